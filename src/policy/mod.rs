@@ -1,0 +1,41 @@
+//! Policies: a formula over `Real`, or a trained network.
+
+mod mlp;
+
+pub use mlp::{Activation, Layer, Mlp, OutputActivation};
+
+use crate::real::Real;
+
+/// A deterministic policy `u = pi(x)`.
+///
+/// A formula implements [`Policy::control`] alone: it is vectorised and printed as WGSL like the
+/// physics. A policy that returns a [`Policy::network`] is evaluated layer by layer by the
+/// backends, and its `control` is the reference for that.
+pub trait Policy<const NX: usize, const NU: usize>: Sync {
+    /// Short name for reports.
+    fn name(&self) -> String;
+
+    /// The network, where the policy is one.
+    fn network(&self) -> Option<&Mlp> {
+        None
+    }
+
+    /// The control at `x`.
+    fn control<R: Real>(&self, x: [R; NX]) -> [R; NU];
+}
+
+impl<const NX: usize, const NU: usize> Policy<NX, NU> for Mlp {
+    fn name(&self) -> String {
+        let widths: Vec<String> = self.widths().iter().map(ToString::to_string).collect();
+        format!("mlp {}", widths.join("-"))
+    }
+
+    fn network(&self) -> Option<&Mlp> {
+        Some(self)
+    }
+
+    fn control<R: Real>(&self, x: [R; NX]) -> [R; NU] {
+        let output = self.forward(&x);
+        std::array::from_fn(|i| output[i])
+    }
+}

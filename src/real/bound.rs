@@ -1,0 +1,1 @@
+//! The bound type: sound intervals of value and gradient over a box.

@@ -1,0 +1,100 @@
+//! SIMD lanes: a plain array that the compiler vectorises for whatever the caller enabled.
+
+use std::array::from_fn;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::Real;
+
+/// `N` f32 numbers that go through the same formula side by side.
+///
+/// Every operation is inlined, so the instruction set is that of the `#[target_feature]`
+/// function around it (`backend::cpu` picks one when it starts); the bits do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub struct Lanes<const N: usize>(pub [f32; N]);
+
+impl<const N: usize> Lanes<N> {
+    /// The first `N` numbers of `values`.
+    ///
+    /// # Panics
+    /// If there are fewer than `N`.
+    #[inline(always)]
+    pub fn load(values: &[f32]) -> Self {
+        let mut lanes = [0.0; N];
+        lanes.copy_from_slice(&values[..N]);
+        Self(lanes)
+    }
+
+    /// Writes the lanes to the first `N` places of `values`.
+    ///
+    /// # Panics
+    /// If there are fewer than `N`.
+    #[inline(always)]
+    pub fn store(self, values: &mut [f32]) {
+        values[..N].copy_from_slice(&self.0);
+    }
+
+    /// One bit pattern per lane that is 0 where the lane is finite, else not.
+    ///
+    /// Tests exponent bits: a compiler or driver may remove `x != x`.
+    #[inline(always)]
+    pub fn non_finite(self) -> [u32; N] {
+        from_fn(|i| u32::from(self.0[i].to_bits() & EXPONENT == EXPONENT))
+    }
+}
+
+/// Exponent bits of an f32: all set for infinities and NaN.
+const EXPONENT: u32 = 0x7f80_0000;
+
+macro_rules! lanewise {
+    ($trait:ident, $method:ident, $op:tt) => {
+        impl<const N: usize> $trait for Lanes<N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, rhs: Self) -> Self {
+                Self(from_fn(|i| self.0[i] $op rhs.0[i]))
+            }
+        }
+    };
+}
+lanewise!(Add, add, +);
+lanewise!(Sub, sub, -);
+lanewise!(Mul, mul, *);
+lanewise!(Div, div, /);
+
+impl<const N: usize> Neg for Lanes<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(from_fn(|i| -self.0[i]))
+    }
+}
+
+impl<const N: usize> Real for Lanes<N> {
+    #[inline(always)]
+    fn lit(value: f32) -> Self {
+        Self([value; N])
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(from_fn(|i| self.0[i].abs()))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(from_fn(|i| self.0[i].sqrt()))
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Self(from_fn(|i| self.0[i].floor()))
+    }
+    #[inline(always)]
+    fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
+        Self(from_fn(|i| {
+            if self.0[i] < rhs.0[i] {
+                yes.0[i]
+            } else {
+                no.0[i]
+            }
+        }))
+    }
+}

@@ -1,0 +1,90 @@
+//! Prints a recorded graph as a WGSL function.
+
+use std::fmt::Write;
+
+use super::record::{Graph, Node};
+
+/// The WGSL function `name`, one `let` per operation.
+///
+/// `arguments` are names and lengths of the array arguments, whose elements are the graph's
+/// inputs in order; an argument of length 1 is a plain f32. The result is an f32, or an array of
+/// them where there are several outputs.
+///
+/// ```
+/// use reachcast::real::{record::record, wgsl::function};
+/// let graph = record(3, |x| vec![x[0] * x[2]]);
+/// let text = function("scaled", &[("x", 2), ("by", 1)], &graph);
+/// assert!(text.starts_with("fn scaled(x: array<f32, 2>, by: f32) -> f32 {"));
+/// ```
+///
+/// # Panics
+/// If the arguments do not add up to the graph's inputs, or a literal is not finite (WGSL has no
+/// such literal).
+pub fn function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
+    let inputs: Vec<String> = arguments
+        .iter()
+        .flat_map(|&(name, length)| {
+            (0..length).map(move |i| {
+                if length == 1 {
+                    name.into()
+                } else {
+                    format!("{name}[{i}]")
+                }
+            })
+        })
+        .collect();
+    assert_eq!(
+        inputs.len(),
+        graph.inputs,
+        "arguments of the WGSL function `{name}`"
+    );
+    let parameters: Vec<String> = arguments
+        .iter()
+        .map(|(name, length)| format!("{name}: {}", float_type(*length)))
+        .collect();
+    let result = float_type(graph.outputs.len());
+    let mut text = format!("fn {name}({}) -> {result} {{\n", parameters.join(", "));
+    for (i, node) in graph.nodes.iter().enumerate() {
+        writeln!(text, "    let v{i} = {};", operation(node, &inputs)).expect("a String grows");
+    }
+    let outputs: Vec<String> = graph.outputs.iter().map(|i| format!("v{i}")).collect();
+    if outputs.len() == 1 {
+        writeln!(text, "    return {};\n}}", outputs[0])
+    } else {
+        writeln!(text, "    return {result}({});\n}}", outputs.join(", "))
+    }
+    .expect("a String grows");
+    text
+}
+
+/// `f32` or an array of them.
+fn float_type(length: usize) -> String {
+    if length == 1 {
+        "f32".to_owned()
+    } else {
+        format!("array<f32, {length}>")
+    }
+}
+
+/// The right-hand side of a node.
+fn operation(node: &Node, inputs: &[String]) -> String {
+    match *node {
+        Node::Input(i) => inputs[i as usize].clone(),
+        Node::Literal(bits) => literal(f32::from_bits(bits)),
+        Node::Add(a, b) => format!("v{a} + v{b}"),
+        Node::Sub(a, b) => format!("v{a} - v{b}"),
+        Node::Mul(a, b) => format!("v{a} * v{b}"),
+        Node::Div(a, b) => format!("v{a} / v{b}"),
+        Node::Neg(a) => format!("-v{a}"),
+        Node::Abs(a) => format!("abs(v{a})"),
+        Node::Sqrt(a) => format!("sqrt(v{a})"),
+        Node::Floor(a) => format!("floor(v{a})"),
+        Node::IfLt(a, b, yes, no) => format!("select(v{no}, v{yes}, v{a} < v{b})"),
+    }
+}
+
+/// The shortest decimal that is read back as the same f32.
+fn literal(value: f32) -> String {
+    assert!(value.is_finite(), "the literal {value} has no WGSL form");
+    format!("{value:?}f")
+}

@@ -1,0 +1,164 @@
+//! The tasks that a backend runs, and their results.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::sample::{Pairs, Starts};
+use crate::error::{Error, Result};
+
+/// Longest horizon, steps.
+pub const MAX_HORIZON: u32 = 10_000;
+
+/// A system and the policy that drives it.
+#[derive(Debug)]
+pub struct Plant<'a, S, P> {
+    /// Dynamics and margins.
+    pub system: &'a S,
+    /// The controls.
+    pub policy: &'a P,
+}
+
+impl<S, P> Clone for Plant<'_, S, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S, P> Copy for Plant<'_, S, P> {}
+
+/// Length and discount of a rollout.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RolloutSpec {
+    /// Steps T; the states are x_0..=x_T.
+    pub horizon: u32,
+    /// Discount per step, in (0, 1].
+    pub gamma: f32,
+}
+
+impl RolloutSpec {
+    /// A checked specification.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the horizon is 0 or above [`MAX_HORIZON`], or gamma is outside (0, 1].
+    pub fn new(horizon: u32, gamma: f32) -> Result<Self> {
+        if !(1..=MAX_HORIZON).contains(&horizon) {
+            let problem = format!("{horizon} is not within 1..={MAX_HORIZON} steps");
+            return Err(Error::invalid("horizon", problem));
+        }
+        if !(gamma > 0.0 && gamma <= 1.0) {
+            return Err(Error::invalid(
+                "gamma",
+                format!("{gamma} is outside (0, 1]"),
+            ));
+        }
+        Ok(Self { horizon, gamma })
+    }
+}
+
+/// What both margins lose at each step: `L_r Delta_t` and `L_c Delta_t`, `[T + 1]` each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tightening {
+    /// Taken off the target margin.
+    pub target: Vec<f32>,
+    /// Taken off the constraint margin.
+    pub constraint: Vec<f32>,
+}
+
+impl Tightening {
+    /// Nothing taken off.
+    pub fn none(spec: &RolloutSpec) -> Self {
+        let zero = vec![0.0; spec.horizon as usize + 1];
+        Self {
+            target: zero.clone(),
+            constraint: zero,
+        }
+    }
+}
+
+/// What is wanted of each start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Query {
+    /// The reach-avoid measure.
+    Measure,
+    /// Its sign, 1 or -1 ([`super::NON_FINITE`] as it is); a decided rollout stops early.
+    Sign,
+}
+
+/// Reach-avoid measures of a range of starts.
+#[derive(Clone, Debug)]
+pub struct ReachAvoidTask<'a, const NX: usize> {
+    /// The starts.
+    pub starts: Starts<'a, NX>,
+    /// Which of them, by index.
+    pub range: Range<u64>,
+    /// Horizon and discount.
+    pub spec: RolloutSpec,
+    /// What the margins lose; `[T + 1]`.
+    pub tightening: &'a Tightening,
+    /// Measure or sign.
+    pub query: Query,
+}
+
+/// How the perturbed rollout of a pair is driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PairControl {
+    /// By the controls of the nominal rollout.
+    Replay,
+    /// By the policy in feedback.
+    ClosedLoop,
+}
+
+/// Rollouts of a range of pairs.
+#[derive(Clone, Debug)]
+pub struct DeviationTask<'a, const NX: usize> {
+    /// The pairs.
+    pub pairs: Pairs<'a, NX>,
+    /// Which of them, by index.
+    pub range: Range<u64>,
+    /// Horizon and discount.
+    pub spec: RolloutSpec,
+    /// What the margins of the nominal rollout lose; `[T + 1]`.
+    pub tightening: &'a Tightening,
+    /// How the perturbed rollout is driven.
+    pub control: PairControl,
+}
+
+/// Reach-avoid measures of one pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PairMeasure {
+    /// Of the nominal rollout, with tightened margins: `V_check`.
+    pub nominal: f32,
+    /// Of the perturbed rollout, with the margins as they are.
+    pub perturbed: f32,
+}
+
+/// The largest distance within a pair at one step, and the first pair that attains it.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Farthest {
+    /// Euclidean distance; [`super::HUGE`] where a state is not finite.
+    pub distance: f32,
+    /// Index of the pair.
+    pub pair: u64,
+}
+
+impl Farthest {
+    /// No pair seen yet.
+    pub const NONE: Self = Self {
+        distance: 0.0,
+        pair: u64::MAX,
+    };
+
+    /// The farther of two; of equal ones the first pair.
+    #[must_use]
+    pub fn merge(self, other: Self) -> Self {
+        let before = other.distance == self.distance && other.pair < self.pair;
+        if other.distance > self.distance || before {
+            other
+        } else {
+            self
+        }
+    }
+}

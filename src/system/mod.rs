@@ -1,0 +1,87 @@
+//! Systems: dynamics, target and constraint, written once over `Real`.
+
+mod double_integrator;
+mod drone_race;
+
+pub use double_integrator::{BangBang, DoubleIntegrator};
+pub use drone_race::{Cone, DroneRace};
+
+use crate::real::Real;
+
+/// A discrete-time system `x[t+1] = f(x[t], u[t])` with its two margins.
+///
+/// `NX` states and `NU` controls. The parameters are recorded as literals: the WGSL text that
+/// comes of it is the experiment, and its hash goes into every certificate. Mark the formulas
+/// `#[inline(always)]`, so that SIMD lanes are compiled for the machine's widest instructions.
+///
+/// ```
+/// use reachcast::real::Real;
+/// use reachcast::system::{Axis, System};
+///
+/// struct Cart;
+///
+/// impl System<2, 1> for Cart {
+///     fn name(&self) -> &str {
+///         "cart"
+///     }
+///     fn states(&self) -> [Axis; 2] {
+///         [Axis::new("position", "m", -1.0, 1.0), Axis::new("velocity", "m/s", -1.0, 1.0)]
+///     }
+///     fn controls(&self) -> [Axis; 1] {
+///         [Axis::new("force", "N", -1.0, 1.0)]
+///     }
+///     #[inline(always)]
+///     fn step<R: Real>(&self, [x, v]: [R; 2], [u]: [R; 1]) -> [R; 2] {
+///         let dt = R::lit(0.1);
+///         [x + dt * v, v + dt * u.clamp(R::lit(-1.0), R::lit(1.0))]
+///     }
+///     #[inline(always)]
+///     fn target<R: Real>(&self, [x, _]: [R; 2]) -> R {
+///         R::lit(0.1) - x.abs()
+///     }
+///     #[inline(always)]
+///     fn constraint<R: Real>(&self, [_, v]: [R; 2]) -> R {
+///         R::lit(1.0) - v.abs()
+///     }
+/// }
+/// assert_eq!(Cart.step([1.0_f64, 0.0], [5.0])[1], f64::from(0.1_f32));
+/// ```
+pub trait System<const NX: usize, const NU: usize>: Sync {
+    /// Short name, lower case with hyphens.
+    fn name(&self) -> &str;
+    /// Name, unit and default box of each state; the order is the state order of every file.
+    fn states(&self) -> [Axis; NX];
+    /// Name, unit and bounds of each control.
+    fn controls(&self) -> [Axis; NU];
+    /// The next state; clips the control to its bounds itself.
+    fn step<R: Real>(&self, x: [R; NX], u: [R; NU]) -> [R; NX];
+    /// Target margin `r`: positive inside the target set.
+    fn target<R: Real>(&self, x: [R; NX]) -> R;
+    /// Constraint margin `c`: positive where safe.
+    fn constraint<R: Real>(&self, x: [R; NX]) -> R;
+}
+
+/// Name, unit and interval of a state or control.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Axis {
+    /// Name, as in `state_order`.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Lower end of the default box, or lower bound of a control.
+    pub low: f32,
+    /// Upper end.
+    pub high: f32,
+}
+
+impl Axis {
+    /// An axis over `[low, high]`.
+    pub fn new(name: &str, unit: &str, low: f32, high: f32) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            low,
+            high,
+        }
+    }
+}
