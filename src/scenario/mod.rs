@@ -1,1 +1,4 @@
-//! Certificates.
+//! Certificates: what scenarios, drawn and rolled out, allow one to claim.
+
+pub mod record;
+pub mod settings;
