@@ -1,1 +1,5 @@
 //! Certificates.
+
+pub mod bound;
+pub mod ledger;
+mod tail;
