@@ -6,6 +6,7 @@ use super::Context;
 use super::bound::{certified_risk, interval};
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord};
 use super::settings::Settings;
+use super::verify::Finding;
 use crate::error::Result;
 use crate::policy::Policy;
 use crate::rollout::{
@@ -255,4 +256,16 @@ where
         Ok(())
     })?;
     Ok(worst)
+}
+
+/// Whether the certified shares of two independent samples are compatible.
+pub(super) fn share_overlaps(stored: &GlobalRecord, fresh: &GlobalRecord) -> Finding {
+    let [low, high] = stored.share_interval;
+    let [fresh_low, fresh_high] = fresh.share_interval;
+    Finding {
+        name: "certified share on fresh pairs".to_owned(),
+        stored: format!("{low:.6} to {high:.6}"),
+        found: format!("{fresh_low:.6} to {fresh_high:.6}"),
+        holds: low <= fresh_high && fresh_low <= high,
+    }
 }

@@ -1,15 +1,21 @@
 //! Certificates: what scenarios, drawn and rolled out, allow one to claim.
 
+pub mod bound;
 mod boundary;
 mod certify;
 mod deviation;
 mod global;
 mod growth;
+pub mod ledger;
+pub mod linear;
+pub mod lipschitz;
 pub mod record;
 pub mod settings;
+mod tail;
 mod verify;
 
-pub use certify::certify;
+pub use certify::{certify, hashes};
+pub use growth::Growth;
 pub use verify::{CheckReport, Finding, QueryRow, check, query};
 
 use crate::backend::Backend;
