@@ -10,7 +10,7 @@ use crate::rollout::{PairControl, RolloutSpec};
 pub enum Joint {
     /// One scalar scales a shape fixed by an independent pilot sample: d = 1.
     FixedShape,
-    /// The bound of every step is a decision variable: d = T + 1.
+    /// The bound of every step but the first is a decision variable: d = T.
     Variables,
     /// Each step on its own with risk and beta divided by their number.
     Bonferroni,
