@@ -71,7 +71,8 @@ fn check_level(
         let refused = |problem: String| Err(Error::invalid(origin, problem));
         match (valid.get(key), value) {
             (None, _) => {
-                let nearest = nearest(&path, &paths(root, ""));
+                let all = paths(root, "");
+                let nearest = nearest(&path, &all);
                 return refused(format!(
                     "unknown key `{path}`; the nearest valid key is `{nearest}`"
                 ));
@@ -108,5 +109,8 @@ pub(super) fn nearest<'a>(path: &str, candidates: &'a [String]) -> &'a str {
         let whole = strsim::damerau_levenshtein(path, candidate);
         whole.min(1 + strsim::damerau_levenshtein(&last(path), &last(candidate)))
     };
-    candidates.iter().min_by_key(edits).map_or("", String::as_str)
+    candidates
+        .iter()
+        .min_by_key(edits)
+        .map_or("", String::as_str)
 }

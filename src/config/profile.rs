@@ -44,13 +44,23 @@ fn drone_race(profile: Profile) -> Config {
     if published {
         (states[9].low, states[9].high) = (-1.0, 1.0);
     }
-    let given = |value| if published { Constant::Given(value) } else { Constant::Computed };
+    let given = |value| {
+        if published {
+            Constant::Given(value)
+        } else {
+            Constant::Computed
+        }
+    };
     let slice = SliceSection {
         x: axis("ego_x", -0.9, 0.9, 0.1),
         y: axis("ego_y", -2.6, 0.0, 0.1),
     };
     let system = SystemSection::DroneRace {
-        cone: if profile == Profile::Paper { Cone::Squared } else { Cone::Distance },
+        cone: if profile == Profile::Paper {
+            Cone::Squared
+        } else {
+            Cone::Distance
+        },
         ego_gain: if profile == Profile::Paper { 1.0 } else { 0.5 },
         opponent_gain: 1.0,
         speed_limit: profile == Profile::Study,
@@ -105,7 +115,10 @@ fn common(
         seed: 1,
         system,
         policy: PolicySection::default(),
-        rollout: RolloutSection { horizon: 30, gamma: 0.95 },
+        rollout: RolloutSection {
+            horizon: 30,
+            gamma: 0.95,
+        },
         bounds: by_name(states, |axis, _| [decimal(axis.low), decimal(axis.high)]),
         constants: ConstantsSection {
             target: Constant::Computed,
@@ -117,11 +130,18 @@ fn common(
             beta,
             scenarios,
             pilot: 1000,
-            joint: if rigorous { Joint::FixedShape } else { Joint::Separate },
+            joint: if rigorous {
+                Joint::FixedShape
+            } else {
+                Joint::Separate
+            },
             control: PairControl::Replay,
             source: DeviationSource::Scenario,
         },
-        global: GlobalSection { draws: 20_000, beta },
+        global: GlobalSection {
+            draws: 20_000,
+            beta,
+        },
         slice,
         state: by_name(states, |_, i| state[i]),
         growth: GrowthSection {
@@ -144,13 +164,22 @@ fn common(
 
 /// A slice axis.
 fn axis(state: &str, from: f64, to: f64, step: f64) -> SliceAxisSection {
-    SliceAxisSection { state: state.to_owned(), from, to, step }
+    SliceAxisSection {
+        state: state.to_owned(),
+        from,
+        to,
+        step,
+    }
 }
 
 /// A value for the name of each state.
 fn by_name<T>(states: &[Axis], value: impl Fn(&Axis, usize) -> T) -> Named<T> {
     let entries = states.iter().enumerate();
-    Named(entries.map(|(i, axis)| (axis.name.clone(), value(axis, i))).collect())
+    Named(
+        entries
+            .map(|(i, axis)| (axis.name.clone(), value(axis, i)))
+            .collect(),
+    )
 }
 
 /// Owned names.

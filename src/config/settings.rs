@@ -5,9 +5,8 @@ use super::section::{Config, SliceAxisSection};
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
-use crate::scenario::bound::{per_round, required_scenarios};
 use crate::scenario::settings::{
-    ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Joint, Settings, SliceAxis,
+    ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings, SliceAxis,
 };
 use crate::system::Axis;
 
@@ -35,7 +34,7 @@ impl Config {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the key whose value is out of range, not finite or no name of a
-    /// state; [`Error::TooFewScenarios`] for fewer scenarios than the exact bound needs.
+    /// state. Whether the scenarios are enough is for [`crate::scenario::certify`] to say.
     pub fn settings<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Settings<NX>> {
         let (low, high) = self.corners(axes)?;
         let constant = |key: &str, constant: Constant| match constant {
@@ -73,7 +72,10 @@ impl Config {
             Ok(ends)
         };
         let intervals = in_order("box", &self.bounds, axes, interval)?;
-        let (low, high) = (intervals.map(|[low, _]| low), intervals.map(|[_, high]| high));
+        let (low, high) = (
+            intervals.map(|[low, _]| low),
+            intervals.map(|[_, high]| high),
+        );
         if low == high {
             let problem = "empty: no interval has any length, so there is nothing to draw from";
             return Err(Error::invalid("box", problem));
@@ -81,10 +83,10 @@ impl Config {
         Ok((low, high))
     }
 
-    /// The deviation bound, its scenarios checked against the exact bound.
+    /// The deviation bound.
     fn deviation_settings(&self) -> Result<DeviationSettings> {
         let asked = self.deviation;
-        let settings = DeviationSettings {
+        Ok(DeviationSettings {
             radius: positive_f32("deviation.radius", asked.radius)?,
             epsilon: share("deviation.epsilon", asked.epsilon)?,
             beta: share("deviation.beta", asked.beta)?,
@@ -93,26 +95,17 @@ impl Config {
             joint: asked.joint,
             control: asked.control,
             source: asked.source,
-        };
-        // The bound of step 0 is the radius itself; the other steps share what is asked for.
-        let steps = f64::from(self.rollout.horizon.max(1));
-        let (epsilon, beta, decision_vars) = match asked.joint {
-            Joint::FixedShape | Joint::Separate => (asked.epsilon, asked.beta, 1),
-            Joint::Variables => (asked.epsilon, asked.beta, self.rollout.horizon.max(1)),
-            Joint::Bonferroni => (asked.epsilon / steps, asked.beta / steps, 1),
-        };
-        enough("deviation", asked.scenarios, epsilon, beta, decision_vars)?;
-        Ok(settings)
+        })
     }
 
-    /// Local growth, its scenarios checked against the exact bound.
+    /// Local growth.
     fn growth_settings<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<GrowthSettings<NX>> {
         let asked = &self.growth;
         if !(1..=MOST_ROUNDS).contains(&asked.rounds) {
             let problem = format!("{} is not within 1..={MOST_ROUNDS}", asked.rounds);
             return Err(Error::invalid("growth.rounds", problem));
         }
-        let settings = GrowthSettings {
+        Ok(GrowthSettings {
             radius: positive_f32("growth.radius", asked.radius)?,
             rounds: asked.rounds,
             scenarios: at_least_one("growth.scenarios", asked.scenarios)?,
@@ -122,13 +115,7 @@ impl Config {
             varies: self.varies(axes)?,
             boundary: asked.boundary,
             heading: self.heading(axes)?,
-        };
-        let beta = match asked.split_beta {
-            true => per_round(asked.beta, asked.rounds)?,
-            false => asked.beta,
-        };
-        enough("growth", asked.scenarios, asked.epsilon, beta, 1)?;
-        Ok(settings)
+        })
     }
 
     /// The coordinates of growth that vary.
@@ -153,14 +140,21 @@ impl Config {
     /// The states that say what is ahead.
     fn heading(&self, axes: &[Axis]) -> Result<Option<[usize; 4]>> {
         let place = "growth.heading";
-        let indices = self.growth.heading.iter().map(|name| state_index(place, name, axes));
+        let indices = self
+            .growth
+            .heading
+            .iter()
+            .map(|name| state_index(place, name, axes));
         let indices = indices.collect::<Result<Vec<_>>>()?;
         if indices.is_empty() {
             return Ok(None);
         }
         let four = <[usize; 4]>::try_from(indices.as_slice());
         four.map(Some).map_err(|_| {
-            let problem = format!("{} states; expected 4, x, vx, y, vy, or none", indices.len());
+            let problem = format!(
+                "{} states; expected 4, x, vx, y, vy, or none",
+                indices.len()
+            );
             Error::invalid(place, problem)
         })
     }
@@ -185,7 +179,10 @@ fn slice_axis(place: &str, section: &SliceAxisSection, axes: &[Axis]) -> Result<
     let to = f64::from(finite(&format!("{place}.to"), section.to)?);
     positive_f32(&format!("{place}.step"), section.step)?;
     if from >= to {
-        let problem = format!("empty: from {} is not below to {}", section.from, section.to);
+        let problem = format!(
+            "empty: from {} is not below to {}",
+            section.from, section.to
+        );
         return Err(Error::invalid(place, problem));
     }
     // A millionth of a step is rounding, not one more value: -0.9, -0.8, ..., 0.8 below 0.9.
@@ -233,23 +230,16 @@ fn in_order<T: Copy, U: Copy, const NX: usize>(
     Ok(std::array::from_fn(|i| checked[i]))
 }
 
-/// Refuses fewer scenarios than the exact bound of `docs/method.md` section 2 needs.
-fn enough(section: &str, have: u64, epsilon: f64, beta: f64, decision_vars: u32) -> Result<()> {
-    share(&format!("{section}.epsilon"), epsilon)?;
-    let need = required_scenarios(epsilon, beta, decision_vars)?;
-    if have < need {
-        return Err(Error::TooFewScenarios { have, need, epsilon, beta, decision_vars });
-    }
-    Ok(())
-}
-
 /// `value` as an f32, finite.
 fn finite(key: &str, value: f64) -> Result<f32> {
     let single = value as f32;
     if single.is_finite() {
         return Ok(single);
     }
-    Err(Error::invalid(key, format!("{value} is not a finite number")))
+    Err(Error::invalid(
+        key,
+        format!("{value} is not a finite number"),
+    ))
 }
 
 /// `value`, finite and above 0.
@@ -257,7 +247,10 @@ fn positive(key: &str, value: f64) -> Result<f64> {
     if value.is_finite() && value > 0.0 {
         return Ok(value);
     }
-    Err(Error::invalid(key, format!("{value} is not a positive number")))
+    Err(Error::invalid(
+        key,
+        format!("{value} is not a positive number"),
+    ))
 }
 
 /// `value` as an f32, finite and above 0.
@@ -273,7 +266,10 @@ fn share(key: &str, value: f64) -> Result<f64> {
     if value > 0.0 && value < 1.0 {
         return Ok(value);
     }
-    Err(Error::invalid(key, format!("{value} is not strictly between 0 and 1")))
+    Err(Error::invalid(
+        key,
+        format!("{value} is not strictly between 0 and 1"),
+    ))
 }
 
 /// `count`, at least 1.

@@ -43,10 +43,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Named<T> {
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a table with the names of states as keys")
             }
-            fn visit_map<A: MapAccess<'de>>(
-                self,
-                mut map: A,
-            ) -> Result<Self::Value, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
                 let mut entries = Vec::new();
                 while let Some(entry) = map.next_entry()? {
                     entries.push(entry);
@@ -84,10 +81,7 @@ impl<'de> Deserialize<'de> for Constant {
             fn visit_u64<E>(self, value: u64) -> Result<Constant, E> {
                 Ok(Constant::Given(value as f64))
             }
-            fn visit_str<E: serde::de::Error>(
-                self,
-                text: &str,
-            ) -> Result<Constant, E> {
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Constant, E> {
                 match text {
                     "computed" => Ok(Constant::Computed),
                     _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
@@ -115,19 +109,13 @@ impl<'de> Deserialize<'de> for Coordinates {
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("\"all\" or a list of names of states")
             }
-            fn visit_str<E: serde::de::Error>(
-                self,
-                text: &str,
-            ) -> Result<Coordinates, E> {
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Coordinates, E> {
                 match text {
                     "all" => Ok(Coordinates::All),
                     _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
                 }
             }
-            fn visit_seq<A: SeqAccess<'de>>(
-                self,
-                names: A,
-            ) -> Result<Coordinates, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, names: A) -> Result<Coordinates, A::Error> {
                 let names = Vec::deserialize(SeqAccessDeserializer::new(names));
                 names.map(Coordinates::Named)
             }

@@ -12,7 +12,50 @@ pub struct Gpu {
     name: String,
 }
 
+/// What an adapter is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub enum AdapterKind {
+    /// A program.
+    Software,
+}
+
+/// An adapter.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Adapter {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: AdapterKind,
+}
+
+impl std::fmt::Display for Adapter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+/// Which adapter to open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// The best one that is not software.
+    Hardware,
+    /// The best one.
+    Any,
+    /// By name.
+    Named(String),
+}
+
+/// The adapters of this machine.
+pub fn adapters() -> Vec<Adapter> {
+    Vec::new()
+}
+
 impl Gpu {
+    /// Opens an adapter.
+    pub fn open(choice: &Choice) -> Result<Self> {
+        Err(crate::Error::Device(format!("no adapter for {choice:?}")))
+    }
+
     /// The adapter in words.
     pub fn device(&self) -> String {
         self.name.clone()
