@@ -18,22 +18,30 @@ const BISECTIONS: usize = 20;
 /// Spread of the directions around the best one so far, sweep by sweep; the first is uniform.
 const SPREADS: [f32; 4] = [0.0, 0.6, 0.3, 0.1];
 /// The eight neighbours of a cell.
-const NEIGHBOURS: [(isize, isize); 8] =
-    [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)];
+const NEIGHBOURS: [(isize, isize); 8] = [
+    (-1, -1),
+    (-1, 0),
+    (-1, 1),
+    (0, -1),
+    (0, 1),
+    (1, -1),
+    (1, 0),
+    (1, 1),
+];
 /// Cosine above which a cell counts as straight ahead, from the study.
 const STRAIGHT: f64 = 0.9;
 
 /// A certified state next to one that is not, and its distance from the state searched from.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Boundary<const NX: usize> {
+pub struct Boundary<const NX: usize> {
     /// The certified state.
-    pub(super) point: [f32; NX],
+    pub point: [f32; NX],
     /// Its Euclidean distance.
-    pub(super) distance: f64,
+    pub distance: f64,
 }
 
 /// The closest boundary point by the method that `settings` ask for; none if there is none.
-pub(super) fn search<S, P, const NX: usize, const NU: usize>(
+pub fn search<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
     settings: &Settings<NX>,
     tightening: &Tightening,
@@ -51,10 +59,7 @@ where
 
 /// The study's choice: a certified cell with an uncertified neighbour (of eight; the rim of the
 /// slice counts as uncertified), cells ahead of the velocity preferred, then the nearest.
-fn on_slice<const NX: usize>(
-    settings: &Settings<NX>,
-    slice: &SliceRecord,
-) -> Option<Boundary<NX>> {
+fn on_slice<const NX: usize>(settings: &Settings<NX>, slice: &SliceRecord) -> Option<Boundary<NX>> {
     let (rows, columns) = (slice.y.values.len(), slice.x.values.len());
     let certified = |row: usize, column: usize| {
         row < rows && column < columns && slice.check_margin[row * columns + column] > 0.0
@@ -64,7 +69,10 @@ fn on_slice<const NX: usize>(
     for row in 0..rows {
         for column in 0..columns {
             let surrounded = NEIGHBOURS.iter().all(|(dr, dc)| {
-                certified(row.wrapping_add_signed(*dr), column.wrapping_add_signed(*dc))
+                certified(
+                    row.wrapping_add_signed(*dr),
+                    column.wrapping_add_signed(*dc),
+                )
             });
             if certified(row, column) && !surrounded {
                 cells.push(states[row * columns + column]);
@@ -93,7 +101,10 @@ fn nearest<const NX: usize>(
             }
         }
     }
-    let measured = cells.into_iter().map(|point| Boundary { point, distance: distance(&point, &state) });
+    let measured = cells.into_iter().map(|point| Boundary {
+        point,
+        distance: distance(&point, &state),
+    });
     measured.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
@@ -117,13 +128,18 @@ where
     P: Policy<NX, NU>,
 {
     let rays = DIRECTIONS * (POINTS + BISECTIONS) as u64;
-    context.watch.begin("boundary search", rays * SPREADS.len() as u64);
+    context
+        .watch
+        .begin("boundary search", rays * SPREADS.len() as u64);
     let certified = |states: &[[f32; NX]]| -> Result<Vec<bool>> {
         let margins = check_margins(context, &settings.spec, tightening, states, Query::Sign)?;
-        let inside = |x: &[f32; NX]| {
-            (0..NX).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i])
-        };
-        Ok(states.iter().zip(margins).map(|(x, margin)| margin > 0.0 && inside(x)).collect())
+        let inside =
+            |x: &[f32; NX]| (0..NX).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
+        Ok(states
+            .iter()
+            .zip(margins)
+            .map(|(x, margin)| margin > 0.0 && inside(x))
+            .collect())
     };
     let start_certified = certified(&[settings.state])?[0];
     let mut best: Option<(Boundary<NX>, [f32; NX])> = None;
@@ -132,7 +148,8 @@ where
         let directions = directions(settings, sweep as u32, around);
         let found = sweep_rays(settings, &directions, start_certified, certified)?;
         let nearer = |boundary: &Boundary<NX>| {
-            best.as_ref().is_none_or(|(best, _)| boundary.distance < best.distance)
+            best.as_ref()
+                .is_none_or(|(best, _)| boundary.distance < best.distance)
         };
         if let Some(found) = found.filter(|(boundary, _)| nearer(boundary)) {
             best = Some(found);
@@ -175,21 +192,34 @@ fn sweep_rays<const NX: usize>(
     let at = |direction: &[f32; NX], length: f32| -> [f32; NX] {
         std::array::from_fn(|i| settings.state[i] + length * direction[i])
     };
-    let reach = settings.low.iter().zip(settings.high).map(|(low, high)| high - low);
+    let reach = settings
+        .low
+        .iter()
+        .zip(settings.high)
+        .map(|(low, high)| high - low);
     let reach = reach.fold(0.0, f32::max);
-    let lengths: Vec<f32> = (1..=POINTS).map(|k| reach * (k as f32 / POINTS as f32).powi(2)).collect();
-    let points: Vec<_> =
-        directions.iter().flat_map(|d| lengths.iter().map(|length| at(d, *length))).collect();
+    let lengths: Vec<f32> = (1..=POINTS)
+        .map(|k| reach * (k as f32 / POINTS as f32).powi(2))
+        .collect();
+    let points: Vec<_> = directions
+        .iter()
+        .flat_map(|d| lengths.iter().map(|length| at(d, *length)))
+        .collect();
     let inside = certified(&points)?;
     // Brackets [near, far] of the first change along each ray; near has the state's side.
     let mut brackets = Vec::new();
     for (ray, inside) in inside.chunks(POINTS).enumerate() {
         if let Some(k) = inside.iter().position(|inside| *inside != start_certified) {
-            brackets.push((ray, k.checked_sub(1).map_or(0.0, |before| lengths[before]), lengths[k]));
+            brackets.push((
+                ray,
+                k.checked_sub(1).map_or(0.0, |before| lengths[before]),
+                lengths[k],
+            ));
         }
     }
     for _ in 0..BISECTIONS {
-        let middle = |(ray, near, far): &(usize, f32, f32)| at(&directions[*ray], 0.5 * (near + far));
+        let middle =
+            |(ray, near, far): &(usize, f32, f32)| at(&directions[*ray], 0.5 * (near + far));
         let inside = certified(&brackets.iter().map(middle).collect::<Vec<_>>())?;
         for ((_, near, far), inside) in brackets.iter_mut().zip(inside) {
             let middle = 0.5 * (*near + *far);
@@ -200,6 +230,12 @@ fn sweep_rays<const NX: usize>(
     Ok(closest.map(|(ray, near, far)| {
         // The certified end of the bracket.
         let point = at(&directions[ray], if start_certified { near } else { far });
-        (Boundary { point, distance: distance(&point, &settings.state) }, directions[ray])
+        (
+            Boundary {
+                point,
+                distance: distance(&point, &settings.state),
+            },
+            directions[ray],
+        )
     }))
 }

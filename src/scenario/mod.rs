@@ -1,11 +1,11 @@
 //! Certificates: what scenarios, drawn and rolled out, allow one to claim.
 
 pub mod bound;
-mod boundary;
+pub mod boundary;
 mod certify;
-mod deviation;
-mod global;
-mod growth;
+pub mod deviation;
+pub mod global;
+pub mod growth;
 pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
@@ -15,7 +15,6 @@ mod tail;
 mod verify;
 
 pub use certify::{certify, hashes};
-pub use growth::Growth;
 pub use verify::{CheckReport, Finding, QueryRow, check, query};
 
 use crate::backend::Backend;
@@ -45,13 +44,13 @@ impl Watch for Unwatched {
 }
 
 /// What every stage works with: who runs, what is run, and who watches.
-pub(crate) struct Context<'a, S, P> {
+pub struct Context<'a, S, P> {
     /// Who runs.
-    pub(crate) backend: &'a Backend,
+    pub backend: &'a Backend,
     /// What is run.
-    pub(crate) plant: Plant<'a, S, P>,
+    pub plant: Plant<'a, S, P>,
     /// Who watches.
-    pub(crate) watch: &'a dyn Watch,
+    pub watch: &'a dyn Watch,
 }
 
 impl<S, P> Clone for Context<'_, S, P> {
