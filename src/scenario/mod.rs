@@ -1,1 +1,4 @@
 //! Certificates.
+
+pub mod linear;
+pub mod lipschitz;
