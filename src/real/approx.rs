@@ -67,7 +67,7 @@ pub(super) fn cos<R: Real>(angle: R) -> R {
     R::lit(1.0) - R::lit(2.0) * sin * sin
 }
 
-/// Hyperbolic tangent: an odd rational function fitted to relative error 9e-9, within 3e-7 of the
+/// Hyperbolic tangent: an odd rational function fitted to relative error 9e-9, within 4e-7 of the
 /// truth after rounding; saturates to 1 at 8.2, where the truth is 1.5e-7 below.
 #[inline(always)]
 pub(super) fn tanh<R: Real>(x: R) -> R {
@@ -128,10 +128,10 @@ mod tests {
     fn close_to_the_platform_in_f64() {
         assert!(worst(-4.0, 4.0, <f32 as Real>::sin, f64::sin) < 3e-7);
         assert!(worst(-4.0, 4.0, <f32 as Real>::cos, f64::cos) < 5e-7);
-        assert!(worst(-1000.0, 1000.0, <f32 as Real>::sin, f64::sin) < 1e-6);
-        assert!(worst(-1000.0, 1000.0, <f32 as Real>::cos, f64::cos) < 1e-6);
-        assert!(worst(-12.0, 12.0, <f32 as Real>::tanh, f64::tanh) < 3e-7);
-        assert!(worst(6e-8, 1.0, <f32 as Real>::ln_unit, f64::ln) < 2e-6);
+        assert!(worst(-1000.0, 1000.0, <f32 as Real>::sin, f64::sin) < 4e-7);
+        assert!(worst(-1000.0, 1000.0, <f32 as Real>::cos, f64::cos) < 6e-7);
+        assert!(worst(-12.0, 12.0, <f32 as Real>::tanh, f64::tanh) < 4e-7);
+        assert!(worst(6e-8, 1.0, <f32 as Real>::ln_unit, f64::ln) < 1.2e-6);
     }
 
     #[test]

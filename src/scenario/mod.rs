@@ -1,1 +1,62 @@
-//! Certificates.
+//! Certificates: what scenarios, drawn and rolled out, allow one to claim.
+
+pub mod bound;
+pub mod boundary;
+mod certify;
+pub mod deviation;
+pub mod global;
+pub mod growth;
+pub mod ledger;
+pub mod linear;
+pub mod lipschitz;
+pub mod record;
+pub mod settings;
+mod tail;
+mod verify;
+
+pub use certify::{certify, hashes};
+pub use verify::{CheckReport, Finding, QueryRow, check, query};
+
+use crate::backend::Backend;
+use crate::error::Result;
+use crate::rollout::Plant;
+
+/// Follows the work: shows progress, and stops it.
+pub trait Watch {
+    /// A stage of `total` rollouts begins.
+    fn begin(&self, stage: &str, total: u64);
+    /// `count` more rollouts of the stage are done.
+    ///
+    /// # Errors
+    /// [`crate::Error::Interrupted`] to stop the work.
+    fn advance(&self, count: u64) -> Result<()>;
+}
+
+/// A watch that does nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _count: u64) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// What every stage works with: who runs, what is run, and who watches.
+pub struct Context<'a, S, P> {
+    /// Who runs.
+    pub backend: &'a Backend,
+    /// What is run.
+    pub plant: Plant<'a, S, P>,
+    /// Who watches.
+    pub watch: &'a dyn Watch,
+}
+
+impl<S, P> Clone for Context<'_, S, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S, P> Copy for Context<'_, S, P> {}

@@ -1,6 +1,6 @@
 //! The two-drone race: an ego that must pass the gate first, and an opponent under linear feedback.
 
-use super::{Axis, System};
+use super::{Axis, Body, System};
 use crate::real::Real;
 
 /// Step of the explicit Euler integration, seconds.
@@ -147,5 +147,14 @@ impl System<12, 3> for DroneRace {
             margin
         };
         R::lit(MARGIN_SCALE) * margin
+    }
+
+    fn bodies(&self) -> Vec<Body> {
+        let body = |name: &str, x| Body {
+            name: name.to_owned(),
+            x,
+            y: x + 2,
+        };
+        vec![body("ego", 0), body("opponent", 6)]
     }
 }

@@ -59,6 +59,21 @@ pub trait System<const NX: usize, const NU: usize>: Sync {
     fn target<R: Real>(&self, x: [R; NX]) -> R;
     /// Constraint margin `c`: positive where safe.
     fn constraint<R: Real>(&self, x: [R; NX]) -> R;
+    /// The bodies that a picture shows, by the indices of their two coordinates in the plane.
+    fn bodies(&self) -> Vec<Body> {
+        Vec::new()
+    }
+}
+
+/// Something that moves in a plane: what a report draws the path of.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Body {
+    /// Name for the legend.
+    pub name: String,
+    /// Index of the state drawn to the right.
+    pub x: usize,
+    /// Index of the state drawn upwards.
+    pub y: usize,
 }
 
 /// Name, unit and interval of a state or control.

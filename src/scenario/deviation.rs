@@ -1,0 +1,334 @@
+//! The deviation bound: how far a perturbed rollout strays from its nominal one, per step.
+
+use std::collections::BTreeSet;
+
+use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
+use super::record::{Claim, DeviationRecord};
+use super::settings::{DeviationSettings, DeviationSource, Joint, Settings};
+use super::{Context, linear};
+use crate::error::{Error, Result};
+use crate::policy::Policy;
+use crate::rollout::{
+    DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Region, RolloutSpec,
+    Starts, Stream, Tightening,
+};
+use crate::system::System;
+
+/// Risk, beta and decision variables of each scenario program of a joint method.
+pub(super) struct Program {
+    /// Decision variables d.
+    pub(super) decision_vars: u32,
+    /// Risk of one program.
+    pub(super) epsilon: f64,
+    /// Beta of one program.
+    pub(super) beta: f64,
+}
+
+impl Program {
+    /// The program that `joint` makes of the deviation bound over `horizon` steps; the bound of
+    /// step 0 is the radius itself and costs nothing.
+    pub(super) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
+        let DeviationSettings {
+            epsilon,
+            beta,
+            joint,
+            ..
+        } = *settings;
+        let steps = f64::from(horizon);
+        match joint {
+            Joint::FixedShape | Joint::Separate => Self {
+                decision_vars: 1,
+                epsilon,
+                beta,
+            },
+            Joint::Variables => Self {
+                decision_vars: horizon,
+                epsilon,
+                beta,
+            },
+            Joint::Bonferroni => Self {
+                decision_vars: 1,
+                epsilon: epsilon / steps,
+                beta: beta / steps,
+            },
+        }
+    }
+}
+
+/// What the pairs of one sample showed.
+struct Sample {
+    /// Farthest pair of each step.
+    farthest: Vec<Farthest>,
+    /// Rollouts that met a state that is not finite.
+    non_finite: u64,
+}
+
+/// Draws the pairs and bounds the deviation; method and numbers as `settings` ask.
+pub fn bound<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+) -> Result<DeviationRecord>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let asked = &settings.deviation;
+    let program = Program::new(asked, settings.spec.horizon);
+    let need = required_scenarios(program.epsilon, program.beta, program.decision_vars)?;
+    if asked.scenarios < need {
+        return Err(Error::TooFewScenarios {
+            have: asked.scenarios,
+            need,
+            epsilon: program.epsilon,
+            beta: program.beta,
+            decision_vars: program.decision_vars,
+        });
+    }
+    let exact = exact(context.plant.system, settings)?;
+    let pilot = (asked.joint == Joint::FixedShape).then_some(asked.pilot);
+    let shape = match pilot {
+        Some(count) => {
+            context.watch.begin("pilot pairs", count);
+            let purposes = [Purpose::PilotNominal, Purpose::PilotPerturbation];
+            Some(shape(
+                &draw(context, settings, purposes, count)?.farthest,
+                asked.radius,
+            ))
+        }
+        None => None,
+    };
+    context.watch.begin("deviation pairs", asked.scenarios);
+    let purposes = [Purpose::DeviationNominal, Purpose::DeviationPerturbation];
+    let sample = draw(context, settings, purposes, asked.scenarios)?;
+    let largest: Vec<f64> = sample
+        .farthest
+        .iter()
+        .map(|f| f64::from(f.distance))
+        .collect();
+    let (scenario_bound, scale, support) =
+        conclude(&sample.farthest, shape.as_deref(), asked.radius);
+    let bound = match (asked.source, &exact) {
+        (DeviationSource::Exact, Some(exact)) => exact.clone(),
+        _ => scenario_bound,
+    };
+    Ok(DeviationRecord {
+        claim: claim(context.plant.system, settings, &program)?,
+        radius: f64::from(asked.radius),
+        control: asked.control,
+        joint: asked.joint,
+        source: asked.source,
+        bound,
+        largest,
+        exact,
+        pilot: pilot.unwrap_or(0),
+        scale,
+        support,
+        posterior_risk: wait_and_judge(asked.scenarios, support, program.beta),
+        non_finite: sample.non_finite,
+    })
+}
+
+/// The exact supremum, for a system that is linear in its state under replayed controls.
+fn exact<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+) -> Result<Option<Vec<f64>>>
+where
+    S: System<NX, NU>,
+{
+    let asked = &settings.deviation;
+    let matrix = match asked.control {
+        PairControl::Replay => linear::state_matrix(system, settings.low, settings.high),
+        // Under feedback the policy bends the dynamics: no single matrix.
+        PairControl::ClosedLoop => None,
+    };
+    if matrix.is_none() && asked.source == DeviationSource::Exact {
+        return Err(Error::invalid(
+            "deviation.source",
+            "`exact` needs a system that is linear in its state and `control = \"replay\"`; \
+             use `scenario`",
+        ));
+    }
+    let radius = f64::from(asked.radius);
+    Ok(matrix.map(|matrix| linear::exact_deviation(&matrix, radius, settings.spec.horizon)))
+}
+
+/// Rolls out `count` pairs of the streams `[nominal, perturbation]`.
+fn draw<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+    [nominal, perturbation]: [Purpose; 2],
+    count: u64,
+) -> Result<Sample>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let stream = |purpose| Stream::new(settings.seed, purpose, 0);
+    let region = Region::new_box(settings.low, settings.high)?;
+    let task = DeviationTask {
+        pairs: Pairs {
+            nominal: Starts::Drawn {
+                region,
+                stream: stream(nominal),
+            },
+            radius: settings.deviation.radius,
+            stream: stream(perturbation),
+        },
+        range: 0..count,
+        spec: settings.spec,
+        tightening: &Tightening::none(&settings.spec),
+        control: settings.deviation.control,
+    };
+    let mut non_finite = 0;
+    let farthest = context
+        .backend
+        .deviation(context.plant, &task, &mut |_, pairs| {
+            let broken = pairs
+                .iter()
+                .filter(|p| p.nominal == NON_FINITE || p.perturbed == NON_FINITE);
+            non_finite += broken.count() as u64;
+            context.watch.advance(pairs.len() as u64)
+        })?;
+    Ok(Sample {
+        farthest,
+        non_finite,
+    })
+}
+
+/// The shape that a pilot sample fixes: its largest distances, the radius at step 0.
+///
+/// A direction that dies out would leave a shape near zero, which one pair could exceed many
+/// times over; a thousandth of the radius is the floor.
+fn shape(pilot: &[Farthest], radius: f32) -> Vec<f64> {
+    let floor = f64::from(radius) * 1e-3;
+    let rest = pilot
+        .iter()
+        .skip(1)
+        .map(|farthest| f64::from(farthest.distance).max(floor));
+    std::iter::once(f64::from(radius)).chain(rest).collect()
+}
+
+/// The bound at each step, the scale of the shape if one was fixed, and the support scenarios.
+///
+/// The perturbed start lies in the ball, so step 0 is bounded by the radius (whose f32 rounding
+/// the largest distance seen may exceed by an ulp).
+fn conclude(
+    farthest: &[Farthest],
+    shape: Option<&[f64]>,
+    radius: f32,
+) -> (Vec<f64>, Option<f64>, u64) {
+    let seen = || farthest.iter().map(|farthest| f64::from(farthest.distance));
+    let Some(shape) = shape else {
+        let first = f64::from(radius).max(f64::from(farthest[0].distance));
+        let bound = std::iter::once(first).chain(seen().skip(1)).collect();
+        let support: BTreeSet<u64> = farthest.iter().skip(1).map(|f| f.pair).collect();
+        return (bound, None, support.len() as u64);
+    };
+    let ratios = seen()
+        .zip(shape)
+        .skip(1)
+        .map(|(distance, shape)| distance / shape);
+    let scale = ratios.fold(0.0, f64::max);
+    let bound = shape.iter().enumerate().map(|(t, shape)| {
+        let scaled = (scale * shape).min(f64::from(HUGE));
+        if t == 0 {
+            scaled.max(f64::from(radius))
+        } else {
+            scaled
+        }
+    });
+    (bound.collect(), Some(scale), 1)
+}
+
+/// The claim in words and numbers.
+fn claim<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    program: &Program,
+) -> Result<Claim>
+where
+    S: System<NX, NU>,
+{
+    let asked = &settings.deviation;
+    let horizon = settings.spec.horizon;
+    let joint = match asked.joint {
+        Joint::FixedShape => format!("at all steps 0..={horizon} at once (fixed shape)"),
+        Joint::Variables => format!("at all steps 0..={horizon} at once ({horizon} variables)"),
+        Joint::Bonferroni => format!("at all steps 0..={horizon} at once (Bonferroni)"),
+        Joint::Separate => "at each single step (no joint statement)".to_owned(),
+    };
+    let driven = match asked.control {
+        PairControl::Replay => "the same controls replayed",
+        PairControl::ClosedLoop => "the policy in feedback on both",
+    };
+    let confidence = format!(
+        "With confidence 1 - {}, a fresh pair stays within the scenario bound {joint} with \
+         probability at least {}, {driven}.",
+        asked.beta,
+        1.0 - asked.epsilon
+    );
+    let statement = match asked.source {
+        DeviationSource::Scenario => confidence,
+        DeviationSource::Exact => format!(
+            "The margins are tightened with the exact supremum, which no pair exceeds. {confidence}"
+        ),
+    };
+    let region = Region::new_box(settings.low, settings.high)?;
+    let (dimension, frozen) = super::certify::coordinates(system, &region.varies());
+    // Risk of one program, times the programs whose risks add up.
+    let programs = asked.epsilon / program.epsilon;
+    let risk = certified_risk(
+        asked.scenarios,
+        u64::from(program.decision_vars) - 1,
+        program.beta,
+    );
+    Ok(Claim {
+        name: "deviation".to_owned(),
+        statement,
+        measure: format!(
+            "nominal start uniform in the box, {dimension} of {NX} coordinates varying; perturbed \
+             start uniform in the Euclidean ball of radius {} around it, all {NX} coordinates",
+            asked.radius
+        ),
+        dimension,
+        frozen,
+        scenarios: asked.scenarios,
+        failures: 0,
+        decision_vars: program.decision_vars,
+        epsilon: asked.epsilon,
+        beta: asked.beta,
+        beta_used: program.beta,
+        required_simple: Some(simple_scenarios(
+            program.epsilon,
+            program.beta,
+            program.decision_vars,
+        )?),
+        required_exact: Some(required_scenarios(
+            program.epsilon,
+            program.beta,
+            program.decision_vars,
+        )?),
+        certified_risk: (programs * risk).min(1.0),
+    })
+}
+
+/// What the margins lose at each step: `L_r Delta_t` and `L_c Delta_t`, rounded up to f32.
+pub fn tightening(
+    bound: &[f64],
+    target_constant: f64,
+    constraint_constant: f64,
+    spec: &RolloutSpec,
+) -> Tightening {
+    debug_assert_eq!(bound.len(), spec.horizon as usize + 1);
+    let scaled = |constant: f64| {
+        let loss = bound
+            .iter()
+            .map(|bound| (constant * bound).min(f64::from(HUGE)) as f32);
+        loss.map(f32::next_up).collect()
+    };
+    Tightening {
+        target: scaled(target_constant),
+        constraint: scaled(constraint_constant),
+    }
+}

@@ -1,0 +1,356 @@
+//! What a certificate prints and stores: plain records, written as `certificate.json`.
+
+use serde::{Deserialize, Serialize};
+
+use super::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::rollout::PairControl;
+use crate::system::{Axis, Body};
+
+/// Version of the layout of [`Record`].
+pub const SCHEMA: u32 = 1;
+
+/// A stored certificate: everything in `certificate.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Whether every claim that was asked for was obtained.
+    pub holds: bool,
+    /// The claims in words, one sentence or two each.
+    pub statements: Vec<String>,
+    /// Who computed what from which input.
+    pub provenance: Provenance,
+    /// The system.
+    pub system: SystemRecord,
+    /// Steps T.
+    pub horizon: u32,
+    /// Discount per step.
+    pub gamma: f64,
+    /// The Lipschitz constants.
+    pub constants: ConstantsRecord,
+    /// The deviation bound.
+    pub deviation: DeviationRecord,
+    /// The certified set.
+    pub global: GlobalRecord,
+    /// The state that slice and growth start from.
+    pub state: StateRecord,
+    /// The slice through that state.
+    pub slice: SliceRecord,
+    /// Local growth.
+    pub growth: GrowthRecord,
+    /// What of beta was spent on which claim.
+    pub ledger: Vec<Spending>,
+    /// Sum of the ledger: all claims hold together with confidence one minus this.
+    pub beta_total: f64,
+    /// A few rollouts, for the picture.
+    pub picture: PictureRecord,
+    /// Wall time and threads: the only part that a second run may change.
+    pub timing: Timing,
+}
+
+/// Who computed what from which input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Version of this crate.
+    pub version: String,
+    /// Seed of every stream.
+    pub seed: u64,
+    /// Name of the generator.
+    pub generator: String,
+    /// The configuration with every default filled in.
+    pub config: serde_json::Value,
+    /// Policy in words.
+    pub policy: String,
+    /// SHA-256 of the policy: of the network's parameters, or of the formula's recorded text.
+    pub policy_sha256: String,
+    /// SHA-256 of the recorded physics as WGSL text.
+    pub physics_sha256: String,
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// Processor or adapter.
+    pub device: String,
+}
+
+/// Names and default boxes of a system.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SystemRecord {
+    /// Name.
+    pub name: String,
+    /// States in order, with the box of nominal starts that was used.
+    pub states: Vec<Axis>,
+    /// Controls.
+    pub controls: Vec<Axis>,
+    /// What a picture shows.
+    pub bodies: Vec<Body>,
+}
+
+/// The Lipschitz constants that tighten the margins.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantsRecord {
+    /// `L_r` of the target margin.
+    pub target: ConstantRecord,
+    /// `L_c` of the constraint margin.
+    pub constraint: ConstantRecord,
+}
+
+/// One Lipschitz constant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantRecord {
+    /// The constant used, Euclidean norm over all states.
+    pub used: f64,
+    /// Where it comes from: `computed` (gradient bound over the box) or `given`.
+    pub source: String,
+    /// The computed bound, also where a given constant is used.
+    pub computed: f64,
+    /// Largest gradient among random points: a lower estimate.
+    pub sampled: f64,
+}
+
+/// What was drawn, what failed, and what follows: the core of every claim.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Claim {
+    /// Name: `deviation`, `global` or `growth`.
+    pub name: String,
+    /// The claim in words.
+    pub statement: String,
+    /// The sampling measure in words.
+    pub measure: String,
+    /// Number of coordinates that vary.
+    pub dimension: usize,
+    /// Names of the frozen coordinates.
+    pub frozen: Vec<String>,
+    /// Scenarios N that count.
+    pub scenarios: u64,
+    /// Failures k among them.
+    pub failures: u64,
+    /// Decision variables d.
+    pub decision_vars: u32,
+    /// Risk asked for (for the conditional claim: the risk obtained).
+    pub epsilon: f64,
+    /// One minus the confidence asked for, before any split.
+    pub beta: f64,
+    /// Beta of this very draw, after the split over rounds or steps.
+    pub beta_used: f64,
+    /// Scenarios that the simple bound asks for; absent where it does not apply.
+    pub required_simple: Option<u64>,
+    /// Scenarios that the exact bound asks for; absent where it does not apply.
+    pub required_exact: Option<u64>,
+    /// Risk that N and k certify at `beta_used`.
+    pub certified_risk: f64,
+}
+
+/// The deviation bound, `docs/method.md` section 3.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviationRecord {
+    /// The claim.
+    pub claim: Claim,
+    /// Radius of the ball around each nominal start.
+    pub radius: f64,
+    /// How perturbed rollouts were driven.
+    pub control: PairControl,
+    /// How the steps hold together.
+    pub joint: Joint,
+    /// Which bound tightens the margins.
+    pub source: DeviationSource,
+    /// Bound used at each step, `[T + 1]`.
+    pub bound: Vec<f64>,
+    /// Largest distance seen at each step, `[T + 1]`.
+    pub largest: Vec<f64>,
+    /// Exact supremum at each step for a system linear in its state, `[T + 1]`.
+    pub exact: Option<Vec<f64>>,
+    /// Pairs of the pilot; 0 where no shape was fixed.
+    pub pilot: u64,
+    /// The one scalar of the fixed shape.
+    pub scale: Option<f64>,
+    /// Support scenarios of the bound.
+    pub support: u64,
+    /// A posteriori risk from their number (wait and judge).
+    pub posterior_risk: f64,
+    /// Pairs of which a state was not finite.
+    pub non_finite: u64,
+}
+
+/// The certified set over the box, sections 4 and 8.3.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlobalRecord {
+    /// Conditional failure inside the certified set.
+    pub claim: Claim,
+    /// Pairs drawn from the box.
+    pub draws: u64,
+    /// Nominal starts with `V_check > 0`.
+    pub accepted: u64,
+    /// Two-sided interval of `P(V_global)`.
+    pub share_interval: [f64; 2],
+    /// Volume of the box in the coordinates that vary.
+    pub box_volume: f64,
+    /// Two-sided interval of the volume of `V_global`.
+    pub volume_interval: [f64; 2],
+    /// Draws whose own reach-avoid measure (perturbed start) is positive.
+    pub reached: u64,
+    /// Perturbed rollouts that failed for a state that is not finite.
+    pub non_finite: u64,
+    /// Measured f32 error of the measure: sample maximum against f64.
+    pub f32_error: f64,
+    /// Measures within this distance of zero were run again in f64.
+    pub band: f64,
+    /// How many were.
+    pub f64_reruns: u64,
+}
+
+/// The state that slice and growth start from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StateRecord {
+    /// The state.
+    pub x: Vec<f32>,
+    /// 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
+    pub tier: u8,
+    /// `V_check` there.
+    pub check_margin: f64,
+    /// Target margin there.
+    pub target_margin: f64,
+    /// Constraint margin there.
+    pub constraint_margin: f64,
+}
+
+/// `V_check` over two coordinates, the others frozen at the state; also `slice.npy`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SliceRecord {
+    /// Across the columns.
+    pub x: SliceAxisRecord,
+    /// Along the rows.
+    pub y: SliceAxisRecord,
+    /// `V_check`, row by row: `[y.values.len(), x.values.len()]`.
+    pub check_margin: Vec<f32>,
+    /// Target margin of each cell's state, same shape.
+    pub target_margin: Vec<f32>,
+    /// Constraint margin of each cell's state, same shape.
+    pub constraint_margin: Vec<f32>,
+}
+
+/// One axis of the slice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SliceAxisRecord {
+    /// Index of the state.
+    pub state: usize,
+    /// Values, ascending.
+    pub values: Vec<f32>,
+}
+
+/// Local growth, section 5.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GrowthRecord {
+    /// What came of it.
+    pub outcome: GrowthOutcome,
+    /// Where the centre was looked for.
+    pub boundary: BoundarySearch,
+    /// The boundary point closest to the state.
+    pub center: Option<Vec<f32>>,
+    /// Its distance from the state in the coordinates that vary.
+    pub distance: Option<f64>,
+    /// Radius of the verified ball; 0 if none was.
+    pub radius: f64,
+    /// Volume of the verified ball in the coordinates that vary.
+    pub volume: f64,
+    /// Whether each coordinate varies.
+    pub varies: Vec<bool>,
+    /// The rounds.
+    pub rounds: Vec<RoundRecord>,
+    /// The claim, where a ball was verified.
+    pub claim: Option<Claim>,
+    /// Some starts of the last round, at most 400, for the picture.
+    pub samples: Vec<SampleRecord>,
+}
+
+/// What came of local growth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GrowthOutcome {
+    /// A round without failure: the ball is verified.
+    Verified,
+    /// All rounds had failures: never a certificate.
+    Exhausted,
+    /// No boundary of the certified set was found, so there was nothing to grow from.
+    NoBoundary,
+}
+
+/// One round of growth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoundRecord {
+    /// Radius tried.
+    pub radius: f64,
+    /// Starts drawn.
+    pub scenarios: u64,
+    /// Of which failed.
+    pub failures: u64,
+    /// Distance of the nearest failure from the centre.
+    pub nearest_failure: Option<f64>,
+    /// Failures for a state that is not finite.
+    pub non_finite: u64,
+    /// Measures run again in f64.
+    pub f64_reruns: u64,
+}
+
+/// A start and whether it reached the target safely.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SampleRecord {
+    /// The start.
+    pub x: Vec<f32>,
+    /// Whether its measure is positive.
+    pub success: bool,
+}
+
+/// One line of the beta ledger.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spending {
+    /// The claim.
+    pub claim: String,
+    /// Which call, round or step.
+    pub item: String,
+    /// What it spent.
+    pub beta: f64,
+}
+
+/// A few rollouts from the state's neighbourhood.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PictureRecord {
+    /// Each: the states x_0..=x_T, `[T + 1, NX]`, and whether it succeeded.
+    pub rollouts: Vec<RolloutRecord>,
+}
+
+/// One rollout.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RolloutRecord {
+    /// States, `[T + 1, NX]`.
+    pub states: Vec<Vec<f32>>,
+    /// Whether the measure is positive.
+    pub success: bool,
+}
+
+/// Wall time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Timing {
+    /// All of it, seconds.
+    pub wall_seconds: f64,
+    /// Threads used.
+    pub threads: usize,
+    /// Rollouts done.
+    pub rollouts: u64,
+}

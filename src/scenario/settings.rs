@@ -1,0 +1,201 @@
+//! What a certificate is asked for: the resolved settings of one system, without file or key.
+
+use serde::{Deserialize, Serialize};
+
+use crate::rollout::{PairControl, RolloutSpec};
+use crate::system::System;
+
+/// Cells of a default slice along each axis.
+const SLICE_CELLS: u16 = 21;
+
+/// How the deviation bounds of all steps hold together, `docs/method.md` section 8.1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Joint {
+    /// One scalar scales a shape fixed by an independent pilot sample: d = 1.
+    FixedShape,
+    /// The bound of every step but the first is a decision variable: d = T.
+    Variables,
+    /// Each step on its own with risk and beta divided by their number.
+    Bonferroni,
+    /// Each step on its own at full risk, as published: no joint statement.
+    Separate,
+}
+
+/// Which deviation bound tightens the margins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviationSource {
+    /// The scenario bound.
+    Scenario,
+    /// The exact supremum `radius * sigma_max(A^t)` of a system that is linear in its state.
+    Exact,
+}
+
+/// Lipschitz constants of the margins: computed from the system, or given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ConstantSettings {
+    /// `L_r`; computed if absent.
+    pub target: Option<f64>,
+    /// `L_c`; computed if absent.
+    pub constraint: Option<f64>,
+}
+
+/// The deviation bound, section 3.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviationSettings {
+    /// Radius of the ball around each nominal start.
+    pub radius: f32,
+    /// Risk.
+    pub epsilon: f64,
+    /// One minus the confidence.
+    pub beta: f64,
+    /// Pairs N.
+    pub scenarios: u64,
+    /// Pairs of the pilot that fixes the shape.
+    pub pilot: u64,
+    /// Joint statement over the steps.
+    pub joint: Joint,
+    /// How the perturbed rollout is driven.
+    pub control: PairControl,
+    /// Which bound tightens the margins.
+    pub source: DeviationSource,
+}
+
+/// The certified set and its conditional failure, sections 4 and 8.3.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GlobalSettings {
+    /// Pairs drawn from the box.
+    pub draws: u64,
+    /// One minus the confidence of the conditional failure bound, and again of the interval of
+    /// the certified share.
+    pub beta: f64,
+}
+
+/// One axis of the slice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SliceAxis {
+    /// Index of the state.
+    pub state: usize,
+    /// Its values, ascending.
+    pub values: Vec<f32>,
+}
+
+/// Where the ball of local growth is centred, section 5.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoundarySearch {
+    /// A boundary cell of the slice, cells ahead of the velocity preferred, as in the study.
+    Slice,
+    /// The nearest crossing along many directions in the coordinates that vary, by bisection.
+    Rays,
+}
+
+/// Local growth, section 5 and Algorithm 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrowthSettings<const NX: usize> {
+    /// First radius, `r_max`.
+    pub radius: f32,
+    /// Rounds M.
+    pub rounds: u32,
+    /// Starts N of each round.
+    pub scenarios: u64,
+    /// Risk.
+    pub epsilon: f64,
+    /// One minus the confidence, over all rounds.
+    pub beta: f64,
+    /// Whether beta is divided by the rounds, as soundness asks (section 8.2).
+    pub split_beta: bool,
+    /// The coordinates that vary; the others keep the values of the state.
+    pub varies: [bool; NX],
+    /// Where the centre is looked for.
+    pub boundary: BoundarySearch,
+    /// The two coordinates whose velocity says what is ahead, and their velocities: the slice
+    /// search of the study prefers cells there. Indices `[x, vx, y, vy]`.
+    pub heading: Option<[usize; 4]>,
+}
+
+/// Everything that `certify` needs to know beside the plant and the backend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings<const NX: usize> {
+    /// Seed of every stream.
+    pub seed: u64,
+    /// Horizon and discount.
+    pub spec: RolloutSpec,
+    /// Lower corner of the box of nominal starts.
+    pub low: [f32; NX],
+    /// Upper corner.
+    pub high: [f32; NX],
+    /// Lipschitz constants.
+    pub constants: ConstantSettings,
+    /// Deviation bound.
+    pub deviation: DeviationSettings,
+    /// Certified set.
+    pub global: GlobalSettings,
+    /// The slice: the axis across the columns, then the axis along the rows.
+    pub slice: [SliceAxis; 2],
+    /// The state that the slice, the boundary search and the growth start from.
+    pub state: [f32; NX],
+    /// Local growth.
+    pub growth: GrowthSettings<NX>,
+}
+
+impl<const NX: usize> Settings<NX> {
+    /// Sound settings for `system` around `state`, to be adjusted field by field: risk 0.1 and
+    /// beta 1e-3 throughout, computed constants, a joint deviation bound of radius 0.05 by fixed
+    /// shape under replayed controls, 20,000 draws, a slice of 21 by 21 cells over the first two
+    /// states, growth in all coordinates from radius 0.5 in at most 10 rounds with beta split.
+    ///
+    /// # Panics
+    /// If the system has a single state: there is no slice.
+    pub fn new<S, const NU: usize>(system: &S, state: [f32; NX], spec: RolloutSpec) -> Self
+    where
+        S: System<NX, NU>,
+    {
+        assert!(NX > 1, "a slice needs two states");
+        let axes = system.states();
+        let (epsilon, beta, scenarios) = (0.1, 1e-3, 159);
+        let slice = [0, 1].map(|state| {
+            let step = (axes[state].high - axes[state].low) / f32::from(SLICE_CELLS - 1);
+            let value = |i| axes[state].low + f32::from(i) * step;
+            SliceAxis {
+                state,
+                values: (0..SLICE_CELLS).map(value).collect(),
+            }
+        });
+        Self {
+            seed: 1,
+            spec,
+            low: std::array::from_fn(|i| axes[i].low),
+            high: std::array::from_fn(|i| axes[i].high),
+            constants: ConstantSettings::default(),
+            deviation: DeviationSettings {
+                radius: 0.05,
+                epsilon,
+                beta,
+                scenarios,
+                pilot: scenarios,
+                joint: Joint::FixedShape,
+                control: PairControl::Replay,
+                source: DeviationSource::Scenario,
+            },
+            global: GlobalSettings {
+                draws: 20_000,
+                beta,
+            },
+            slice,
+            state,
+            growth: GrowthSettings {
+                radius: 0.5,
+                rounds: 10,
+                scenarios,
+                epsilon,
+                beta,
+                split_beta: true,
+                varies: [true; NX],
+                boundary: BoundarySearch::Rays,
+                heading: None,
+            },
+        }
+    }
+}

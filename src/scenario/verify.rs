@@ -1,0 +1,351 @@
+//! What a stored certificate is used for: the tier of states, and whether it still holds.
+
+use serde::Serialize;
+
+use super::bound::lower_bound;
+use super::certify::{certify, hashes, tightening};
+use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
+use super::settings::Settings;
+use super::{Context, Unwatched, Watch, global};
+use crate::backend::Backend;
+use crate::error::{Error, Result};
+use crate::policy::Policy;
+use crate::rollout::{
+    Ball, Plant, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening,
+};
+use crate::system::System;
+
+/// Fresh starts that a verified ball is tried with.
+const FRESH_STARTS: u64 = 20_000;
+/// Chance that a check calls a true claim false, each.
+const FALSE_ALARM: f64 = 1e-6;
+/// Relative difference of a recomputed bound that another device's rounding may make.
+const TOLERANCE: f64 = 1e-4;
+/// Share of the recomputed counts that another device's rounding may move across zero.
+const MOVED: f64 = 1e-3;
+
+/// Tier and margins of one state.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct QueryRow {
+    /// 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
+    pub tier: u8,
+    /// `V_check`.
+    pub check_margin: f32,
+    /// Target margin.
+    pub target_margin: f32,
+}
+
+/// One thing that was checked.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What.
+    pub name: String,
+    /// As stored.
+    pub stored: String,
+    /// As found now.
+    pub found: String,
+    /// Whether the stored claim stands.
+    pub holds: bool,
+}
+
+/// What a check found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct CheckReport {
+    /// Whether every finding holds.
+    pub holds: bool,
+    /// One by one.
+    pub findings: Vec<Finding>,
+}
+
+/// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
+pub(super) fn tier<const NX: usize>(
+    target_margin: f64,
+    check_margin: f64,
+    growth: &GrowthRecord,
+    x: &[f32; NX],
+) -> u8 {
+    let local = || verified_ball::<NX>(growth).is_some_and(|ball| ball.contains(x));
+    match () {
+        () if target_margin > 0.0 => 0,
+        () if check_margin > 0.0 => 1,
+        () if local() => 2,
+        () => 3,
+    }
+}
+
+/// The verified ball, where there is one.
+fn verified_ball<const NX: usize>(growth: &GrowthRecord) -> Option<Ball<NX>> {
+    let center = growth
+        .center
+        .as_ref()
+        .filter(|_| growth.outcome == GrowthOutcome::Verified)?;
+    Some(Ball {
+        center: center.as_slice().try_into().ok()?,
+        radius: growth.radius as f32,
+        varies: growth.varies.as_slice().try_into().ok()?,
+    })
+}
+
+/// Refuses a record that is not of this plant.
+fn check_identity<S, P, const NX: usize, const NU: usize>(
+    plant: Plant<'_, S, P>,
+    record: &Record,
+) -> Result<()>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let refuse = |field: &str, stored: &str, found: &str| {
+        Err(Error::Refused(format!(
+            "{field} is {stored} in the record, {found} here"
+        )))
+    };
+    let (physics, policy) = hashes(plant);
+    let stored = &record.provenance;
+    if record.schema != SCHEMA {
+        return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());
+    }
+    if record.system.states.len() != NX || record.system.name != plant.system.name() {
+        return refuse("system.name", &record.system.name, plant.system.name());
+    }
+    if stored.physics_sha256 != physics {
+        return refuse(
+            "provenance.physics_sha256",
+            &stored.physics_sha256,
+            &physics,
+        );
+    }
+    if stored.policy_sha256 != policy {
+        return refuse("provenance.policy_sha256", &stored.policy_sha256, &policy);
+    }
+    if record.deviation.bound.len() != record.horizon as usize + 1 {
+        let found = record.deviation.bound.len().to_string();
+        return refuse(
+            "deviation.bound length",
+            &found,
+            &(record.horizon + 1).to_string(),
+        );
+    }
+    Ok(())
+}
+
+/// Tier and `V_check` of each of `states` against a stored certificate.
+///
+/// # Errors
+/// [`Error::Refused`] if the record is of another plant; those of the backend.
+pub fn query<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    record: &Record,
+    states: &[[f32; NX]],
+) -> Result<Vec<QueryRow>>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    check_identity(plant, record)?;
+    let spec = RolloutSpec::new(record.horizon, record.gamma as f32)?;
+    let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
+    let context = Context {
+        backend,
+        plant,
+        watch: &Unwatched,
+    };
+    let margins = global::check_margins(context, &spec, &tightening, states, Query::Measure)?;
+    let row = |(x, check_margin): (&[f32; NX], f32)| {
+        let target_margin: f32 = plant.system.target(*x);
+        let check = f64::from(check_margin);
+        let tier = tier(f64::from(target_margin), check, &record.growth, x);
+        QueryRow {
+            tier,
+            check_margin,
+            target_margin,
+        }
+    };
+    Ok(states.iter().zip(margins).map(row).collect())
+}
+
+/// Verifies a stored certificate: computes it again from its seed, and tries its claims on fresh
+/// scenarios.
+///
+/// A claim fails on fresh scenarios only if they refute it with confidence 1 - 1e-6.
+///
+/// # Errors
+/// [`Error::Refused`] if the record is of another plant; those of the backend.
+pub fn check<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    record: &Record,
+    settings: &Settings<NX>,
+    watch: &dyn Watch,
+) -> Result<CheckReport>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    check_identity(plant, record)?;
+    let again = certify(
+        backend,
+        plant,
+        settings,
+        record.provenance.config.clone(),
+        watch,
+    )?;
+    let context = Context {
+        backend,
+        plant,
+        watch,
+    };
+    let mut findings = recomputed(record, &again);
+    let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
+    let purposes = [Purpose::Check, Purpose::CheckPerturbation];
+    let fresh = global::conditional(context, settings, &tightening, purposes)?;
+    findings.push(refuted(
+        "conditional failure on fresh pairs",
+        record.global.claim.certified_risk,
+        fresh.claim.failures,
+        fresh.accepted,
+    ));
+    let share = global::share_overlaps(&record.global, &fresh);
+    findings.push(share);
+    if let Some(ball) = verified_ball::<NX>(&record.growth) {
+        let failures = fresh_failures(context, settings, ball)?;
+        let risk = record
+            .growth
+            .claim
+            .as_ref()
+            .map_or(0.0, |claim| claim.certified_risk);
+        findings.push(refuted(
+            "failures in the verified ball",
+            risk,
+            failures,
+            FRESH_STARTS,
+        ));
+    }
+    Ok(CheckReport {
+        holds: findings.iter().all(|finding| finding.holds),
+        findings,
+    })
+}
+
+/// Compares the stored record with the one computed again from its seed.
+fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
+    let number = |name: &str, stored: f64, found: f64| Finding {
+        name: name.to_owned(),
+        stored: format!("{stored:.6}"),
+        found: format!("{found:.6}"),
+        holds: (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
+    };
+    let count = |name: &str, stored: u64, found: u64, of: u64| Finding {
+        name: name.to_owned(),
+        stored: stored.to_string(),
+        found: found.to_string(),
+        holds: stored.abs_diff(found) as f64 <= MOVED * of as f64,
+    };
+    let worst = stored.deviation.bound.iter().zip(&again.deviation.bound);
+    let (was, is) = worst.fold((0.0, 0.0), |worst: (f64, f64), (was, is)| {
+        let farther = (was - is).abs() > (worst.0 - worst.1).abs();
+        if farther || worst.0 == 0.0 {
+            (*was, *is)
+        } else {
+            worst
+        }
+    });
+    let text = |name: &str, stored: String, found: String| {
+        let holds = stored == found;
+        Finding {
+            name: name.to_owned(),
+            stored,
+            found,
+            holds,
+        }
+    };
+    let outcome = |record: &Record| format!("{:?}", record.growth.outcome).to_lowercase();
+    vec![
+        number(
+            "constant of the target margin",
+            stored.constants.target.used,
+            again.constants.target.used,
+        ),
+        number(
+            "constant of the constraint margin",
+            stored.constants.constraint.used,
+            again.constants.constraint.used,
+        ),
+        number("deviation bound, where it differs most", was, is),
+        count(
+            "certified starts",
+            stored.global.accepted,
+            again.global.accepted,
+            stored.global.draws,
+        ),
+        count(
+            "failures among them",
+            stored.global.claim.failures,
+            again.global.claim.failures,
+            stored.global.draws,
+        ),
+        number(
+            "conditional failure bound",
+            stored.global.claim.certified_risk,
+            again.global.claim.certified_risk,
+        ),
+        text("outcome of local growth", outcome(stored), outcome(again)),
+        number(
+            "radius of the verified ball",
+            stored.growth.radius,
+            again.growth.radius,
+        ),
+        text(
+            "all claims obtained",
+            stored.holds.to_string(),
+            again.holds.to_string(),
+        ),
+    ]
+}
+
+/// Whether `failures` of `trials` refute a risk of at most `risk`.
+fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
+    let least = lower_bound(failures, trials, FALSE_ALARM);
+    Finding {
+        name: name.to_owned(),
+        stored: format!("at most {risk:.6}"),
+        found: format!("{failures} of {trials}: at least {least:.6}"),
+        holds: least <= risk,
+    }
+}
+
+/// Failures among fresh starts in the verified ball.
+fn fresh_failures<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+    ball: Ball<NX>,
+) -> Result<u64>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    context
+        .watch
+        .begin("fresh starts in the ball", FRESH_STARTS);
+    let stream = Stream::new(settings.seed, Purpose::Check, 1);
+    let tightening = Tightening::none(&settings.spec);
+    let task = ReachAvoidTask {
+        starts: Starts::Drawn {
+            region: Region::Ball(ball),
+            stream,
+        },
+        range: 0..FRESH_STARTS,
+        spec: settings.spec,
+        tightening: &tightening,
+        query: Query::Sign,
+    };
+    let mut failures = 0;
+    context
+        .backend
+        .reach_avoid(context.plant, &task, &mut |_, values| {
+            failures += values.iter().filter(|value| **value <= 0.0).count() as u64;
+            context.watch.advance(values.len() as u64)
+        })?;
+    Ok(failures)
+}
