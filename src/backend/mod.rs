@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod gpu;
+mod physics;
 
 use crate::error::Result;
 use crate::policy::Policy;
@@ -10,6 +11,8 @@ use crate::system::System;
 
 use cpu::Cpu;
 use gpu::Gpu;
+
+pub use physics::physics;
 
 /// The native CPU, or a GPU through wgpu.
 #[derive(Debug)]

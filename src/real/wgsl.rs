@@ -4,7 +4,16 @@ use std::fmt::Write;
 
 use super::record::{Graph, Node};
 
-/// The WGSL function `name`, one `let` per operation.
+/// How a product is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Product<'a> {
+    /// `a * b`: a driver may contract it with a sum that follows.
+    Plain,
+    /// A call of the function of that name, which can keep the product from being contracted.
+    Call(&'a str),
+}
+
+/// The WGSL function `name`, one `let` per operation, products printed plainly.
 ///
 /// `arguments` are names and lengths of the array arguments, whose elements are the graph's
 /// inputs in order; an argument of length 1 is a plain f32. The result is an f32, or an array of
@@ -21,6 +30,19 @@ use super::record::{Graph, Node};
 /// If the arguments do not add up to the graph's inputs, or a literal is not finite (WGSL has no
 /// such literal).
 pub fn function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
+    function_with(name, arguments, graph, Product::Plain)
+}
+
+/// Like [`function`], with products as `product` says.
+///
+/// # Panics
+/// As [`function`] does.
+pub fn function_with(
+    name: &str,
+    arguments: &[(&str, usize)],
+    graph: &Graph,
+    product: Product<'_>,
+) -> String {
     let inputs: Vec<String> = arguments
         .iter()
         .flat_map(|&(name, length)| {
@@ -45,7 +67,12 @@ pub fn function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> Strin
     let result = float_type(graph.outputs.len());
     let mut text = format!("fn {name}({}) -> {result} {{\n", parameters.join(", "));
     for (i, node) in graph.nodes.iter().enumerate() {
-        writeln!(text, "    let v{i} = {};", operation(node, &inputs)).expect("a String grows");
+        writeln!(
+            text,
+            "    let v{i} = {};",
+            operation(node, &inputs, product)
+        )
+        .expect("a String grows");
     }
     let outputs: Vec<String> = graph.outputs.iter().map(|i| format!("v{i}")).collect();
     if outputs.len() == 1 {
@@ -67,13 +94,16 @@ fn float_type(length: usize) -> String {
 }
 
 /// The right-hand side of a node.
-fn operation(node: &Node, inputs: &[String]) -> String {
+fn operation(node: &Node, inputs: &[String], product: Product<'_>) -> String {
     match *node {
         Node::Input(i) => inputs[i as usize].clone(),
         Node::Literal(bits) => literal(f32::from_bits(bits)),
         Node::Add(a, b) => format!("v{a} + v{b}"),
         Node::Sub(a, b) => format!("v{a} - v{b}"),
-        Node::Mul(a, b) => format!("v{a} * v{b}"),
+        Node::Mul(a, b) => match product {
+            Product::Plain => format!("v{a} * v{b}"),
+            Product::Call(name) => format!("{name}(v{a}, v{b})"),
+        },
         Node::Div(a, b) => format!("v{a} / v{b}"),
         Node::Neg(a) => format!("-v{a}"),
         Node::Abs(a) => format!("abs(v{a})"),
