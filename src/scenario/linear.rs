@@ -155,6 +155,20 @@ mod tests {
         }
     }
 
+    /// Entries that are off by their rounding still give an upper bound.
+    #[test]
+    fn the_margin_covers_the_rounding_of_the_entries() {
+        let matrix = state_matrix(&DoubleIntegrator::default()).expect("it is linear");
+        let rounded = &matrix * (1.0 - 0.5 * super::ROUNDING);
+        let s = f64::from(0.1_f32) * 200.0;
+        let exact = 0.5 * (s + s.hypot(2.0));
+        let found = exact_deviation(&rounded, 1.0, 200)[200];
+        assert!(
+            found >= exact && found <= exact * (1.0 + 1e-9),
+            "{found} {exact}"
+        );
+    }
+
     /// Along a vector of slope sigma the trajectories do come apart that far, never farther.
     #[test]
     fn no_pair_of_race_trajectories_comes_farther_apart() {
