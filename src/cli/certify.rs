@@ -67,9 +67,9 @@ impl Job for Certify<'_> {
         let settings = self.config.settings(&plant.system.states())?;
         let stored = self.config.to_json()?;
         let backend = devices::open(self.global)?;
+        let progress = Progress::new(self.global);
         // Before the work: a folder that cannot be written to would waste it.
         let staged = Staged::new(self.out)?;
-        let progress = Progress::new(self.global);
         let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
         progress.check()?;

@@ -83,10 +83,20 @@ fn check_level(
             (Some(Value::Table(_)), _) => {
                 return refused(format!("`{path}` is a section, not a value"));
             }
+            (Some(default), _) if prefix == "system." && !same_kind(default, value) => {
+                // A section that is read by its `name` does not say which key was wrong.
+                let expected = default.type_str();
+                return refused(format!("`{path}` is {value}, expected a {expected}"));
+            }
             _ => {}
         }
     }
     Ok(())
+}
+
+/// Whether `value` can stand where `default` stands; a whole number is a float too.
+fn same_kind(default: &Value, value: &Value) -> bool {
+    default.same_type(value) || (default.is_float() && value.is_integer())
 }
 
 /// The paths of all keys that are not sections, with dots.

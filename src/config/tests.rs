@@ -180,13 +180,23 @@ fn values_of_the_wrong_kind_name_their_key() {
         "constants.target=guessed",
         "growth.coordinates=some",
         "box.ego_x=[1]",
-        "system.cone=round",
+        "system.ego_gain=fast",
+        "system.speed_limit=1",
         "growth.split_beta=1",
     ] {
         let (key, _) = set.split_once('=').unwrap();
         let message = wrong(set);
         assert!(message.contains(key), "{set}: {message}");
     }
+    let cone = wrong("system.cone=round");
+    assert!(
+        cone.contains("`round`") && cone.contains("`squared`"),
+        "{cone}"
+    );
+    assert_eq!(
+        load(RACE, &["system.ego_gain=1"]).unwrap().rollout.horizon,
+        30
+    );
     assert!(wrong("system.name=drone").contains("\"drone-race\" or \"double-integrator\""));
     assert!(wrong("profile=strict").contains("rigorous"));
     assert!(wrong("policy.formula=bang-bang").contains("both `file` and `formula`"));
