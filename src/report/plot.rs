@@ -398,7 +398,7 @@ mod tests {
         };
         let (ticks, decimals) = span.ticks(6.0);
         assert_eq!(decimals, 1);
-        assert_eq!(ticks.len(), 6);
+        assert_eq!(ticks.len(), 5);
         for (tick, expected) in ticks.iter().zip([-2.5, -2.0, -1.5, -1.0, -0.5]) {
             assert!((tick - expected).abs() < 1e-12, "{tick}");
         }
