@@ -347,17 +347,16 @@ fn sources() -> Vec<(String, String)> {
 
 /// Top-level modules that `code` names after `crate::` or `reachcast::`, also in braces.
 fn imports(code: &str) -> Vec<String> {
+    let word = |text: &str| -> String {
+        text.chars()
+            .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
+            .collect()
+    };
+    let paths = ["crate::", "reachcast::"]
+        .into_iter()
+        .flat_map(|prefix| code.split(prefix).skip(1));
     let mut found = Vec::new();
-    for (prefix, rest) in ["crate::", "reachcast::"].iter().flat_map(|prefix| {
-        code.match_indices(prefix)
-            .map(|(at, p)| (p, &code[at + p.len()..]))
-    }) {
-        let _ = prefix;
-        let word = |text: &str| -> String {
-            text.chars()
-                .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
-                .collect()
-        };
+    for rest in paths {
         match rest.strip_prefix('{') {
             None => found.push(word(rest)),
             Some(list) => {

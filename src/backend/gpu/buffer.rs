@@ -121,6 +121,7 @@ impl Pool {
         Buffer {
             inner,
             bytes,
+            reusable: true,
             pool: self.clone(),
         }
     }
@@ -130,6 +131,7 @@ impl Pool {
 pub(super) struct Buffer {
     inner: wgpu::Buffer,
     bytes: u64,
+    reusable: bool,
     pool: Pool,
 }
 
@@ -169,7 +171,9 @@ impl Buffer {
     /// [`crate::Error::DeviceFailed`], also for failures of earlier work.
     pub(super) fn read<T: Pod>(&self, device: &Device, count: usize) -> Result<Vec<T>> {
         let bytes = (count * size_of::<T>()) as u64;
-        let staging = self.pool.take(device, Use::Readback, bytes);
+        let mut staging = self.pool.take(device, Use::Readback, bytes);
+        // Until it is unmapped again, nobody else can use it.
+        staging.reusable = false;
         let mut encoder = device.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&self.inner, 0, &staging.inner, 0, bytes);
         device.queue.submit([encoder.finish()]);
@@ -192,6 +196,7 @@ impl Buffer {
             .map(|view| bytemuck::pod_collect_to_vec(&view))
             .map_err(|e| failed(e.to_string()));
         staging.inner.unmap();
+        staging.reusable = true;
         numbers
     }
 }
@@ -204,7 +209,7 @@ impl Drop for Buffer {
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
         let kept: u64 = free.iter().map(wgpu::Buffer::size).sum();
-        if kept + self.inner.size() <= KEPT_BYTES {
+        if self.reusable && kept + self.inner.size() <= KEPT_BYTES {
             free.push(self.inner.clone());
         }
     }

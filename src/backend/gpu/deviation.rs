@@ -1,7 +1,7 @@
 //! Pairs on the device: both rollouts of each side by side, the farthest pair of each step.
 
 use super::Gpu;
-use super::buffer::Params;
+use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, Slot};
 use super::kernel::Bound;
 use super::network::Network;
@@ -9,7 +9,7 @@ use super::plan::Work;
 use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
 use crate::backend::PairSink;
 use crate::error::Result;
-use crate::policy::Policy;
+use crate::policy::{Mlp, Policy};
 use crate::rollout::{DeviationTask, Farthest, PairControl, PairMeasure, Plant};
 use crate::system::System;
 
@@ -32,59 +32,93 @@ where
     }
     check_starts(&task.pairs.nominal)?;
     let job = Job::new(gpu, plant, Work::Pairs, count)?;
-    let row = u64::from(job.plan.row);
-    let schedule = job.uploaded(&schedule(&task.spec, task.tightening)?);
-    let region = job.uploaded(&region_vectors(&task.pairs.nominal));
-    let network = plant
-        .policy
-        .network()
-        .map(|mlp| Network::new(&job, mlp, job.plan.row));
-    let state = job.storage(16 * NX.div_ceil(4) as u64 * row);
-    let folds = job.storage(8 * row);
-    let origin = job.storage(4 * row);
-    let measures = job.storage(4 * row);
-    let distances = job.storage(2 * row * u64::from(job.plan.segment));
-    let partial = job.storage(8 * rows as u64);
-    let buffer = |slot| match slot {
-        Slot::Region => &region,
-        Slot::Schedule => &schedule,
-        Slot::State => &state,
-        Slot::Folds => &folds,
-        Slot::Origin => &origin,
-        Slot::Distances => &distances,
-        Slot::Farthest => &partial,
-        Slot::Control => network.as_ref().map_or(&measures, Network::control),
-        _ => &measures,
-    };
+    let buffers = Buffers::new(&job, plant.policy.network(), task)?;
     let chunks = Chunks {
-        sample: job.bind(Kernel::Sample, buffer)?,
-        rollout: job.bind(Kernel::Deviation, buffer)?,
-        reduce: job.bind(Kernel::Reduce, buffer)?,
-        layers: match &network {
-            Some(network) => network.bind(&job, &state)?,
-            None => Vec::new(),
-        },
+        kernels: buffers.bind(&job)?,
         job: &job,
-        network: network.as_ref(),
+        network: buffers.network.as_ref(),
         params: pair_params(task, job.plan.stride),
     };
     let mut first = task.range.start;
     while first < task.range.end {
         let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
-        job.upload_starts(&task.pairs.nominal, first, columns, &state);
+        job.upload_starts(&task.pairs.nominal, first, columns, &buffers.state);
         chunks.run(first, columns)?;
-        let found: Vec<[u32; 2]> = partial.read(job.device, rows)?;
+        let found: Vec<[u32; 2]> = buffers.farthest.read(job.device, rows)?;
         for (farthest, [bits, column]) in farthest.iter_mut().zip(found) {
             *farthest = farthest.merge(Farthest {
                 distance: f32::from_bits(bits),
                 pair: first + u64::from(column),
             });
         }
-        let values: Vec<PairMeasure> = measures.read(job.device, columns as usize)?;
+        let values: Vec<PairMeasure> = buffers.measures.read(job.device, columns as usize)?;
         sink(first, &values)?;
         first += u64::from(columns);
     }
     Ok(farthest)
+}
+
+/// The buffers of a call.
+struct Buffers {
+    schedule: Buffer,
+    region: Buffer,
+    state: Buffer,
+    folds: Buffer,
+    origin: Buffer,
+    measures: Buffer,
+    distances: Buffer,
+    farthest: Buffer,
+    network: Option<Network>,
+}
+
+impl Buffers {
+    fn new<const NX: usize>(
+        job: &Job<'_>,
+        network: Option<&Mlp>,
+        task: &DeviationTask<'_, NX>,
+    ) -> Result<Self> {
+        let (row, stride) = (u64::from(job.plan.row), u64::from(job.plan.stride));
+        Ok(Self {
+            schedule: job.uploaded(&schedule(&task.spec, task.tightening)?),
+            region: job.uploaded(&region_vectors(&task.pairs.nominal)),
+            state: job.storage(16 * NX.div_ceil(4) as u64 * row),
+            folds: job.storage(8 * row),
+            origin: job.storage(4 * stride),
+            measures: job.storage(8 * stride),
+            distances: job.storage(4 * stride * u64::from(job.plan.segment)),
+            farthest: job.storage(8 * (u64::from(task.spec.horizon) + 1)),
+            network: network.map(|mlp| Network::new(job, mlp, job.plan.row)),
+        })
+    }
+
+    fn bind(&self, job: &Job<'_>) -> Result<Kernels> {
+        let network = self.network.as_ref();
+        let buffer = |slot| match slot {
+            Slot::Region => &self.region,
+            Slot::Schedule => &self.schedule,
+            Slot::State => &self.state,
+            Slot::Folds => &self.folds,
+            Slot::Origin => &self.origin,
+            Slot::Distances => &self.distances,
+            Slot::Farthest => &self.farthest,
+            Slot::Control => network.map_or(&self.measures, Network::control),
+            _ => &self.measures,
+        };
+        Ok(Kernels {
+            sample: job.bind(Kernel::Sample, buffer)?,
+            rollout: job.bind(Kernel::Deviation, buffer)?,
+            reduce: job.bind(Kernel::Reduce, buffer)?,
+            layers: network.map_or(Ok(Vec::new()), |network| network.bind(job, &self.state))?,
+        })
+    }
+}
+
+/// The kernels bound to them.
+struct Kernels {
+    sample: Bound,
+    rollout: Bound,
+    reduce: Bound,
+    layers: Vec<Bound>,
 }
 
 /// Parameters of the pairs.
@@ -106,10 +140,7 @@ fn pair_params<const NX: usize>(task: &DeviationTask<'_, NX>, stride: u32) -> Pa
 struct Chunks<'a> {
     job: &'a Job<'a>,
     network: Option<&'a Network>,
-    sample: Bound,
-    rollout: Bound,
-    reduce: Bound,
-    layers: Vec<Bound>,
+    kernels: Kernels,
     params: Params,
 }
 
@@ -119,7 +150,7 @@ impl Chunks<'_> {
         let plan = self.job.plan;
         let params = self.params.at(first, columns);
         let mut batch = Batch::default();
-        batch.push_columns(Kernel::Sample, &self.sample, &params);
+        batch.push_columns(Kernel::Sample, &self.kernels.sample, &params);
         let mut step = 0;
         while step <= params.horizon {
             let count = plan.segment.min(params.horizon + 1 - step);
@@ -150,11 +181,15 @@ impl Chunks<'_> {
                 } else {
                     plan.row
                 };
-                network.forward(batch, &self.layers, columns, plan.row);
+                network.forward(batch, &self.kernels.layers, columns, plan.row);
             }
-            batch.push_columns(Kernel::Deviation, &self.rollout, &params.over(step, steps));
+            batch.push_columns(
+                Kernel::Deviation,
+                &self.kernels.rollout,
+                &params.over(step, steps),
+            );
             step += steps;
         }
-        batch.push(&self.reduce, &params.over(first, count), [count, 1]);
+        batch.push(&self.kernels.reduce, &params.over(first, count), [count, 1]);
     }
 }

@@ -151,3 +151,74 @@ fn too_large(adapter: &Adapter, columns: u64, parameters: u64, binding: u64) -> 
         adapter.name
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::gpu::AdapterKind;
+    use crate::policy::{Activation, Layer, OutputActivation};
+
+    fn adapter(max_binding_bytes: u64) -> Adapter {
+        Adapter {
+            name: "made up".to_owned(),
+            api: "none".to_owned(),
+            kind: AdapterKind::Unknown,
+            driver: String::new(),
+            max_buffer_bytes: 1 << 30,
+            max_binding_bytes,
+            max_workgroup_threads: 256,
+        }
+    }
+
+    fn network(widths: &[usize]) -> Mlp {
+        let layer = |pair: &[usize]| Layer {
+            weight: vec![0.0; pair[0] * pair[1]],
+            bias: vec![0.0; pair[1]],
+            inputs: pair[0],
+            outputs: pair[1],
+        };
+        let layers = widths.windows(2).map(layer).collect();
+        Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+    }
+
+    #[test]
+    fn chunks_are_whole_tiles_within_the_limits() {
+        let wide = network(&[12, 512, 512, 3]);
+        for (binding, count) in [
+            (1 << 27, 1),
+            (1 << 27, u64::MAX / 2),
+            (1 << 20, 100_000_000),
+        ] {
+            for network in [None, Some(&wide)] {
+                for work in [Work::Measure, Work::Sign, Work::Pairs] {
+                    // Parameters of the wide network take a megabyte of their own.
+                    let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
+                    let plan = Plan::new(&adapter(binding), work, 12, network, count);
+                    let plan = plan.expect("a plan within the limits");
+                    let bytes = column_bytes(work, 12, network, plan.segment);
+                    let stride = u64::from(plan.stride);
+                    assert_eq!(stride % COLUMN_UNIT, 0);
+                    assert!(bytes.iter().all(|bytes| bytes * stride <= binding));
+                    assert!(bytes.iter().sum::<u64>() * stride <= MEMORY_BYTES);
+                    assert!(u64::from(plan.steps) <= MAX_TRIPS);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn small_batches_get_small_chunks() {
+        let plan = Plan::new(&adapter(1 << 27), Work::Measure, 12, None, 468);
+        assert_eq!(plan.expect("a plan").stride, 512);
+    }
+
+    #[test]
+    fn what_cannot_run_is_refused() {
+        let small = Plan::new(&adapter(1 << 10), Work::Measure, 12, None, 10);
+        assert!(matches!(small, Err(Error::Device(_))), "{small:?}");
+        let states = 4 * MAX_TRIPS as usize;
+        let long = Plan::new(&adapter(1 << 30), Work::Measure, states, None, 10);
+        let text = long.expect_err("too many iterations").to_string();
+        assert!(text.contains("loop iterations"), "{text}");
+    }
+}

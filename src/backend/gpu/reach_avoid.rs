@@ -9,7 +9,7 @@ use super::plan::Work;
 use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
 use crate::backend::MeasureSink;
 use crate::error::Result;
-use crate::policy::Policy;
+use crate::policy::{Mlp, Policy};
 use crate::rollout::{Plant, Query, ReachAvoidTask};
 use crate::system::System;
 
@@ -34,62 +34,79 @@ where
         Query::Sign => Work::Sign,
     };
     let job = Job::new(gpu, plant, work, count)?;
-    let schedule = job.uploaded(&schedule(&task.spec, task.tightening)?);
-    let region = job.uploaded(&region_vectors(&task.starts));
-    let params = Params {
-        stride: job.plan.stride,
-        sign_only: u32::from(work == Work::Sign),
-        ..start_params(&task.starts, &task.spec)
+    let buffers = Buffers::new(&job, plant.policy.network(), task)?;
+    let chunks = Chunks {
+        kernels: [buffers.bind(&job, 0)?, buffers.bind(&job, 1)?],
+        job: &job,
+        buffers: &buffers,
+        params: Params {
+            stride: job.plan.stride,
+            sign_only: u32::from(work == Work::Sign),
+            ..start_params(&task.starts, &task.spec)
+        },
     };
-    let network = plant
-        .policy
-        .network()
-        .map(|mlp| Network::new(&job, mlp, job.plan.row));
-    let measures = job.storage(4 * u64::from(job.plan.stride));
-    let survivors = job.storage(4);
-    let sets = [Columns::new(&job, NX), Columns::new(&job, NX)];
-    let bind = |from: usize| {
-        let (set, kept) = (&sets[from], &sets[1 - from]);
+    let mut first = task.range.start;
+    while first < task.range.end {
+        let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
+        job.upload_starts(&task.starts, first, columns, &buffers.sets[0].state);
+        chunks.run(first, columns)?;
+        let values: Vec<f32> = buffers.measures.read(job.device, columns as usize)?;
+        sink(first, &values)?;
+        first += u64::from(columns);
+    }
+    Ok(())
+}
+
+/// The buffers of a call.
+struct Buffers {
+    schedule: Buffer,
+    region: Buffer,
+    measures: Buffer,
+    survivors: Buffer,
+    sets: [Columns; 2],
+    network: Option<Network>,
+}
+
+impl Buffers {
+    fn new<const NX: usize>(
+        job: &Job<'_>,
+        network: Option<&Mlp>,
+        task: &ReachAvoidTask<'_, NX>,
+    ) -> Result<Self> {
+        Ok(Self {
+            schedule: job.uploaded(&schedule(&task.spec, task.tightening)?),
+            region: job.uploaded(&region_vectors(&task.starts)),
+            measures: job.storage(4 * u64::from(job.plan.stride)),
+            survivors: job.storage(4),
+            sets: [Columns::new(job, NX), Columns::new(job, NX)],
+            network: network.map(|mlp| Network::new(job, mlp, job.plan.row)),
+        })
+    }
+
+    /// The kernels on the set `from`, which compact into the other one.
+    fn bind(&self, job: &Job<'_>, from: usize) -> Result<Kernels> {
+        let (set, kept) = (&self.sets[from], &self.sets[1 - from]);
+        let network = self.network.as_ref();
         let buffer = |slot| match slot {
-            Slot::Region => &region,
-            Slot::Schedule => &schedule,
+            Slot::Region => &self.region,
+            Slot::Schedule => &self.schedule,
             Slot::State => &set.state,
             Slot::Folds => &set.folds,
             Slot::Origin => &set.origin,
             Slot::KeptState => &kept.state,
             Slot::KeptFolds => &kept.folds,
             Slot::KeptOrigin => &kept.origin,
-            Slot::Survivors => &survivors,
-            Slot::Control => network.as_ref().map_or(&measures, Network::control),
-            _ => &measures,
+            Slot::Survivors => &self.survivors,
+            Slot::Control => network.map_or(&self.measures, Network::control),
+            _ => &self.measures,
         };
         Ok(Kernels {
             sample: job.bind(Kernel::Sample, buffer)?,
             rollout: job.bind(Kernel::ReachAvoid, buffer)?,
             compact: job.bind(Kernel::Compact, buffer)?,
-            layers: match &network {
-                Some(network) => network.bind(&job, &set.state)?,
-                None => Vec::new(),
-            },
+            layers: network.map_or(Ok(Vec::new()), |network| network.bind(job, &set.state))?,
         })
-    };
-    let chunks = Chunks {
-        kernels: [bind(0)?, bind(1)?],
-        job: &job,
-        network: network.as_ref(),
-        survivors: &survivors,
-        params,
-    };
-    let mut first = task.range.start;
-    while first < task.range.end {
-        let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
-        job.upload_starts(&task.starts, first, columns, &sets[0].state);
-        chunks.run(first, columns)?;
-        let values: Vec<f32> = measures.read(job.device, columns as usize)?;
-        sink(first, &values)?;
-        first += u64::from(columns);
     }
-    Ok(())
 }
 
 /// One of the two sets of buffers that compaction moves trajectories between.
@@ -121,8 +138,7 @@ struct Kernels {
 /// What the chunks of a call share.
 struct Chunks<'a> {
     job: &'a Job<'a>,
-    network: Option<&'a Network>,
-    survivors: &'a Buffer,
+    buffers: &'a Buffers,
     kernels: [Kernels; 2],
     params: Params,
 }
@@ -144,8 +160,8 @@ impl Chunks<'_> {
             } else {
                 let compact = &self.kernels[set].compact;
                 batch.push_columns(Kernel::Compact, compact, &params);
-                self.job.submit(&batch, Some(self.survivors))?;
-                params.columns = self.survivors.read::<u32>(self.job.device, 1)?[0];
+                self.job.submit(&batch, Some(&self.buffers.survivors))?;
+                params.columns = self.buffers.survivors.read::<u32>(self.job.device, 1)?[0];
                 set = 1 - set;
                 if params.columns == 0 {
                     break;
@@ -168,7 +184,7 @@ impl Chunks<'_> {
         let mut step = steps.start;
         while step < steps.end {
             let count = self.job.plan.steps.min(steps.end - step);
-            if let Some(network) = self.network
+            if let Some(network) = &self.buffers.network
                 && step < params.horizon
             {
                 network.forward(batch, &kernels.layers, params.columns, params.stride);

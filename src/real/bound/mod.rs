@@ -73,7 +73,9 @@ pub fn enclose(domain: Domain<'_>, formula: impl FnOnce(&[Bound]) -> Vec<Bound>)
         "a box has as many lower as upper ends"
     );
     assert!(
-        low.iter().zip(high).all(|(low, high)| low <= high),
+        low.iter()
+            .zip(high)
+            .all(|(&low, &high)| low <= high && low < f64::INFINITY && high > f64::NEG_INFINITY),
         "a lower end is not above its upper end"
     );
     let dimensions = varies.iter().filter(|&&varies| varies).count();
