@@ -292,7 +292,7 @@ fn shipped_configurations_are_complete() {
         .unwrap();
     assert_eq!(
         (settings.deviation.radius, settings.growth.radius),
-        (0.02, 0.2)
+        (0.02, 0.1)
     );
     // The race's file says what the defaults say.
     let shipped = Config::load(&folder.join("race.toml"), &Overrides::default()).unwrap();
