@@ -11,6 +11,7 @@ mod html;
 mod palette;
 mod plot;
 mod slice;
+mod span;
 mod table;
 mod text;
 mod words;
