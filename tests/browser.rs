@@ -3,6 +3,7 @@
 //!
 //! To look at a report: `chromium --headless --no-sandbox --hide-scrollbars
 //! --window-size=1400,1500 --screenshot=docs/report.png report.html`.
+#![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
 mod records;
 

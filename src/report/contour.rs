@@ -151,10 +151,10 @@ fn joined(mut links: BTreeMap<usize, Vec<usize>>) -> Vec<Vec<usize>> {
         let mut line = vec![start];
         let mut here = start;
         while let Some(next) = links.get_mut(&here).and_then(Vec::pop) {
-            if let Some(back) = links.get_mut(&next) {
-                if let Some(index) = back.iter().position(|&edge| edge == here) {
-                    back.swap_remove(index);
-                }
+            if let Some(back) = links.get_mut(&next)
+                && let Some(index) = back.iter().position(|&edge| edge == here)
+            {
+                back.swap_remove(index);
             }
             line.push(next);
             here = next;

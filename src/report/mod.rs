@@ -1,8 +1,8 @@
 //! The report: one self-contained HTML page made from a stored certificate.
 //!
-//! Figures are written as SVG here rather than with a plot library. `plotters`, the one that was
-//! tried, fixes every colour and text size in its output, so that the page could follow neither
-//! the reader's light or dark setting nor a phone's width, and its legends sit inside the plot.
+//! Figures are written as SVG here rather than with a plot library: `plotters` writes each colour
+//! and text size as a fixed value and its legend into the plot, so that the page could follow
+//! neither the reader's light or dark setting nor a phone's width.
 
 mod contour;
 mod figure;
@@ -11,6 +11,7 @@ mod html;
 mod palette;
 mod plot;
 mod slice;
+mod span;
 mod table;
 mod text;
 mod words;

@@ -1,7 +1,7 @@
 //! The slice of a record as a grid of cells and as fields that reach its outer edge.
 
 use super::contour::Field;
-use super::plot::Span;
+use super::span::Span;
 use super::text::ordinary;
 use crate::rollout::HUGE;
 use crate::scenario::record::{Record, SliceAxisRecord};

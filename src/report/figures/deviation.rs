@@ -1,7 +1,8 @@
 //! The deviation bound against the step.
 
 use crate::report::figure::{Figure, Swatch};
-use crate::report::plot::{Labels, Plot, Shape, Span};
+use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::span::Span;
 use crate::report::text::{lower, number, ordinary, upper};
 use crate::report::words;
 use crate::scenario::record::Record;

@@ -1,7 +1,8 @@
 //! The rounds of local growth: radius tried and failures.
 
 use crate::report::figure::{Figure, Swatch, cross, dot};
-use crate::report::plot::{Labels, Plot, Shape, Span};
+use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::span::Span;
 use crate::report::text::{count, number, ordinary};
 use crate::report::words;
 use crate::scenario::record::{GrowthOutcome, Record};

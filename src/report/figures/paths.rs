@@ -2,8 +2,9 @@
 
 use super::{entry, margins, point, same_unit, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, dot};
-use crate::report::plot::{Labels, Plot, Shape, Span};
+use crate::report::plot::{Labels, Plot, Shape};
 use crate::report::slice::Grid;
+use crate::report::span::Span;
 use crate::report::text::shorten;
 use crate::report::words;
 use crate::scenario::record::{Record, RolloutRecord};

@@ -3,8 +3,9 @@
 use super::{lines, no_slice, point, same_unit, slice_states};
 use crate::report::figure::{Figure, Swatch, diamond};
 use crate::report::palette::{self, LEVELS};
-use crate::report::plot::{Labels, Plot, Shape, Span, coordinate};
+use crate::report::plot::{Labels, Plot, Shape, coordinate};
 use crate::report::slice::Grid;
+use crate::report::span::Span;
 use crate::report::text::{number, ordinary};
 use crate::report::words;
 use crate::scenario::record::Record;
