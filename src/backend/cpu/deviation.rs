@@ -1,13 +1,11 @@
 //! Pairs of rollouts side by side: the farthest pair of each step, and both measures.
 
-use std::array::from_fn;
-
 use super::dispatch::Body;
 use super::kernel::Kernel;
 use super::mlp::Packed;
 use super::tile::{Driver, Loss, Score, is_finite};
 use crate::policy::Policy;
-use crate::real::{Lanes, Real};
+use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure, Plant};
 use crate::system::System;
 
@@ -28,13 +26,6 @@ pub(super) struct Deviation<'a, S, P, const NX: usize, const NU: usize> {
     pub(super) out: &'a mut [PairMeasure],
 }
 
-/// A group of pairs: of each the nominal, then the perturbed rollout.
-#[derive(Clone, Copy, Debug)]
-struct Scores<const N: usize> {
-    nominal: Score<N>,
-    perturbed: Score<N>,
-}
-
 impl<S, P, const NX: usize, const NU: usize> Body for Deviation<'_, S, P, NX, NU>
 where
     S: System<NX, NU>,
@@ -46,69 +37,115 @@ where
     #[inline(always)]
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Vec<Farthest> {
         let Self {
-            plant: Plant { system, .. },
-            task,
-            width,
-            ..
+            plant, task, width, ..
         } = self;
-        let horizon = task.spec.horizon as usize;
-        let mut driver = Driver::<S, P, K, N, NU>::new(self.plant, self.network, kernel, width);
-        let mut farthest = vec![Farthest::NONE; horizon + 1];
-        let mut nominal = vec![[Lanes([0.0; N]); NX]; width.div_ceil(N)];
-        let mut perturbed = nominal.clone();
-        let mut scores = vec![Scores::<N>::new(); nominal.len()];
+        let mut driver = Driver::<S, P, K, N, NU>::new(plant, self.network, kernel, width);
+        let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
+        let mut pairs = Pairs::<N, NX>::new(width);
         for (tile, out) in self.out.chunks_mut(width).enumerate() {
             let first = self.first + (tile * width) as u64;
-            let pairs = out.len();
-            let groups = pairs.div_ceil(N);
-            let (nominal, perturbed) = (&mut nominal[..groups], &mut perturbed[..groups]);
-            for (group, x) in nominal.iter_mut().enumerate() {
-                [*x, perturbed[group]] = task.pairs.load(first + (group * N) as u64);
-            }
-            scores.fill(Scores::new());
-            for t in 0..=horizon {
+            pairs.load(task, first, out.len());
+            for (t, farthest) in farthest.iter_mut().enumerate() {
                 if t > 0 {
-                    driver.decide(nominal, pairs);
-                    driver.step_all(nominal);
-                    if task.control == PairControl::ClosedLoop {
-                        driver.decide(perturbed, pairs);
-                    }
-                    driver.step_all(perturbed);
+                    pairs.step(&mut driver, task.control);
                 }
-                let loss = Loss::at(task.tightening, t);
-                for (group, scores) in scores[..groups].iter_mut().enumerate() {
-                    let (x, y) = (&nominal[group], &perturbed[group]);
-                    scores.nominal.add(system, x, loss, &task.spec);
-                    scores.perturbed.add(system, y, Loss::NONE, &task.spec);
-                    let live = N.min(pairs - group * N);
-                    let index = first + (group * N) as u64;
-                    farther(&mut farthest[t], &distance(x, y).0[..live], index);
-                }
+                pairs.judge(plant.system, task, t, farthest);
             }
-            for (out, scores) in out.chunks_mut(N).zip(&scores) {
-                scores.write(out);
+            for (out, scores) in out.chunks_mut(N).zip(&pairs.scores) {
+                write(scores, out);
             }
         }
         farthest
     }
 }
 
-impl<const N: usize> Scores<N> {
+/// A tile of pairs, group by group.
+#[derive(Debug)]
+struct Pairs<const N: usize, const NX: usize> {
+    nominal: Vec<[Lanes<N>; NX]>,
+    perturbed: Vec<[Lanes<N>; NX]>,
+    /// Of the nominal and of the perturbed rollouts.
+    scores: Vec<[Score<N>; 2]>,
+    first: u64,
+    count: usize,
+}
+
+impl<const N: usize, const NX: usize> Pairs<N, NX> {
+    /// Room for `width` pairs.
     #[inline(always)]
-    fn new() -> Self {
+    fn new(width: usize) -> Self {
+        let groups = width.div_ceil(N);
         Self {
-            nominal: Score::new(),
-            perturbed: Score::new(),
+            nominal: vec![[Lanes([0.0; N]); NX]; groups],
+            perturbed: vec![[Lanes([0.0; N]); NX]; groups],
+            scores: vec![[Score::new(); 2]; groups],
+            first: 0,
+            count: 0,
         }
     }
 
-    /// The measures of the first pairs of the group.
+    /// Takes the pairs `first..first + count` in.
     #[inline(always)]
-    fn write(&self, out: &mut [PairMeasure]) {
-        let (nominal, perturbed) = (self.nominal.measure().0, self.perturbed.measure().0);
-        for (out, (nominal, perturbed)) in out.iter_mut().zip(nominal.into_iter().zip(perturbed)) {
-            *out = PairMeasure { nominal, perturbed };
+    fn load(&mut self, task: &DeviationTask<'_, NX>, first: u64, count: usize) {
+        (self.first, self.count) = (first, count);
+        let groups = self.nominal.iter_mut().zip(&mut self.perturbed);
+        for (group, (nominal, perturbed)) in groups.take(count.div_ceil(N)).enumerate() {
+            [*nominal, *perturbed] = task.pairs.load(first + (group * N) as u64);
         }
+        self.scores.fill([Score::new(); 2]);
+    }
+
+    /// Moves both rollouts of each pair one step on.
+    #[inline(always)]
+    fn step<S, P, K, const NU: usize>(
+        &mut self,
+        driver: &mut Driver<'_, S, P, K, N, NU>,
+        control: PairControl,
+    ) where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+        K: Kernel,
+    {
+        let groups = self.count.div_ceil(N);
+        let (nominal, perturbed) = (&mut self.nominal[..groups], &mut self.perturbed[..groups]);
+        driver.decide(nominal, self.count);
+        driver.step_all(nominal);
+        match control {
+            PairControl::Replay => {}
+            PairControl::ClosedLoop => driver.decide(perturbed, self.count),
+        }
+        driver.step_all(perturbed);
+    }
+
+    /// Adds the states of step `t` to the scores, and their distances to the farthest.
+    #[inline(always)]
+    fn judge<S: System<NX, NU>, const NU: usize>(
+        &mut self,
+        system: &S,
+        task: &DeviationTask<'_, NX>,
+        t: usize,
+        farthest: &mut Farthest,
+    ) {
+        let loss = Loss::at(task.tightening, t);
+        let states = self.nominal.iter().zip(&self.perturbed);
+        let groups = self.scores.iter_mut().zip(states);
+        for (group, (scores, (x, y))) in groups.take(self.count.div_ceil(N)).enumerate() {
+            let [nominal, perturbed] = scores;
+            nominal.add(system, x, loss, &task.spec);
+            perturbed.add(system, y, Loss::NONE, &task.spec);
+            let live = N.min(self.count - group * N);
+            let first = self.first + (group * N) as u64;
+            farther(farthest, &distance(x, y).0[..live], first);
+        }
+    }
+}
+
+/// Writes the measures of the first pairs of a group.
+#[inline(always)]
+fn write<const N: usize>([nominal, perturbed]: &[Score<N>; 2], out: &mut [PairMeasure]) {
+    let (nominal, perturbed) = (nominal.measure().0, perturbed.measure().0);
+    for (out, (nominal, perturbed)) in out.iter_mut().zip(nominal.into_iter().zip(perturbed)) {
+        *out = PairMeasure { nominal, perturbed };
     }
 }
 
@@ -121,7 +158,7 @@ fn distance<const N: usize, const NX: usize>(x: &[Lanes<N>; NX], y: &[Lanes<N>; 
         square = square + gap * gap;
     }
     let distance = square.sqrt();
-    Lanes(from_fn(|i| {
+    Lanes(per_lane!(N, i => {
         if is_finite(distance.0[i]) {
             distance.0[i]
         } else {

@@ -1,13 +1,11 @@
 //! Signs of reach-avoid measures: a decided trajectory leaves the tile, and the next start takes
 //! its lane.
 
-use std::array::from_fn;
-
 use super::kernel::Kernel;
 use super::reach_avoid::ReachAvoid;
 use super::tile::{Driver, Loss, Score};
 use crate::policy::Policy;
-use crate::real::{Lanes, Real};
+use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{NON_FINITE, Plant, ReachAvoidTask};
 use crate::system::System;
 
@@ -84,17 +82,18 @@ impl<const N: usize> Group<N> {
     ) {
         let horizon = task.spec.horizon;
         // An empty lane runs on: its clock must stay within the tightening.
-        self.step = self.step.map(|step| (step + 1).min(horizon));
+        self.step = per_lane!(N, i => (self.step[i] + 1).min(horizon));
         let loss = Loss::at_each(task.tightening, &self.step);
         self.score.add(system, x, loss, &task.spec);
         let decided = self.score.decided();
-        self.done = from_fn(|i| decided[i] | u32::from(self.step[i] == horizon));
+        self.done = per_lane!(N, i => decided[i] | u32::from(self.step[i] == horizon));
     }
 
     /// The sign of each measure, [`NON_FINITE`] as it is.
     #[inline(always)]
     fn signs(&self) -> [f32; N] {
-        self.score.measure().0.map(sign)
+        let measure = self.score.measure().0;
+        per_lane!(N, i => sign(measure[i]))
     }
 
     #[inline(always)]
@@ -197,7 +196,7 @@ impl<'a, const N: usize, const NX: usize> Queue<'a, N, NX> {
             let live = N.min(self.count - self.loaded);
             self.x = self.task.starts.load(self.first + self.loaded as u64);
             self.group = Group::new();
-            self.group.place = from_fn(|i| (self.loaded + i) as u32);
+            self.group.place = per_lane!(N, i => (self.loaded + i) as u32);
             let loss = Loss::at(self.task.tightening, 0);
             self.group.score.add(system, &self.x, loss, &self.task.spec);
             self.group.done = self.group.score.decided();

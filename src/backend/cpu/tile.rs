@@ -1,11 +1,9 @@
 //! A tile of trajectories in groups of lanes: their controls and their scores.
 
-use std::array::from_fn;
-
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use crate::policy::Policy;
-use crate::real::{Lanes, Real};
+use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{Fold, HUGE, NON_FINITE, Plant, RolloutSpec, Tightening};
 use crate::system::System;
 
@@ -90,14 +88,18 @@ impl<const N: usize> Loss<N> {
     /// At step `t`, the same for all lanes.
     #[inline(always)]
     pub(super) fn at(tightening: &Tightening, t: usize) -> Self {
-        Self([tightening.target[t], tightening.constraint[t]].map(Lanes::lit))
+        let (target, constraint) = (tightening.target[t], tightening.constraint[t]);
+        Self([Lanes::lit(target), Lanes::lit(constraint)])
     }
 
     /// At a step of its own for each lane.
     #[inline(always)]
     pub(super) fn at_each(tightening: &Tightening, steps: &[u32; N]) -> Self {
-        let gather = |values: &[f32]| Lanes(from_fn(|i| values[steps[i] as usize]));
-        Self([gather(&tightening.target), gather(&tightening.constraint)])
+        let Tightening { target, constraint } = tightening;
+        Self([
+            Lanes(per_lane!(N, i => target[steps[i] as usize])),
+            Lanes(per_lane!(N, i => constraint[steps[i] as usize])),
+        ])
     }
 }
 
@@ -132,25 +134,20 @@ impl<const N: usize> Score<N> {
         let constraint = system.constraint(*x) - constraint_loss;
         let mut largest = [0; N];
         for values in x.iter().chain([&target, &constraint]) {
-            largest = from_fn(|i| values.0[i].abs().to_bits().max(largest[i]));
+            largest = per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]));
         }
-        self.failed = from_fn(|i| self.failed[i] | u32::from(largest[i] >= EXPONENT));
+        self.failed = per_lane!(N, i => self.failed[i] | u32::from(largest[i] >= EXPONENT));
         // Margins of -HUGE leave a positive measure as it is and make no other one positive.
-        let failed = self.failed;
-        let or_lost = |margin: Lanes<N>| {
-            Lanes(from_fn(
-                |i| if failed[i] != 0 { -HUGE } else { margin.0[i] },
-            ))
-        };
-        self.fold
-            .add(or_lost(target), or_lost(constraint), Lanes::lit(spec.gamma));
+        let target = lost(&self.failed, target);
+        let constraint = lost(&self.failed, constraint);
+        self.fold.add(target, constraint, Lanes::lit(spec.gamma));
     }
 
     /// The measures; [`NON_FINITE`] where the rollout failed before it reached the target.
     #[inline(always)]
     pub(super) fn measure(&self) -> Lanes<N> {
         let measure = self.fold.measure().0;
-        Lanes(from_fn(|i| {
+        Lanes(per_lane!(N, i => {
             if self.failed[i] != 0 && measure[i] <= 0.0 {
                 NON_FINITE
             } else {
@@ -163,7 +160,7 @@ impl<const N: usize> Score<N> {
     #[inline(always)]
     pub(super) fn decided(&self) -> [u32; N] {
         let (measure, safe) = (self.fold.measure().0, self.fold.safe().0);
-        from_fn(|i| u32::from(measure[i] > 0.0) | u32::from(safe[i] <= 0.0))
+        per_lane!(N, i => u32::from(measure[i] > 0.0) | u32::from(safe[i] <= 0.0))
     }
 
     /// Copies lane `from` of `source` to lane `to`.
@@ -172,4 +169,10 @@ impl<const N: usize> Score<N> {
         self.fold.copy_lane(to, &source.fold, from);
         self.failed[to] = source.failed[from];
     }
+}
+
+/// `margin`, or -[`HUGE`] where the rollout failed.
+#[inline(always)]
+fn lost<const N: usize>(failed: &[u32; N], margin: Lanes<N>) -> Lanes<N> {
+    Lanes(per_lane!(N, i => if failed[i] != 0 { -HUGE } else { margin.0[i] }))
 }
