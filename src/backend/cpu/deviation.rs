@@ -1,7 +1,8 @@
 //! Pairs of rollouts side by side: the farthest pair of each step, and both measures.
 
-use super::dispatch::Body;
+use super::dispatch::{Body, Unit};
 use super::kernel::Kernel;
+use super::load::LoadPairs;
 use super::mlp::Packed;
 use super::tile::{Driver, Loss, Score, is_finite};
 use crate::policy::Policy;
@@ -26,7 +27,7 @@ pub(super) struct Deviation<'a, S, P, const NX: usize, const NU: usize> {
     pub(super) out: &'a mut [PairMeasure],
 }
 
-impl<S, P, const NX: usize, const NU: usize> Body for Deviation<'_, S, P, NX, NU>
+impl<S, P, const NX: usize, const NU: usize> Unit for Deviation<'_, S, P, NX, NU>
 where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
@@ -34,7 +35,6 @@ where
     /// The farthest pair of each step, `[T + 1]`.
     type Output = Vec<Farthest>;
 
-    #[inline(always)]
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Vec<Farthest> {
         let Self {
             plant, task, width, ..
@@ -44,12 +44,12 @@ where
         let mut pairs = Pairs::<N, NX>::new(width);
         for (tile, out) in self.out.chunks_mut(width).enumerate() {
             let first = self.first + (tile * width) as u64;
-            pairs.load(task, first, out.len());
+            pairs.load(kernel, task, first, out.len());
             for (t, farthest) in farthest.iter_mut().enumerate() {
                 if t > 0 {
                     pairs.step(&mut driver, task.control);
                 }
-                pairs.judge(plant.system, task, t, farthest);
+                pairs.judge(&driver, task, t, farthest);
             }
             for (out, scores) in out.chunks_mut(N).zip(&pairs.scores) {
                 write(scores, out);
@@ -72,7 +72,6 @@ struct Pairs<const N: usize, const NX: usize> {
 
 impl<const N: usize, const NX: usize> Pairs<N, NX> {
     /// Room for `width` pairs.
-    #[inline(always)]
     fn new(width: usize) -> Self {
         let groups = width.div_ceil(N);
         Self {
@@ -85,18 +84,27 @@ impl<const N: usize, const NX: usize> Pairs<N, NX> {
     }
 
     /// Takes the pairs `first..first + count` in.
-    #[inline(always)]
-    fn load(&mut self, task: &DeviationTask<'_, NX>, first: u64, count: usize) {
+    fn load<K: Kernel>(
+        &mut self,
+        kernel: K,
+        task: &DeviationTask<'_, NX>,
+        first: u64,
+        count: usize,
+    ) {
         (self.first, self.count) = (first, count);
         let groups = self.nominal.iter_mut().zip(&mut self.perturbed);
         for (group, (nominal, perturbed)) in groups.take(count.div_ceil(N)).enumerate() {
-            [*nominal, *perturbed] = task.pairs.load(first + (group * N) as u64);
+            kernel.call(LoadPairs {
+                pairs: &task.pairs,
+                first: first + (group * N) as u64,
+                nominal,
+                perturbed,
+            });
         }
         self.scores.fill([Score::new(); 2]);
     }
 
     /// Moves both rollouts of each pair one step on.
-    #[inline(always)]
     fn step<S, P, K, const NU: usize>(
         &mut self,
         driver: &mut Driver<'_, S, P, K, N, NU>,
@@ -109,39 +117,46 @@ impl<const N: usize, const NX: usize> Pairs<N, NX> {
         let groups = self.count.div_ceil(N);
         let (nominal, perturbed) = (&mut self.nominal[..groups], &mut self.perturbed[..groups]);
         driver.decide(nominal, self.count);
-        driver.step_all(nominal);
+        driver.step(nominal);
         match control {
             PairControl::Replay => {}
             PairControl::ClosedLoop => driver.decide(perturbed, self.count),
         }
-        driver.step_all(perturbed);
+        driver.step(perturbed);
     }
 
     /// Adds the states of step `t` to the scores, and their distances to the farthest.
-    #[inline(always)]
-    fn judge<S: System<NX, NU>, const NU: usize>(
+    fn judge<S, P, K, const NU: usize>(
         &mut self,
-        system: &S,
+        driver: &Driver<'_, S, P, K, N, NU>,
         task: &DeviationTask<'_, NX>,
         t: usize,
         farthest: &mut Farthest,
-    ) {
-        let loss = Loss::at(task.tightening, t);
+    ) where
+        S: System<NX, NU>,
+        K: Kernel,
+    {
+        let (loss, gamma) = (Loss::at(task.tightening, t), task.spec.gamma);
         let states = self.nominal.iter().zip(&self.perturbed);
         let groups = self.scores.iter_mut().zip(states);
         for (group, (scores, (x, y))) in groups.take(self.count.div_ceil(N)).enumerate() {
             let [nominal, perturbed] = scores;
-            nominal.add(system, x, loss, &task.spec);
-            perturbed.add(system, y, Loss::NONE, &task.spec);
+            driver.judge(x, nominal, &loss, gamma);
+            driver.judge(y, perturbed, &Loss::NONE, gamma);
             let live = N.min(self.count - group * N);
             let first = self.first + (group * N) as u64;
-            farther(farthest, &distance(x, y).0[..live], first);
+            driver.kernel().call(Gap {
+                x,
+                y,
+                live,
+                first,
+                farthest,
+            });
         }
     }
 }
 
 /// Writes the measures of the first pairs of a group.
-#[inline(always)]
 fn write<const N: usize>([nominal, perturbed]: &[Score<N>; 2], out: &mut [PairMeasure]) {
     let (nominal, perturbed) = (nominal.measure().0, perturbed.measure().0);
     for (out, (nominal, perturbed)) in out.iter_mut().zip(nominal.into_iter().zip(perturbed)) {
@@ -149,37 +164,38 @@ fn write<const N: usize>([nominal, perturbed]: &[Score<N>; 2], out: &mut [PairMe
     }
 }
 
-/// Euclidean distance of two groups of states; [`HUGE`] where one is not finite.
-#[inline(always)]
-fn distance<const N: usize, const NX: usize>(x: &[Lanes<N>; NX], y: &[Lanes<N>; NX]) -> Lanes<N> {
-    let mut square = Lanes::<N>::lit(0.0);
-    for (x, y) in x.iter().zip(y) {
-        let gap = *y - *x;
-        square = square + gap * gap;
-    }
-    let distance = square.sqrt();
-    Lanes(per_lane!(N, i => {
-        if is_finite(distance.0[i]) {
-            distance.0[i]
-        } else {
-            HUGE
-        }
-    }))
+/// Merges the distances of a group of pairs into the farthest.
+struct Gap<'a, const N: usize, const NX: usize> {
+    x: &'a [Lanes<N>; NX],
+    y: &'a [Lanes<N>; NX],
+    /// How many of the pairs there are.
+    live: usize,
+    /// Index of the first of them.
+    first: u64,
+    farthest: &'a mut Farthest,
 }
 
-/// Merges the distances of the pairs from `first` on into `farthest`.
-#[inline(always)]
-fn farther(farthest: &mut Farthest, distances: &[f32], first: u64) {
-    // Distances are not negative, so the order of their bits is theirs.
-    let largest = distances
-        .iter()
-        .fold(0, |largest, d| d.to_bits().max(largest));
-    let distance = f32::from_bits(largest);
-    if distance > farthest.distance || farthest.pair > first {
-        let lane = distances.iter().take_while(|d| **d != distance).count();
-        *farthest = farthest.merge(Farthest {
-            distance,
-            pair: first + lane as u64,
-        });
+impl<const N: usize, const NX: usize> Body for Gap<'_, N, NX> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let mut square = Lanes::<N>::lit(0.0);
+        for (x, y) in self.x.iter().zip(self.y) {
+            let gap = *y - *x;
+            square = square + gap * gap;
+        }
+        let root = square.sqrt().0;
+        let distances = per_lane!(N, i => if is_finite(root[i]) { root[i] } else { HUGE });
+        // Distances are not negative, so the order of their bits is theirs.
+        let bits = per_lane!(N, i => if i < self.live { distances[i].to_bits() } else { 0 });
+        let distance = f32::from_bits(bits.iter().fold(0, |largest, bits| *bits.max(&largest)));
+        if distance > self.farthest.distance || self.farthest.pair > self.first {
+            let lane = distances.iter().take_while(|d| **d != distance).count();
+            *self.farthest = self.farthest.merge(Farthest {
+                distance,
+                pair: self.first + lane as u64,
+            });
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! The dense-layer kernels for AVX-512 and for AVX2 with fused multiply-add.
 
+use super::dispatch::Body;
 use super::kernel::{Kernel, Panel};
 
 /// Rows of inputs that are fetched ahead of their use.
@@ -96,7 +97,10 @@ macro_rules! x86_kernel {
     };
 }
 
-#[allow(unsafe_code, reason = "vector loads and stores at checked offsets")]
+#[allow(
+    unsafe_code,
+    reason = "vector instructions behind a proof of their presence"
+)]
 mod kernels {
     use super::*;
 
@@ -134,12 +138,26 @@ mod kernels {
         };
     }
 
+    #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma")]
+    fn call_avx512<B: Body>(body: B) -> B::Output {
+        body.run()
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    fn call_avx2<B: Body>(body: B) -> B::Output {
+        body.run()
+    }
+
     impl Kernel for Avx512 {
         // 24 of 32 registers hold sums.
         const ROWS: usize = 8;
         const BLOCK: usize = 48;
 
-        #[inline]
+        fn call<B: Body>(self, body: B) -> B::Output {
+            // SAFETY: `self` proves that the processor has the instructions.
+            unsafe { call_avx512(body) }
+        }
+
         fn panel(self, panel: Panel<'_>, lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
             match lanes {
                 0..=16 => by_rows!(avx512, 1, panel, inputs, outputs: 1 2 3 4 5 6 7 8),
@@ -154,7 +172,11 @@ mod kernels {
         const ROWS: usize = 6;
         const BLOCK: usize = 16;
 
-        #[inline]
+        fn call<B: Body>(self, body: B) -> B::Output {
+            // SAFETY: `self` proves that the processor has the instructions.
+            unsafe { call_avx2(body) }
+        }
+
         fn panel(self, panel: Panel<'_>, _lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
             by_rows!(avx2, 2, panel, inputs, outputs: 1 2 3 4 5 6)
         }

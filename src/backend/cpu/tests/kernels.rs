@@ -1,6 +1,6 @@
 //! The dense-layer kernels against a scalar loop, to the bit.
 
-use super::super::dispatch::{Body, Instructions};
+use super::super::dispatch::{Instructions, Unit};
 use super::super::kernel::{GRANULE, Kernel, Panel};
 
 /// Compares every shape of panel with a scalar loop.
@@ -8,7 +8,7 @@ struct EveryShape {
     fused: bool,
 }
 
-impl Body for EveryShape {
+impl Unit for EveryShape {
     type Output = ();
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) {
