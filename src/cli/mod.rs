@@ -1,1 +1,97 @@
-//! The command line.
+//! The command line: reads arguments, runs a command, says what came of it by its exit code.
+
+mod args;
+mod certify;
+mod devices;
+mod progress;
+mod rollout;
+mod scenarios;
+mod stored;
+mod summary;
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::Path;
+
+use clap::Parser;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use args::{Arguments, Command, Global};
+
+/// What a command that ran to its end came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// All that was asked for.
+    Done,
+    /// The claim asked for was not obtained.
+    NotObtained,
+}
+
+/// Runs the command line and returns its exit code: 0 done, 1 failed, 2 wrong usage,
+/// configuration or input, 3 ran but the claim asked for was not obtained.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(usage) => {
+            // Help and version come this way too, with exit code 0. Nobody reads what a closed
+            // pipe does not take.
+            let _ = usage.print();
+            return usage.exit_code() as u8;
+        }
+    };
+    match dispatch(&arguments) {
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::NotObtained) => 3,
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "error: {error}");
+            error.exit_code()
+        }
+    }
+}
+
+/// Runs the command.
+fn dispatch(arguments: &Arguments) -> Result<Outcome> {
+    let global = &arguments.global;
+    match &arguments.command {
+        Command::Certify { config } => certify::run(global, config),
+        Command::Rollout {
+            config,
+            starts,
+            measures,
+        } => rollout::run(global, config, starts, measures),
+        Command::Query { folder, states } => stored::query(global, folder, states),
+        Command::Check { folder } => stored::check(global, folder),
+        Command::Scenarios(asked) => scenarios::run(global, *asked),
+        Command::Devices => devices::list(global),
+    }
+}
+
+/// Prints `value` as JSON with `--json`, nothing with `-q`, else `text`.
+fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
+    let text = match (global.json, global.quiet) {
+        (true, _) => {
+            let json = serde_json::to_string_pretty(value);
+            json.map_err(|e| Error::invalid("--json", e.to_string()))? + "\n"
+        }
+        (false, true) => return Ok(()),
+        (false, false) => text(),
+    };
+    let mut output = std::io::stdout().lock();
+    match output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush())
+    {
+        // Whoever closed the pipe has read enough.
+        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::Write {
+            path: "standard output".into(),
+            source,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// The folder that `path` lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
+}

@@ -22,7 +22,7 @@ use crate::system::System;
 /// Rollouts drawn in the picture: the state's, and that many starts of the growth.
 const PICTURED: usize = 12;
 /// Points whose gradients are sampled beside each computed constant.
-const GRADIENT_SAMPLES: u64 = 4096;
+const GRADIENT_SAMPLES: u32 = 4096;
 /// How much wider a box is tried to see whether a constant depends on it.
 const WIDER: f32 = 10.0;
 
@@ -173,7 +173,8 @@ where
     };
     let (low, high) = (wider(&settings.low, -1.0), wider(&settings.high, 1.0));
     let outside = lipschitz::margins(system, low, high, all);
-    let sampled = lipschitz::sampled(system, settings.low, settings.high, all, GRADIENT_SAMPLES);
+    let (samples, seed) = (GRADIENT_SAMPLES, settings.seed);
+    let sampled = lipschitz::sampled(system, settings.low, settings.high, all, samples, seed);
     let one = |name: &str, given: Option<f64>, computed: f64, beyond: f64, sampled: f64| {
         let used = given.unwrap_or(computed);
         if !(used.is_finite() && used > 0.0) {

@@ -138,7 +138,7 @@ where
 {
     let asked = &settings.deviation;
     let matrix = match asked.control {
-        PairControl::Replay => linear::state_matrix(system, settings.low, settings.high),
+        PairControl::Replay => linear::state_matrix(system),
         // Under feedback the policy bends the dynamics: no single matrix.
         PairControl::ClosedLoop => None,
     };

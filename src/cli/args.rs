@@ -1,0 +1,176 @@
+//! The arguments of the command line and their help texts.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::config::{Overrides, Profile};
+
+/// Batch rollouts and the probabilistic reach-avoid certificates that they support.
+#[derive(Debug, Parser)]
+#[command(name = "reachcast", version, max_term_width = 100, after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    pub(super) global: Global,
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+/// Shown after the help of the program.
+const EXAMPLES: &str = "\
+Examples:
+  reachcast certify configs/race.toml
+  reachcast certify configs/race.toml --profile study --set growth.rounds=10 --out study
+  reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures measures.npy
+  reachcast query reachcast-out --states configs/race_starts_500.csv
+  reachcast check reachcast-out
+  reachcast scenarios --epsilon 0.1 --beta 1e-3
+
+Exit codes:
+  0  done
+  1  failed
+  2  wrong usage, configuration or input
+  3  ran, but the claim asked for was not obtained";
+
+/// Options of every command.
+#[derive(Args, Debug)]
+pub(super) struct Global {
+    /// Who runs the rollouts; `auto` takes a hardware GPU if there is one, else the CPU
+    #[arg(long, global = true, value_enum, default_value_t = BackendName::Auto)]
+    pub(super) backend: BackendName,
+    /// The GPU adapter whose name contains this, as `devices` lists them
+    #[arg(long, global = true, value_name = "NAME")]
+    pub(super) device: Option<String>,
+    /// Threads of the CPU backend [default: as many as the processor runs at once]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) threads: Option<u16>,
+    /// Seed of every random stream, instead of the configuration's
+    #[arg(long, global = true, value_name = "N")]
+    pub(super) seed: Option<u64>,
+    /// Profile whose defaults count, instead of the configuration's
+    #[arg(long, global = true, value_enum)]
+    pub(super) profile: Option<Profile>,
+    /// Override a key of the configuration, for instance rollout.horizon=40; repeatable
+    #[arg(long, global = true, value_name = "SECTION.KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Folder for the results [default of certify: reachcast-out]
+    #[arg(long, global = true, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Print one JSON document on standard output and nothing else
+    #[arg(long, global = true)]
+    pub(super) json: bool,
+    /// Print errors only
+    #[arg(short, long, global = true)]
+    pub(super) quiet: bool,
+}
+
+impl Global {
+    /// What lies over a configuration file.
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides {
+            profile: self.profile,
+            seed: self.seed,
+            set: self.set.clone(),
+        }
+    }
+}
+
+/// The values of `--backend`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum BackendName {
+    /// A hardware GPU if there is one, else the CPU; never a software adapter
+    Auto,
+    /// The native CPU backend
+    Cpu,
+    /// A GPU, or a software adapter where there is none
+    Gpu,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Certify a policy: deviation bound, certified set, and a locally grown ball
+    ///
+    /// Writes certificate.json, deviation.csv (step, bound, largest, exact), slice.npy (f32,
+    /// [rows, columns]), report.html and, for a network, policy.safetensors to the folder of
+    /// --out. Exit code 3: it ran, but a claim that was asked for was not obtained.
+    #[command(after_help = "\
+Examples:
+  reachcast certify configs/smoke.toml
+  reachcast certify configs/race.toml --backend gpu --seed 7 --out run7 --json")]
+    Certify {
+        /// Configuration (TOML)
+        config: PathBuf,
+    },
+    /// Compute the reach-avoid measure of each start
+    #[command(after_help = "\
+A start succeeds where its measure is positive. States are in the system's order; a header of a
+.csv file has to name them in that order.
+
+Example:
+  reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures out.npy")]
+    Rollout {
+        /// Configuration (TOML)
+        config: PathBuf,
+        /// Starts: .npy (f32 or f64, [N, states]) or .csv
+        #[arg(long, value_name = "FILE")]
+        starts: PathBuf,
+        /// Where the measures go: .npy (f32, [N]) or .csv
+        #[arg(long, value_name = "FILE")]
+        measures: PathBuf,
+    },
+    /// Tell the tier and the tightened measure V_check of states against a stored certificate
+    #[command(after_help = "\
+Tiers: 0 in the target set, 1 in the certified set, 2 in the locally verified ball, 3 otherwise.
+Prints a line per state (tier, check_margin, target_margin); with --out DIR these go to
+DIR/query.csv instead and a summary is printed.
+
+Example:
+  reachcast query reachcast-out --states configs/race_starts_500.csv")]
+    Query {
+        /// Folder that `certify` wrote
+        folder: PathBuf,
+        /// States: .npy (f32 or f64, [N, states]) or .csv
+        #[arg(long, value_name = "FILE")]
+        states: PathBuf,
+    },
+    /// Verify a stored certificate again, and try its claims on fresh scenarios
+    ///
+    /// Exit code 3: it no longer holds.
+    #[command(after_help = "\
+Example:
+  reachcast check reachcast-out")]
+    Check {
+        /// Folder that `certify` wrote
+        folder: PathBuf,
+    },
+    /// Tell how many scenarios a claim needs
+    #[command(after_help = "\
+Examples:
+  reachcast scenarios --epsilon 0.1 --beta 1e-3
+  reachcast scenarios --epsilon 0.1 --beta 1e-3 --rounds 5
+  reachcast scenarios --epsilon 0.01 --beta 1e-6 --failures 3")]
+    Scenarios(ScenarioArguments),
+    /// List the devices that can run rollouts
+    Devices,
+}
+
+/// The claim that `scenarios` is asked about.
+#[derive(Args, Clone, Copy, Debug)]
+pub(super) struct ScenarioArguments {
+    /// Risk, in (0, 1)
+    #[arg(long)]
+    pub(super) epsilon: f64,
+    /// One minus the confidence, in (0, 1)
+    #[arg(long)]
+    pub(super) beta: f64,
+    /// Decision variables of the scenario program
+    #[arg(long, value_name = "D", default_value_t = 1)]
+    pub(super) dim: u32,
+    /// Failures that may be among the scenarios (Clopper-Pearson; for one decision variable)
+    #[arg(long, value_name = "K")]
+    pub(super) failures: Option<u64>,
+    /// Rounds that share beta, each of which spends beta / M
+    #[arg(long, value_name = "M", default_value_t = 1)]
+    pub(super) rounds: u32,
+}

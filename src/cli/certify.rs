@@ -1,0 +1,105 @@
+//! The command `certify`: a certificate, its tables and its report in one folder.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use super::args::Global;
+use super::progress::Progress;
+use super::{Outcome, devices, folder_of, report, summary};
+use crate::config::{Config, Job, PolicySource};
+use crate::error::{Error, Result};
+use crate::files::{Staged, npy_bytes};
+use crate::policy::Policy;
+use crate::rollout::Plant;
+use crate::scenario;
+use crate::scenario::record::{DeviationRecord, Record};
+use crate::system::System;
+
+/// Where the results go unless `--out` says otherwise.
+const DEFAULT_OUT: &str = "reachcast-out";
+/// Name of the stored certificate.
+pub(super) const CERTIFICATE: &str = "certificate.json";
+/// Name of the copy of the network, which makes the folder self-contained.
+pub(super) const POLICY: &str = "policy.safetensors";
+
+/// Certifies what the configuration asks for.
+pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
+    let config = Config::load(path, &global.overrides())?;
+    let policy = config.policy_source(folder_of(path))?;
+    let out = global
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let job = Certify {
+        global,
+        config: &config,
+        out: &out,
+    };
+    let (record, mut staged) = config.with_plant(&policy, job)?;
+    stage(&mut staged, &record, &policy)?;
+    let files = staged.publish()?;
+    report(global, &record, || summary::text(&record, &files))?;
+    Ok(if record.holds {
+        Outcome::Done
+    } else {
+        Outcome::NotObtained
+    })
+}
+
+/// The command for one plant.
+struct Certify<'a> {
+    global: &'a Global,
+    config: &'a Config,
+    out: &'a Path,
+}
+
+impl Job for Certify<'_> {
+    type Output = (Record, Staged);
+
+    fn run<S, P, const NX: usize, const NU: usize>(
+        self,
+        plant: Plant<'_, S, P>,
+    ) -> Result<(Record, Staged)>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let settings = self.config.settings(&plant.system.states())?;
+        let stored = self.config.to_json()?;
+        let backend = devices::open(self.global)?;
+        let progress = Progress::new(self.global);
+        // Before the work: a folder that cannot be written to would waste it.
+        let staged = Staged::new(self.out)?;
+        let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
+        record.timing.threads = devices::threads(self.global);
+        progress.check()?;
+        Ok((record, staged))
+    }
+}
+
+/// Writes all files of the folder, the certificate itself last.
+fn stage(staged: &mut Staged, record: &Record, policy: &PolicySource) -> Result<()> {
+    if let PolicySource::Network { bytes, .. } = policy {
+        staged.add(POLICY, bytes)?;
+    }
+    let slice = &record.slice;
+    let shape = [slice.y.values.len(), slice.x.values.len()];
+    staged.add("slice.npy", &npy_bytes(&slice.check_margin, shape))?;
+    staged.add("deviation.csv", deviation_csv(&record.deviation).as_bytes())?;
+    staged.add("report.html", crate::report::html(record).as_bytes())?;
+    let json = serde_json::to_string_pretty(record);
+    let json = json.map_err(|e| Error::invalid(CERTIFICATE, e.to_string()))?;
+    staged.add(CERTIFICATE, (json + "\n").as_bytes())
+}
+
+/// The bounds of each step; the column `exact` is empty for a system that is not linear.
+fn deviation_csv(deviation: &DeviationRecord) -> String {
+    let mut text = "step,bound,largest,exact\n".to_owned();
+    for (step, (bound, largest)) in deviation.bound.iter().zip(&deviation.largest).enumerate() {
+        let exact = deviation.exact.as_ref().and_then(|exact| exact.get(step));
+        let exact = exact.map(f64::to_string).unwrap_or_default();
+        // A String takes whatever is written to it.
+        let _ = writeln!(text, "{step},{bound},{largest},{exact}");
+    }
+    text
+}

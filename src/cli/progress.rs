@@ -1,0 +1,93 @@
+//! Progress on standard error, and stopping at Ctrl-C.
+
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::args::Global;
+use crate::error::{Error, Result};
+use crate::scenario::Watch;
+
+/// Set by Ctrl-C or a termination signal.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Work that is done sooner shows no bar.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A bar per stage with rate and time left, on a terminal and for work over a second.
+#[derive(Debug)]
+pub(super) struct Progress {
+    begun: Instant,
+    visible: bool,
+    bar: Mutex<ProgressBar>,
+}
+
+impl Progress {
+    /// A bar for the command, and the end of the work at Ctrl-C.
+    pub(super) fn new(global: &Global) -> Self {
+        // A second handler is refused: tests of this library may run commands side by side.
+        let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+        Self {
+            begun: Instant::now(),
+            visible: std::io::stderr().is_terminal() && !global.json && !global.quiet,
+            bar: Mutex::new(ProgressBar::hidden()),
+        }
+    }
+
+    /// Takes the bar off the screen.
+    pub(super) fn finish(&self) {
+        self.with_bar(|bar| bar.finish_and_clear());
+    }
+
+    /// [`Error::Interrupted`] once Ctrl-C was pressed.
+    pub(super) fn check(&self) -> Result<()> {
+        match INTERRUPTED.load(Ordering::Relaxed) {
+            true => Err(Error::Interrupted),
+            false => Ok(()),
+        }
+    }
+
+    fn with_bar<T>(&self, work: impl FnOnce(&mut ProgressBar) -> T) -> T {
+        // A bar has no state that a panic elsewhere could break.
+        let mut bar = self
+            .bar
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        work(&mut bar)
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+impl Watch for Progress {
+    fn begin(&self, stage: &str, total: u64) {
+        let template = "{msg:28} [{bar:24}] {percent:>3} %  {per_sec}, {eta} left";
+        let style = ProgressStyle::with_template(template);
+        let style = style
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .progress_chars("=> ");
+        self.with_bar(|bar| {
+            bar.finish_and_clear();
+            *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden())
+                .with_style(style)
+                .with_message(stage.to_owned());
+        });
+    }
+
+    fn advance(&self, count: u64) -> Result<()> {
+        self.with_bar(|bar| {
+            if self.visible && bar.is_hidden() && self.begun.elapsed() > PATIENCE {
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+            }
+            bar.inc(count);
+        });
+        self.check()
+    }
+}

@@ -1,0 +1,178 @@
+//! The command `rollout`: the reach-avoid measure of each start in a file.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::args::Global;
+use super::progress::Progress;
+use super::{Outcome, devices, folder_of, report};
+use crate::backend::Backend;
+use crate::config::{Config, Job};
+use crate::error::Result;
+use crate::files::{MeasureWriter, StateReader};
+use crate::policy::Policy;
+use crate::rollout::{NON_FINITE, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
+use crate::scenario::Watch;
+use crate::scenario::bound::interval;
+use crate::system::System;
+
+/// Starts that are held in memory at a time.
+const CHUNK: usize = 1 << 18;
+/// One minus the confidence of the interval of the success rate.
+const BETA: f64 = 0.05;
+
+/// What `rollout --json` prints.
+#[derive(Serialize)]
+struct Summary {
+    starts: u64,
+    successes: u64,
+    non_finite: u64,
+    /// Two-sided 95 % interval of the success rate (Clopper-Pearson).
+    success_interval: [f64; 2],
+    horizon: u32,
+    gamma: f32,
+    measures: String,
+    backend: String,
+    device: String,
+    wall_seconds: f64,
+}
+
+/// Rolls the starts out and writes their measures.
+pub(super) fn run(
+    global: &Global,
+    config: &Path,
+    starts: &Path,
+    measures: &Path,
+) -> Result<Outcome> {
+    let folder = folder_of(config);
+    let config = Config::load(config, &global.overrides())?;
+    let spec = config.spec()?;
+    let policy = config.policy_source(folder)?;
+    let job = Rollout {
+        global,
+        spec,
+        starts,
+        measures,
+    };
+    let summary = config.with_plant(&policy, job)?;
+    report(global, &summary, || text(&summary))?;
+    Ok(Outcome::Done)
+}
+
+/// The command for one plant.
+struct Rollout<'a> {
+    global: &'a Global,
+    spec: RolloutSpec,
+    starts: &'a Path,
+    measures: &'a Path,
+}
+
+impl Job for Rollout<'_> {
+    type Output = Summary;
+
+    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Summary>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let names = plant.system.states().map(|axis| axis.name);
+        let mut reader = StateReader::<NX>::open(self.starts, names)?;
+        let backend = devices::open(self.global)?;
+        let mut writer = MeasureWriter::create(self.measures)?;
+        let progress = Progress::new(self.global);
+        let begun = Instant::now();
+        progress.begin("rollouts", reader.left().unwrap_or(0));
+        let mut count = Count::default();
+        loop {
+            let starts = reader.next(CHUNK)?;
+            if starts.is_empty() {
+                break;
+            }
+            measure(&backend, plant, self.spec, &starts, &mut |values| {
+                count.add(values);
+                writer.add(values)?;
+                progress.advance(values.len() as u64)
+            })?;
+        }
+        writer.publish()?;
+        let (low, high) = interval(count.successes, count.starts, BETA);
+        Ok(Summary {
+            starts: count.starts,
+            successes: count.successes,
+            non_finite: count.non_finite,
+            success_interval: [low, high],
+            horizon: self.spec.horizon,
+            gamma: self.spec.gamma,
+            measures: self.measures.display().to_string(),
+            backend: backend.name().to_owned(),
+            device: backend.device(),
+            wall_seconds: begun.elapsed().as_secs_f64(),
+        })
+    }
+}
+
+/// Sends the measures of `starts` to `sink`, in order.
+fn measure<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    spec: RolloutSpec,
+    starts: &[[f32; NX]],
+    sink: &mut dyn FnMut(&[f32]) -> Result<()>,
+) -> Result<()>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let task = ReachAvoidTask {
+        starts: Starts::Listed(starts),
+        range: 0..starts.len() as u64,
+        spec,
+        tightening: &Tightening::none(&spec),
+        query: Query::Measure,
+    };
+    backend.reach_avoid(plant, &task, &mut |_, values| sink(values))
+}
+
+/// How the starts fared.
+#[derive(Default)]
+struct Count {
+    starts: u64,
+    successes: u64,
+    non_finite: u64,
+}
+
+impl Count {
+    fn add(&mut self, measures: &[f32]) {
+        let count = |holds: fn(&f32) -> bool| measures.iter().filter(|m| holds(m)).count() as u64;
+        self.starts += measures.len() as u64;
+        self.successes += count(|measure| *measure > 0.0);
+        self.non_finite += count(|measure| *measure <= NON_FINITE);
+    }
+}
+
+/// The summary in words.
+fn text(summary: &Summary) -> String {
+    let Summary {
+        starts,
+        successes,
+        non_finite,
+        success_interval: [low, high],
+        ..
+    } = summary;
+    let share = 100.0 * *successes as f64 / *starts as f64;
+    format!(
+        "{successes} of {starts} starts reach the target safely: {share:.2} % \
+         (95 % interval {:.2} % to {:.2} %)\n\
+         {non_finite} failed for a state that is not finite\n\
+         measures: {}\n\
+         {} steps, {}, {:.3} s\n",
+        100.0 * low,
+        100.0 * high,
+        summary.measures,
+        summary.horizon,
+        summary.device,
+        summary.wall_seconds
+    )
+}

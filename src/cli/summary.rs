@@ -1,0 +1,99 @@
+//! A certificate as a page of text.
+
+use std::path::PathBuf;
+
+use crate::scenario::record::{Claim, GrowthOutcome, Record};
+
+/// What was claimed, with the numbers behind it, and where the files are.
+pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
+    let mut lines = vec![headline(record), String::new()];
+    lines.extend(
+        record
+            .statements
+            .iter()
+            .map(|statement| format!("* {statement}")),
+    );
+    lines.push(String::new());
+    lines.extend(table(record));
+    lines.push(String::new());
+    let [low, high] = record.global.share_interval;
+    lines.push(format!(
+        "certified set   {} of {} draws, P(V_global) within {low:.4} to {high:.4}",
+        record.global.accepted, record.global.draws
+    ));
+    lines.push(format!(
+        "conditional     failure inside it at most {:.5} ({} failed)",
+        record.global.claim.certified_risk, record.global.claim.failures
+    ));
+    lines.push(format!("growth          {}", growth(record)));
+    let state = &record.state;
+    lines.push(format!(
+        "state           tier {}, V_check {:.4}",
+        state.tier, state.check_margin
+    ));
+    let timing = &record.timing;
+    lines.push(format!(
+        "work            {} rollouts in {:.2} s on {}",
+        timing.rollouts, timing.wall_seconds, record.provenance.device
+    ));
+    let names = files.iter().map(|file| file.display().to_string());
+    lines.push(format!(
+        "files           {}",
+        names.collect::<Vec<_>>().join("\n                ")
+    ));
+    lines.join("\n") + "\n"
+}
+
+/// System, policy and verdict.
+fn headline(record: &Record) -> String {
+    let verdict = match record.holds {
+        true => "all claims obtained",
+        false => "NOT all claims obtained",
+    };
+    let (system, policy) = (&record.system.name, &record.provenance.policy);
+    format!("{system} under {policy}, T = {}: {verdict}", record.horizon)
+}
+
+/// The counts behind each claim, a row each.
+fn table(record: &Record) -> Vec<String> {
+    let mut rows = vec![format!(
+        "{:<12} {:>10} {:>8} {:>3} {:>8} {:>9} {:>8} {:>8} {:>10}",
+        "claim", "N", "failed", "d", "epsilon", "beta", "simple", "exact", "risk"
+    )];
+    let claims = [&record.deviation.claim, &record.global.claim];
+    rows.extend(claims.into_iter().chain(&record.growth.claim).map(row));
+    rows
+}
+
+/// The counts behind one claim.
+fn row(claim: &Claim) -> String {
+    let count = |count: Option<u64>| count.map_or("-".to_owned(), |count| count.to_string());
+    format!(
+        "{:<12} {:>10} {:>8} {:>3} {:>8.5} {:>9.1e} {:>8} {:>8} {:>10.6}",
+        claim.name,
+        claim.scenarios,
+        claim.failures,
+        claim.decision_vars,
+        claim.epsilon,
+        claim.beta_used,
+        count(claim.required_simple),
+        count(claim.required_exact),
+        claim.certified_risk
+    )
+}
+
+/// What came of local growth.
+fn growth(record: &Record) -> String {
+    let growth = &record.growth;
+    let rounds = growth.rounds.len();
+    match growth.outcome {
+        GrowthOutcome::Verified => {
+            format!(
+                "verified a ball of radius {:.4} in round {rounds}",
+                growth.radius
+            )
+        }
+        GrowthOutcome::Exhausted => format!("exhausted: each of {rounds} rounds had a failure"),
+        GrowthOutcome::NoBoundary => "no boundary of the certified set to grow from".to_owned(),
+    }
+}

@@ -1,0 +1,126 @@
+//! Keys of a configuration: overriding them, and refusing unknown ones with the nearest valid.
+
+use toml::{Table, Value};
+
+use crate::error::{Error, Result};
+
+/// The document that `section.key=value` stands for; the value in TOML, or else a string.
+pub(super) fn parse_assignment(text: &str) -> Result<Table> {
+    let malformed = || {
+        let problem = "expected section.key=value, for instance rollout.horizon=40";
+        Error::invalid(format!("--set {text}"), problem)
+    };
+    let (path, value) = text.split_once('=').ok_or_else(malformed)?;
+    let mut keys = path.split('.').map(str::trim);
+    if keys.clone().any(str::is_empty) {
+        return Err(malformed());
+    }
+    let first = keys.next().ok_or_else(malformed)?;
+    let inner = keys.rfold(parse_value(value.trim()), |inner, key| {
+        Value::Table(Table::from_iter([(key.to_owned(), inner)]))
+    });
+    Ok(Table::from_iter([(first.to_owned(), inner)]))
+}
+
+/// `text` as a TOML value, or as a string where it is none.
+fn parse_value(text: &str) -> Value {
+    let document = toml::from_str::<Table>(&format!("value = {text}"));
+    match document {
+        // A line break could smuggle in further keys.
+        Ok(mut table) if table.len() == 1 => table.remove("value"),
+        _ => None,
+    }
+    .unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+/// Lays `over` on `base`: tables key by key, everything else whole.
+pub(super) fn overlay(base: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(base)), Value::Table(over)) => overlay(base, over),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+/// The keys of `defaults` and those that have no default.
+pub(super) fn with_optional(defaults: &Table) -> Table {
+    let mut valid = defaults.clone();
+    let policy = ["file", "formula"].map(|key| (key.to_owned(), Value::String(String::new())));
+    valid.insert("policy".to_owned(), Value::Table(Table::from_iter(policy)));
+    valid
+}
+
+/// Refuses the first key of `given` that `valid` does not have.
+pub(super) fn check_known(valid: &Table, given: &Table, origin: &str) -> Result<()> {
+    check_level(valid, valid, given, "", origin)
+}
+
+/// [`check_known`] for the tables at `prefix`; `root` has all valid keys.
+fn check_level(
+    root: &Table,
+    valid: &Table,
+    given: &Table,
+    prefix: &str,
+    origin: &str,
+) -> Result<()> {
+    for (key, value) in given {
+        let path = format!("{prefix}{key}");
+        let refused = |problem: String| Err(Error::invalid(origin, problem));
+        match (valid.get(key), value) {
+            (None, _) => {
+                let all = paths(root, "");
+                let nearest = nearest(&path, &all);
+                return refused(format!(
+                    "unknown key `{path}`; the nearest valid key is `{nearest}`"
+                ));
+            }
+            (Some(Value::Table(valid)), Value::Table(given)) => {
+                check_level(root, valid, given, &format!("{path}."), origin)?;
+            }
+            (Some(Value::Table(_)), _) => {
+                return refused(format!("`{path}` is a section, not a value"));
+            }
+            (Some(default), _) if prefix == "system." && !same_kind(default, value) => {
+                // A section that is read by its `name` does not say which key was wrong.
+                let expected = default.type_str();
+                return refused(format!("`{path}` is {value}, expected a {expected}"));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Whether `value` can stand where `default` stands; a whole number is a float too.
+fn same_kind(default: &Value, value: &Value) -> bool {
+    default.same_type(value) || (default.is_float() && value.is_integer())
+}
+
+/// The paths of all keys that are not sections, with dots.
+fn paths(table: &Table, prefix: &str) -> Vec<String> {
+    let path = |(key, value): (&String, &Value)| {
+        let path = format!("{prefix}{key}");
+        match value {
+            Value::Table(inner) => paths(inner, &format!("{path}.")),
+            _ => vec![path],
+        }
+    };
+    table.iter().flat_map(path).collect()
+}
+
+/// The candidate that takes the fewest edits to get to; a key in the wrong section counts by its
+/// last part alone, one edit dearer.
+pub(super) fn nearest<'a>(path: &str, candidates: &'a [String]) -> &'a str {
+    let last = |path: &str| path.rsplit('.').next().unwrap_or_default().to_owned();
+    let edits = |candidate: &&String| {
+        let whole = strsim::damerau_levenshtein(path, candidate);
+        whole.min(1 + strsim::damerau_levenshtein(&last(path), &last(candidate)))
+    };
+    candidates
+        .iter()
+        .min_by_key(edits)
+        .map_or("", String::as_str)
+}

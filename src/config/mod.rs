@@ -1,0 +1,120 @@
+//! Configuration: a TOML file over the defaults of its profile, and overrides over both.
+
+mod keys;
+mod plant;
+mod profile;
+mod section;
+mod settings;
+#[cfg(test)]
+mod tests;
+mod value;
+
+pub use plant::{Job, PolicySource};
+pub use section::{
+    BoxSection, Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection,
+    PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection, StateSection,
+    SystemSection,
+};
+pub use value::{Constant, Coordinates, Named};
+
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use crate::error::{Error, Result};
+
+/// What the command line lays over a configuration file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// Profile whose defaults count, instead of the file's.
+    pub profile: Option<Profile>,
+    /// Seed instead of the file's.
+    pub seed: Option<u64>,
+    /// `section.key=value` each; the value in TOML, or else a string.
+    pub set: Vec<String>,
+}
+
+impl Config {
+    /// Reads `path`, fills in the defaults of its profile and lays `overrides` over it.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file is missing or no TOML, [`Error::Invalid`] naming the key that
+    /// is unknown, with the nearest valid one, or that has a value of the wrong kind.
+    pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+        let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
+        Self::from_table(table, &path.display().to_string(), overrides)
+    }
+
+    /// The configuration of the TOML document `table`, which errors call `origin`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`], as for [`Config::load`].
+    pub fn from_table(table: Table, origin: &str, overrides: &Overrides) -> Result<Self> {
+        let mut given = table.clone();
+        let mut layers = vec![(origin.to_owned(), table)];
+        for text in &overrides.set {
+            let assignment = keys::parse_assignment(text)?;
+            keys::overlay(&mut given, assignment.clone());
+            layers.push((format!("--set {text}"), assignment));
+        }
+        if let Some(profile) = overrides.profile {
+            given.insert("profile".to_owned(), profile.name().into());
+        }
+        let mut merged = defaults(&given, origin)?;
+        let valid = keys::with_optional(&merged);
+        for (origin, layer) in &layers {
+            keys::check_known(&valid, layer, origin)?;
+        }
+        keys::overlay(&mut merged, given);
+        // Without a source text, the message ends with a line that names the key.
+        let wrong_kind = |e: toml::de::Error| {
+            Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
+        };
+        let mut config: Self = merged.try_into().map_err(wrong_kind)?;
+        config.seed = overrides.seed.unwrap_or(config.seed);
+        config.policy.check()?;
+        Ok(config)
+    }
+
+    /// The configuration as a certificate stores it, every default filled in.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a value has no JSON form.
+    pub fn to_json(&self) -> Result<serde_json::Value> {
+        serde_json::to_value(self).map_err(|e| Error::invalid("configuration", e.to_string()))
+    }
+
+    /// The configuration that a certificate stores.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if it is not complete or not of this version.
+    pub fn from_json(value: &serde_json::Value) -> Result<Self> {
+        let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("provenance.config: {e}"));
+        let config = Self::deserialize(value).map_err(|e| refused(&e))?;
+        config.policy.check().map_err(|e| refused(&e))?;
+        Ok(config)
+    }
+}
+
+/// The defaults of the profile and the system that the table `given` names.
+fn defaults(given: &Table, origin: &str) -> Result<Table> {
+    let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
+    let profile = match given.get("profile").cloned() {
+        Some(name) => {
+            Profile::deserialize(name).map_err(|e| refused("profile", e.message().to_owned()))?
+        }
+        None => Profile::default(),
+    };
+    let expected = format!("expected \"{}\"", profile::SYSTEMS.join("\" or \""));
+    let name = given.get("system").and_then(|system| system.get("name"));
+    let known = name
+        .and_then(Value::as_str)
+        .and_then(|name| profile::defaults(profile, name));
+    let config = known.ok_or_else(|| {
+        let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
+        refused("system.name", format!("{found}; {expected}"))
+    })?;
+    Table::try_from(config).map_err(|e| refused("defaults", e.to_string()))
+}

@@ -1,0 +1,160 @@
+//! From names to types: the system and the policy that a configuration names, for one generic job.
+
+use std::path::{Path, PathBuf};
+
+use super::section::{Config, SystemSection};
+use super::settings::positive_f32;
+use crate::error::{Error, Result};
+use crate::policy::{Mlp, Policy};
+use crate::rollout::Plant;
+use crate::system::{BangBang, DoubleIntegrator, DroneRace, System};
+
+/// Work on a plant of any system and policy.
+pub trait Job {
+    /// What comes of it.
+    type Output;
+
+    /// Does the work.
+    ///
+    /// # Errors
+    /// Those of the work.
+    fn run<S, P, const NX: usize, const NU: usize>(
+        self,
+        plant: Plant<'_, S, P>,
+    ) -> Result<Self::Output>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>;
+}
+
+/// The policy that a configuration names: a formula, or a network and the bytes of its file.
+#[derive(Clone, Debug)]
+pub enum PolicySource {
+    /// A formula.
+    Formula(String),
+    /// A network.
+    Network {
+        /// Where it was read.
+        path: PathBuf,
+        /// The file as it was read, for a copy that is sure to be the same.
+        bytes: Vec<u8>,
+        /// The network.
+        network: Mlp,
+    },
+}
+
+impl PolicySource {
+    /// Reads the safetensors file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it is missing, damaged, or has a weight that is not finite.
+    pub fn read(path: PathBuf) -> Result<Self> {
+        let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
+        let network = Mlp::from_bytes(&bytes).map_err(|problem| Error::file(&path, problem))?;
+        Ok(Self::Network {
+            path,
+            bytes,
+            network,
+        })
+    }
+}
+
+impl Config {
+    /// The policy; a file is sought relative to `folder`, where the configuration lies.
+    ///
+    /// # Errors
+    /// Those of [`PolicySource::read`]; [`Error::Invalid`] without file and formula.
+    pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
+        match (&self.policy.file, &self.policy.formula) {
+            (Some(file), _) => PolicySource::read(folder.join(file)),
+            (None, Some(formula)) => Ok(PolicySource::Formula(formula.clone())),
+            (None, None) => Err(Error::invalid("policy", "neither `file` nor `formula`")),
+        }
+    }
+
+    /// Builds the system, checks the policy against it, and runs `job` on both.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a parameter out of range or a formula that the system does not
+    /// have, [`Error::File`] for a network of the wrong shape, and those of the job.
+    pub fn with_plant<J: Job>(&self, policy: &PolicySource, job: J) -> Result<J::Output> {
+        let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
+        match self.system {
+            SystemSection::DroneRace {
+                cone,
+                ego_gain,
+                opponent_gain,
+                speed_limit,
+            } => {
+                let system = DroneRace {
+                    ego_gain: number("ego_gain", ego_gain)?,
+                    opponent_gain: number("opponent_gain", opponent_gain)?,
+                    cone,
+                    speed_limit,
+                };
+                match policy {
+                    PolicySource::Formula(name) => Err(no_formula(&system, name, "none")),
+                    PolicySource::Network { path, network, .. } => {
+                        with_network(&system, path, network, job)
+                    }
+                }
+            }
+            SystemSection::DoubleIntegrator {
+                target,
+                corridor,
+                acceleration,
+            } => {
+                let system = DoubleIntegrator {
+                    target: number("target", target)?,
+                    corridor: number("corridor", corridor)?,
+                    acceleration: number("acceleration", acceleration)?,
+                };
+                match policy {
+                    PolicySource::Formula(name) if name == "bang-bang" => {
+                        let acceleration = system.acceleration;
+                        let policy = &BangBang { acceleration };
+                        job.run(Plant {
+                            system: &system,
+                            policy,
+                        })
+                    }
+                    PolicySource::Formula(name) => Err(no_formula(&system, name, "bang-bang")),
+                    PolicySource::Network { path, network, .. } => {
+                        with_network(&system, path, network, job)
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The refusal of the formula `name`.
+fn no_formula<S, const NX: usize, const NU: usize>(system: &S, name: &str, has: &str) -> Error
+where
+    S: System<NX, NU>,
+{
+    let system = system.name();
+    let problem = format!("`{name}` is unknown; formulas of {system}: {has}, or give a `file`");
+    Error::invalid("policy.formula", problem)
+}
+
+/// Runs `job` with a network that fits the system.
+fn with_network<J: Job, S, const NX: usize, const NU: usize>(
+    system: &S,
+    path: &Path,
+    network: &Mlp,
+    job: J,
+) -> Result<J::Output>
+where
+    S: System<NX, NU>,
+{
+    let states = system.states();
+    let names = states.each_ref().map(|axis| axis.name.as_str());
+    network
+        .check_fits(&names, NU)
+        .map_err(|problem| Error::file(path, problem))?;
+    job.run(Plant {
+        system,
+        policy: network,
+    })
+}

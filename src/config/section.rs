@@ -1,0 +1,219 @@
+//! The sections of a configuration, with the meaning and unit of each key.
+
+use serde::{Deserialize, Serialize};
+
+use super::value::{Constant, Coordinates, Named};
+use crate::error::{Error, Result};
+use crate::rollout::PairControl;
+use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::system::Cone;
+
+/// Intervals by state name, in state order.
+pub type BoxSection = Named<[f64; 2]>;
+/// Numbers by state name, in state order.
+pub type StateSection = Named<f64>;
+
+/// A whole configuration, every default filled in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Where the defaults come from.
+    pub profile: Profile,
+    /// Seed of every random stream.
+    pub seed: u64,
+    /// The system and its parameters.
+    pub system: SystemSection,
+    /// The policy.
+    pub policy: PolicySection,
+    /// Length and discount of a rollout.
+    pub rollout: RolloutSection,
+    /// Interval of each state for nominal starts.
+    #[serde(rename = "box")]
+    pub bounds: BoxSection,
+    /// Lipschitz constants of the margins.
+    pub constants: ConstantsSection,
+    /// The deviation bound.
+    pub deviation: DeviationSection,
+    /// The certified set and its conditional failure.
+    pub global: GlobalSection,
+    /// The two coordinates of the slice.
+    pub slice: SliceSection,
+    /// The state that slice, boundary search and growth start from.
+    pub state: StateSection,
+    /// Local growth.
+    pub growth: GrowthSection,
+}
+
+/// Which defaults fill in what a file leaves out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Profile {
+    /// The experiment as printed in the paper.
+    Paper,
+    /// The experiment as the authors' published code does it.
+    Study,
+    /// The same experiment with sound constants and accounting.
+    #[default]
+    Rigorous,
+}
+
+impl Profile {
+    /// The name in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Study => "study",
+            Self::Rigorous => "rigorous",
+        }
+    }
+}
+
+/// The system and its parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SystemSection {
+    /// [`crate::system::DroneRace`].
+    DroneRace {
+        /// Form of the collision cone.
+        cone: Cone,
+        /// Acceleration of the ego at full control, m/s^2.
+        ego_gain: f64,
+        /// Factor on the opponent's feedback.
+        opponent_gain: f64,
+        /// Whether the constraint keeps the ego below 1 m/s.
+        speed_limit: bool,
+    },
+    /// [`crate::system::DoubleIntegrator`].
+    DoubleIntegrator {
+        /// Half width of the target interval, m.
+        target: f64,
+        /// Half width of the constraint interval, m.
+        corridor: f64,
+        /// Bound on the acceleration, m/s^2.
+        acceleration: f64,
+    },
+}
+
+/// The policy: a file or a formula.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolicySection {
+    /// Safetensors file, relative to the configuration file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Name of a formula: `bang-bang`, for the double integrator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub formula: Option<String>,
+}
+
+impl PolicySection {
+    /// Refuses a section with neither a file nor a formula, or with both.
+    pub(super) fn check(&self) -> Result<()> {
+        let problem = match (&self.file, &self.formula) {
+            (None, None) => "no policy; give `file`, a safetensors file, or `formula`",
+            (Some(_), Some(_)) => "both `file` and `formula` are given; keep one of them",
+            _ => return Ok(()),
+        };
+        Err(Error::invalid("policy", problem))
+    }
+}
+
+/// Length and discount of a rollout.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RolloutSection {
+    /// Steps T.
+    pub horizon: u32,
+    /// Discount per step, in (0, 1].
+    pub gamma: f64,
+}
+
+/// Lipschitz constants of the margins.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantsSection {
+    /// `L_r` of the target margin.
+    pub target: Constant,
+    /// `L_c` of the constraint margin.
+    pub constraint: Constant,
+}
+
+/// The deviation bound.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviationSection {
+    /// Radius of the ball around each nominal start.
+    pub radius: f64,
+    /// Risk.
+    pub epsilon: f64,
+    /// One minus the confidence.
+    pub beta: f64,
+    /// Pairs N.
+    pub scenarios: u64,
+    /// Pairs of the pilot that fixes the shape.
+    pub pilot: u64,
+    /// How the bounds of all steps hold together.
+    pub joint: Joint,
+    /// How the perturbed rollout is driven.
+    pub control: PairControl,
+    /// Which bound tightens the margins.
+    pub source: DeviationSource,
+}
+
+/// The certified set and its conditional failure.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlobalSection {
+    /// Pairs drawn from the box.
+    pub draws: u64,
+    /// One minus the confidence of each of the two statements.
+    pub beta: f64,
+}
+
+/// The two coordinates of the slice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SliceSection {
+    /// Across the columns.
+    pub x: SliceAxisSection,
+    /// Along the rows.
+    pub y: SliceAxisSection,
+}
+
+/// One coordinate of the slice: `from`, `from + step`, ... below `to`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SliceAxisSection {
+    /// Name of the state.
+    pub state: String,
+    /// First value.
+    pub from: f64,
+    /// End, exclusive.
+    pub to: f64,
+    /// Distance of neighbours.
+    pub step: f64,
+}
+
+/// Local growth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GrowthSection {
+    /// First radius.
+    pub radius: f64,
+    /// Rounds M.
+    pub rounds: u32,
+    /// Starts N of each round.
+    pub scenarios: u64,
+    /// Risk.
+    pub epsilon: f64,
+    /// One minus the confidence, over all rounds.
+    pub beta: f64,
+    /// Whether each round spends `beta / rounds`, as soundness asks.
+    pub split_beta: bool,
+    /// The coordinates that vary.
+    pub coordinates: Coordinates,
+    /// Where the centre is looked for.
+    pub boundary: BoundarySearch,
+    /// States `[x, vx, y, vy]` of the slice search that prefers cells ahead; empty for none.
+    pub heading: Vec<String>,
+}

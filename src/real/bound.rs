@@ -1,1 +1,0 @@
-//! The bound type: sound intervals of value and gradient over a box.

@@ -1,0 +1,110 @@
+//! The rounds of local growth: radius tried and failures.
+
+use crate::report::figure::{Figure, Swatch, cross, dot};
+use crate::report::plot::{Labels, Plot, Shape, Span};
+use crate::report::text::{count, number, ordinary};
+use crate::report::words;
+use crate::scenario::record::{GrowthOutcome, Record};
+
+const NEAREST: &str = "<path class=\"nearest\" d=\"M-9 0H9\"/>";
+
+/// The figure.
+pub(super) fn figure(record: &Record) -> Figure {
+    let growth = &record.growth;
+    let drawing = if growth.rounds.is_empty() {
+        Err("No round of growth was run.".to_owned())
+    } else {
+        Ok(drawing(record))
+    };
+    let mut legend = Vec::new();
+    if drawing.is_ok() {
+        legend = vec![
+            (Swatch::Mark(dot(5.0)), "round without failure".to_owned()),
+            (Swatch::Mark(cross(4.0)), "round with failures".to_owned()),
+            (
+                Swatch::Mark(NEAREST.to_owned()),
+                "nearest failure: the next radius".to_owned(),
+            ),
+        ];
+    }
+    let outcome = match growth.outcome {
+        GrowthOutcome::Verified => "The last round had no failure: its ball is verified.",
+        GrowthOutcome::Exhausted => "No round was clean: no ball is certified.",
+        GrowthOutcome::NoBoundary => "There was no boundary to grow from.",
+    };
+    Figure {
+        id: "figure-growth",
+        title: "Rounds of local growth".to_owned(),
+        drawing,
+        legend,
+        caption: format!(
+            "Each round draws fresh starts from a ball and shrinks it to the nearest failure; the \
+             labels count failures among starts. {outcome}"
+        ),
+    }
+}
+
+fn drawing(record: &Record) -> String {
+    let rounds = &record.growth.rounds;
+    let radii = rounds
+        .iter()
+        .flat_map(|round| [Some(round.radius), round.nearest_failure]);
+    let highest = Span::of(radii.flatten().chain([0.0])).map_or(0.0, |span| span.high);
+    let x = Span {
+        low: 0.5,
+        high: rounds.len() as f64 + 0.5,
+    };
+    let y = Span {
+        low: 0.0,
+        high: if highest > 0.0 { 1.18 * highest } else { 1.0 },
+    };
+    let mut plot = Plot::new("growth", x, y, Shape::Free(190.0));
+    for (index, round) in rounds.iter().enumerate() {
+        let at = index as f64 + 1.0;
+        let stem = plot.line([[at, 0.0], [at, round.radius]]);
+        plot.path("stem", &stem);
+        if let Some(nearest) = round.nearest_failure.filter(|&nearest| ordinary(nearest)) {
+            plot.mark([at, nearest], NEAREST);
+        }
+        let mark = if round.failures == 0 {
+            dot(6.0)
+        } else {
+            cross(5.0)
+        };
+        // Beyond eight rounds only the failures fit above a mark.
+        let label = if rounds.len() > 8 {
+            count(round.failures)
+        } else {
+            format!("{}/{}", count(round.failures), count(round.scenarios))
+        };
+        plot.mark(
+            [at, round.radius],
+            &format!(
+                "<title>round {}: radius {}, {} failures among {}</title>{mark}\
+                 <text class=\"tick\" y=\"-11\" text-anchor=\"middle\">{label}</text>",
+                index + 1,
+                number(round.radius),
+                count(round.failures),
+                count(round.scenarios)
+            ),
+        );
+    }
+    let unit = words::ball_unit(record);
+    let labels = Labels {
+        x: "round",
+        y: &format!("radius tried ({unit})"),
+        whole: true,
+    };
+    plot.finish(&labels, &description(record))
+}
+
+fn description(record: &Record) -> String {
+    let rounds = record.growth.rounds.iter().map(|round| {
+        let radius = number(round.radius);
+        format!("radius {radius} with {} failures", round.failures)
+    });
+    format!(
+        "Rounds of growth: {}.",
+        rounds.collect::<Vec<_>>().join(", then ")
+    )
+}

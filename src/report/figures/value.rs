@@ -1,0 +1,146 @@
+//! The value slice: `V_check` as a heat map with its zero level.
+
+use super::{lines, no_slice, point, same_unit, slice_states};
+use crate::report::figure::{Figure, Swatch, diamond};
+use crate::report::palette::{self, LEVELS};
+use crate::report::plot::{Labels, Plot, Shape, Span, coordinate};
+use crate::report::slice::Grid;
+use crate::report::text::{number, ordinary};
+use crate::report::words;
+use crate::scenario::record::Record;
+
+/// Thickness of the colour bar.
+const BAR: f64 = 12.0;
+
+/// The figure.
+pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
+    let mut legend = vec![
+        (
+            Swatch::Line("zero"),
+            "V_check = 0: boundary of the certified set".to_owned(),
+        ),
+        (
+            Swatch::Mark(diamond()),
+            "the state that the slice goes through".to_owned(),
+        ),
+    ];
+    let values = &record.slice.check_margin;
+    if values.iter().any(|&value| !ordinary(f64::from(value))) {
+        legend.push((Swatch::Area("nf"), "not finite: a failure".to_owned()));
+    }
+    let [x, y] = slice_states(record).map(|state| words::name(record, state));
+    let frozen = record.system.states.len().saturating_sub(2);
+    let held = match frozen {
+        0 => String::new(),
+        1 => "; the other coordinate keeps the state's value".to_owned(),
+        _ => format!("; the other {frozen} coordinates keep the state's values"),
+    };
+    Figure {
+        id: "figure-value",
+        title: "Value slice: V_check".to_owned(),
+        drawing: grid.map_or_else(no_slice, |grid| Ok(drawing(grid))),
+        legend,
+        caption: format!(
+            "Each cell is one rollout from its centre, with margins tightened by the deviation \
+             bound, over {x} and {y}{held}. Blue is certified, orange is not. Only the sign has a \
+             meaning: margins mix units."
+        ),
+    }
+}
+
+fn drawing(grid: &Grid) -> String {
+    let record = grid.record;
+    let states = slice_states(record);
+    let [mut x, mut y] = grid.spans();
+    if let Some([across, up]) = point(&record.state.x, states) {
+        x = x.join(Span::of([across]).unwrap_or(x));
+        y = y.join(Span::of([up]).unwrap_or(y));
+    }
+    let shape = if same_unit(record, states) {
+        Shape::Equal
+    } else {
+        Shape::Free(330.0)
+    };
+    let mut plot = Plot::new("value", x, y, shape);
+    let limit = limit(&record.slice.check_margin);
+    for (class, data) in cells(&plot, grid, limit) {
+        plot.path(&format!("cell {class}"), &data);
+    }
+    let zero = lines(&plot, &grid.field(&record.slice.check_margin, 1.0));
+    plot.path("zero-halo", &zero);
+    plot.path("zero", &zero);
+    if let Some(state) = point(&record.state.x, states) {
+        plot.mark(state, &diamond());
+    }
+    plot.strip(BAR + 45.0, |width| bar(width, limit));
+    let [x, y] = states.map(|state| words::axis(record, state));
+    let labels = Labels {
+        x: &x,
+        y: &y,
+        whole: false,
+    };
+    plot.finish(&labels, &description(grid))
+}
+
+/// Path data of the cells of each colour.
+fn cells(plot: &Plot, grid: &Grid, limit: f64) -> std::collections::BTreeMap<String, String> {
+    let mut paths = std::collections::BTreeMap::<String, String>::new();
+    let values = &grid.record.slice.check_margin;
+    for (class, area) in grid.runs(values, |value| palette::class(value, limit)) {
+        *paths.entry(class).or_default() += &plot.rectangle(area);
+    }
+    paths
+}
+
+/// What the colours end at on both sides: the largest size drawn, up to two digits.
+fn limit(values: &[f32]) -> f64 {
+    let sizes = values.iter().map(|&value| f64::from(value).abs());
+    let largest = sizes.filter(|&size| ordinary(size)).fold(0.0, f64::max);
+    if largest < f64::from(f32::MIN_POSITIVE) {
+        return 1.0;
+    }
+    let digit = 10.0_f64.powf(largest.log10().floor() - 1.0);
+    (largest / digit).ceil() * digit
+}
+
+/// The colour bar: steps even in the square root of the value.
+fn bar(width: f64, limit: f64) -> String {
+    let step = width / (2 * LEVELS) as f64;
+    let below = (1..=LEVELS).rev().map(|level| format!("n{level}"));
+    let above = (1..=LEVELS).map(|level| format!("p{level}"));
+    let mut bar = String::new();
+    for (index, class) in below.chain(above).enumerate() {
+        bar += &format!(
+            "<path class=\"cell {class}\" d=\"M{} 4h{}v{BAR}h-{2}Z\"/>",
+            coordinate(index as f64 * step),
+            coordinate(step + 0.3),
+            coordinate(step + 0.3)
+        );
+    }
+    for position in [-1.0, -0.5, 0.0, 0.5, 1.0_f64] {
+        let value = position * position.abs() * limit;
+        let at = coordinate(width * (position + 1.0) / 2.0);
+        let (text, low) = (number(value).replace('-', "−"), 4.0 + BAR);
+        bar += &format!(
+            "<path class=\"tick-mark\" d=\"M{at} {low}v4\"/>\
+             <text class=\"tick\" x=\"{at}\" y=\"{}\" text-anchor=\"middle\">{text}</text>",
+            low + 17.0
+        );
+    }
+    bar + &format!(
+        "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">\
+         V_check (no unit, square-root scale)</text>",
+        coordinate(width / 2.0),
+        4.0 + BAR + 35.0
+    )
+}
+
+fn description(grid: &Grid) -> String {
+    let values = &grid.record.slice.check_margin;
+    let positive = values.iter().filter(|&&value| value > 0.0).count();
+    let [x, y] = slice_states(grid.record).map(|state| words::axis(grid.record, state));
+    format!(
+        "Heat map of V_check over {x} and {y}: {positive} of {} cells are positive.",
+        values.len()
+    )
+}

@@ -1,0 +1,201 @@
+//! The page: verdict, statements, figures and numbers of a record.
+
+use super::figures;
+use super::palette;
+use super::table;
+use super::text::{escape, number, upper};
+use super::words::{self, Verdict};
+use crate::rollout::PairControl;
+use crate::scenario::record::{GrowthOutcome, Record};
+use crate::scenario::settings::Joint;
+
+const STYLE: &str = include_str!("style.css");
+/// The pattern of violated constraints, shared by all figures.
+const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+    <pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern></defs></svg>\n";
+
+/// The report as one HTML document that loads nothing from anywhere.
+///
+/// It depends on the record alone, so equal records give equal pages byte for byte; only
+/// `record.timing` differs between two runs of a configuration.
+pub fn html(record: &Record) -> String {
+    let [value, certified, paths, deviation, growth] =
+        figures::all(record).map(|figure| figure.html());
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{HATCH}{header}<main>\n{statements}\
+         <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
+         <div class=\"figures\">\n{value}{certified}{paths}<div class=\"stack\">\n{deviation}{growth}</div>\
+         </div></section>\n{numbers}</main>\n{footer}\
+         </body>\n</html>\n",
+        head = head(record),
+        header = header(record),
+        statements = statements(record),
+        numbers = numbers(record),
+        footer = footer(record),
+    )
+}
+
+fn head(record: &Record) -> String {
+    format!(
+        "<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" \
+         content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>Reachcast: {}</title>\n<style>\n{STYLE}{}</style>\n</head>\n",
+        escape(&record.system.name),
+        palette::rules()
+    )
+}
+
+fn header(record: &Record) -> String {
+    let verdicts = words::verdicts(record);
+    let (class, mark, verdict) = if record.holds {
+        (
+            "good",
+            "✓",
+            "Every claim that was asked for was obtained.".to_owned(),
+        )
+    } else {
+        ("bad", "✗", missing(&verdicts))
+    };
+    let cards: String = verdicts.iter().map(card).collect();
+    format!(
+        "<header>\n<p class=\"brand\">Reachcast certificate</p>\n<h1>{}</h1>\n\
+         <p class=\"policy\">Policy: {}</p>\n\
+         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}</p>\n\
+         <div class=\"cards\">\n{cards}</div>\n</header>\n",
+        escape(&record.system.name),
+        escape(&record.provenance.policy),
+    )
+}
+
+/// Which claims were not obtained.
+fn missing(verdicts: &[Verdict]) -> String {
+    let missing = verdicts.iter().filter(|verdict| !verdict.obtained);
+    let names: Vec<_> = missing
+        .map(|verdict| verdict.title.to_lowercase())
+        .collect();
+    if names.is_empty() {
+        "Not every claim that was asked for was obtained.".to_owned()
+    } else {
+        format!("Not obtained: {}.", names.join(", "))
+    }
+}
+
+fn card(verdict: &Verdict) -> String {
+    let (class, mark, status) = if verdict.obtained {
+        ("good", "✓", "obtained")
+    } else {
+        ("bad", "✗", "not obtained")
+    };
+    let beta = verdict.claim.map_or_else(String::new, |claim| {
+        format!("Confidence 1 − {} over the draw.", number(claim.beta))
+    });
+    format!(
+        "<section class=\"card claim {class}\"><h2>{}</h2>\
+         <p class=\"status\"><span aria-hidden=\"true\">{mark}</span> {status}</p>\
+         <p class=\"headline\">{}</p><p>{} {}</p></section>\n",
+        verdict.title,
+        escape(&verdict.headline),
+        escape(&verdict.detail),
+        escape(&beta)
+    )
+}
+
+fn statements(record: &Record) -> String {
+    let items = |texts: &[String]| -> String {
+        texts
+            .iter()
+            .map(|text| format!("<li>{}</li>\n", escape(text)))
+            .collect()
+    };
+    format!(
+        "<div class=\"words\"><section aria-labelledby=\"claimed\">\
+         <h2 id=\"claimed\">What is claimed</h2>\n<ol class=\"statements\">\n{}</ol>\n\
+         <p>All claims hold together with confidence 1 − {}.</p></section>\n\
+         <section class=\"card limits\" aria-labelledby=\"limits\">\
+         <h2 id=\"limits\">What this does not say</h2>\n<ul>\n{}</ul></section></div>\n",
+        items(&record.statements),
+        upper(record.beta_total),
+        items(&limits(record))
+    )
+}
+
+/// What a reader might take the certificate for, and what it is.
+fn limits(record: &Record) -> Vec<String> {
+    let mut limits = vec![
+        format!(
+            "Nothing is certified for one given state. Each claim is about a measure: how much \
+             of what is drawn from it may fail, not which start does. The deviation bound is \
+             about {}; the certified set about {}.",
+            record.deviation.claim.measure, record.global.claim.measure
+        ),
+        format!(
+            "Confidence is about the draw of the scenarios: the procedure gives a false \
+             certificate with probability at most {}.",
+            upper(record.beta_total)
+        ),
+        "It is about the system as modelled and the policy with the recorded digests, within the \
+         horizon; not about the machine that the model stands for."
+            .to_owned(),
+        "The picture of the slice is made of single rollouts. What lies between two cells was not \
+         computed, and the zero lines are interpolated."
+            .to_owned(),
+    ];
+    match record.deviation.control {
+        PairControl::Replay => limits.push(
+            "The deviation bound replays the controls of the nominal rollout: it shows that some \
+             controls succeed, not that the policy in feedback gives them."
+                .to_owned(),
+        ),
+        PairControl::ClosedLoop => {}
+    }
+    if record.deviation.joint == Joint::Separate {
+        limits.push(
+            "The deviation bound was drawn for each step on its own: there is no statement about \
+             all steps at once, though V_check uses them so."
+                .to_owned(),
+        );
+    }
+    match (record.growth.outcome, &record.growth.claim) {
+        (GrowthOutcome::Verified, Some(claim)) => {
+            limits.push(format!("The verified ball is about {}.", claim.measure));
+        }
+        (GrowthOutcome::Exhausted, _) => limits.push(
+            "Local growth was exhausted: the last ball tried is drawn, and is not certified."
+                .to_owned(),
+        ),
+        _ => {}
+    }
+    limits
+}
+
+fn numbers(record: &Record) -> String {
+    let config = serde_json::to_string_pretty(&record.provenance.config).unwrap_or_default();
+    format!(
+        "<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
+         <p class=\"hint\">Risks and bounds are rounded up, radii down, intervals outwards. The \
+         equations are in <code>docs/method.md</code>, every digit is in \
+         <code>certificate.json</code>.</p>\n\
+         {}<div class=\"tables\">\n{}</div>\n{}\
+         <details><summary>Deviation bound at each step</summary>\n{}</details>\n\
+         <details><summary>Configuration with every default</summary>\n\
+         <pre tabindex=\"0\">{}</pre></details></section>\n",
+        table::claims(record),
+        table::narrow(record),
+        table::wide(record),
+        table::steps(record),
+        escape(&config)
+    )
+}
+
+fn footer(record: &Record) -> String {
+    format!(
+        "<footer>Written by reachcast {} from one record; only the wall time and the threads \
+         differ between two runs with the same seed.</footer>\n",
+        escape(&record.provenance.version)
+    )
+}

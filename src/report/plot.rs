@@ -1,0 +1,452 @@
+//! A plot as SVG: scales, axes and marks in the coordinates of the data.
+
+use super::text::{escape, ordinary, shorten};
+
+/// Width of every plot in its own units; the page scales it. Narrow, so that labels stay legible
+/// on a phone.
+const WIDTH: f64 = 440.0;
+/// Room above and to the right of the axes.
+const MARGIN: f64 = 14.0;
+/// Room below the axes, for tick labels and the name.
+const FOOT: f64 = 46.0;
+/// Height of the axes, at most, where both have one scale.
+const HIGHEST: f64 = 480.0;
+/// Width of a character of a tick label, at most.
+const CHARACTER: f64 = 7.6;
+/// Characters that an axis name may take.
+const NAME: usize = 44;
+
+/// An interval of data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Span {
+    /// Lower end.
+    pub(super) low: f64,
+    /// Upper end.
+    pub(super) high: f64,
+}
+
+impl Span {
+    /// The span of the values that can be drawn; `None` without any.
+    pub(super) fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        values
+            .into_iter()
+            .filter(|&value| ordinary(value))
+            .map(|value| Self {
+                low: value,
+                high: value,
+            })
+            .reduce(Self::join)
+    }
+
+    /// The smallest span that holds both.
+    pub(super) fn join(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    /// Wider by `share` of its width on each side, and never empty.
+    pub(super) fn widened(self, share: f64) -> Self {
+        let reach = share * (self.high - self.low);
+        let least = 1e-6 * self.low.abs().max(self.high.abs()).max(1e-3);
+        let reach = reach.max(if self.high - self.low > least {
+            0.0
+        } else {
+            least
+        });
+        Self {
+            low: self.low - reach,
+            high: self.high + reach,
+        }
+    }
+
+    fn width(self) -> f64 {
+        self.high - self.low
+    }
+
+    fn stretched(self, width: f64) -> Self {
+        self.widened(((width / self.width() - 1.0) / 2.0).max(0.0))
+    }
+
+    /// Round values about `parts` to the span, and the decimals that tell them apart.
+    fn ticks(self, parts: f64) -> (Vec<f64>, usize) {
+        let rough = self.width() / parts;
+        let power = 10.0_f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .map(|factor| factor * power)
+            .into_iter()
+            .find(|&step| step >= rough * 0.999)
+            .unwrap_or(10.0 * power);
+        let decimals = (-(step.log10() + 1e-9).floor()).max(0.0) as usize;
+        let slack = 1e-9 * self.width();
+        let first = ((self.low - slack) / step).ceil();
+        let ticks = (0..=(2.0 * parts) as usize + 2)
+            .map(|index| (first + index as f64) * step)
+            .take_while(|&tick| tick <= self.high + slack);
+        (ticks.collect(), decimals)
+    }
+}
+
+/// How the axes fill the plot.
+#[derive(Clone, Copy)]
+pub(super) enum Shape {
+    /// All of the width, and this height.
+    Free(f64),
+    /// One unit as long across as upwards.
+    Equal,
+}
+
+/// Name of an axis and whether its ticks draw lines across the plot.
+pub(super) struct Labels<'a> {
+    /// Below the plot.
+    pub(super) x: &'a str,
+    /// Left of the plot.
+    pub(super) y: &'a str,
+    /// Whole numbers only along x, as for steps and rounds.
+    pub(super) whole: bool,
+}
+
+/// A plot under construction.
+pub(super) struct Plot {
+    id: String,
+    x: Span,
+    y: Span,
+    left: f64,
+    width: f64,
+    height: f64,
+    clipped: String,
+    marks: String,
+    foot: String,
+    foot_height: f64,
+}
+
+impl Plot {
+    /// An empty plot; `id` names its clip path and is unique in the page.
+    pub(super) fn new(id: &str, x: Span, y: Span, shape: Shape) -> Self {
+        let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
+        let room = |y: Span, height: f64| {
+            let (ticks, decimals) = y.ticks(height / 46.0);
+            let longest = ticks
+                .iter()
+                .map(|&tick| label(tick, decimals).chars().count());
+            32.0 + CHARACTER * longest.max().unwrap_or(1) as f64
+        };
+        let (mut width, mut height) = (WIDTH - MARGIN - room(y, 400.0), 0.0);
+        match shape {
+            Shape::Free(fixed) => height = fixed,
+            Shape::Equal => {
+                let scale = (width / x.width()).min(HIGHEST / y.width());
+                // A sliver would be unreadable: show more of the shorter axis instead.
+                x = x.stretched(width * 0.5 / scale);
+                y = y.stretched(width * 0.5 / scale);
+                (width, height) = (width.min(scale * x.width()), scale * y.width() + height);
+            }
+        }
+        let left = room(y, height);
+        let spare = WIDTH - MARGIN - left - width;
+        Self {
+            id: id.to_owned(),
+            x,
+            y,
+            left: left + spare.max(0.0) / 2.0,
+            width: width + spare.min(0.0),
+            height,
+            clipped: String::new(),
+            marks: String::new(),
+            foot: String::new(),
+            foot_height: 0.0,
+        }
+    }
+
+    /// Where `x` lies across the plot.
+    pub(super) fn across(&self, x: f64) -> f64 {
+        self.left + self.width * (x - self.x.low) / self.x.width()
+    }
+
+    /// Where `y` lies down the plot.
+    pub(super) fn down(&self, y: f64) -> f64 {
+        MARGIN + self.height * (self.y.high - y) / self.y.width()
+    }
+
+    /// Length of a data distance across and down.
+    pub(super) fn lengths(&self, distance: f64) -> [f64; 2] {
+        [
+            distance * self.width / self.x.width(),
+            distance * self.height / self.y.width(),
+        ]
+    }
+
+    /// Path data through `points`; breaks where a point cannot be drawn.
+    pub(super) fn line(&self, points: impl IntoIterator<Item = [f64; 2]>) -> String {
+        let mut path = String::new();
+        let mut pen = 'M';
+        for [x, y] in points {
+            if ordinary(x) && ordinary(y) {
+                path += &format!(
+                    "{pen}{} {}",
+                    coordinate(self.across(x)),
+                    coordinate(self.down(y))
+                );
+                pen = 'L';
+            } else {
+                pen = 'M';
+            }
+        }
+        path
+    }
+
+    /// Path data of a closed polygon.
+    pub(super) fn polygon(&self, points: impl IntoIterator<Item = [f64; 2]>) -> String {
+        self.line(points) + "Z"
+    }
+
+    /// Path data of a rectangle between two corners.
+    pub(super) fn rectangle(&self, [x0, y0, x1, y1]: [f64; 4]) -> String {
+        self.polygon([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    }
+
+    /// Draws path data inside the axes.
+    pub(super) fn path(&mut self, class: &str, data: &str) {
+        if !data.is_empty() {
+            self.clipped += &format!("<path class=\"{class}\" d=\"{data}\"/>");
+        }
+    }
+
+    /// Draws an ellipse with its half axes in plot units, inside the axes.
+    pub(super) fn ellipse(&mut self, class: &str, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) {
+        if ordinary(x) && ordinary(y) && ordinary(rx) && ordinary(ry) {
+            self.clipped += &format!(
+                "<ellipse class=\"{class}\" cx=\"{}\" cy=\"{}\" rx=\"{}\" ry=\"{}\"/>",
+                coordinate(self.across(x)),
+                coordinate(self.down(y)),
+                coordinate(rx),
+                coordinate(ry)
+            );
+        }
+    }
+
+    /// Puts a mark, drawn around the origin, at a point of the plot; nothing outside the axes.
+    pub(super) fn mark(&mut self, point: [f64; 2], drawing: &str) {
+        let mark = self.placed(point, drawing);
+        self.marks += &mark;
+    }
+
+    /// Puts a mark under the paths that are drawn after it.
+    pub(super) fn speck(&mut self, point: [f64; 2], drawing: &str) {
+        let mark = self.placed(point, drawing);
+        self.clipped += &mark;
+    }
+
+    fn placed(&self, [x, y]: [f64; 2], drawing: &str) -> String {
+        let within = |span: Span, value: f64| {
+            let slack = 1e-9 * span.width();
+            value >= span.low - slack && value <= span.high + slack
+        };
+        if !within(self.x, x) || !within(self.y, y) {
+            return String::new();
+        }
+        let (across, down) = (coordinate(self.across(x)), coordinate(self.down(y)));
+        format!("<g transform=\"translate({across} {down})\">{drawing}</g>")
+    }
+
+    /// A strip below the axes, `height` tall, drawn from its upper left corner, `width` wide.
+    pub(super) fn strip(&mut self, height: f64, draw: impl FnOnce(f64) -> String) {
+        let (left, top) = (
+            coordinate(self.left),
+            coordinate(MARGIN + self.height + FOOT),
+        );
+        let drawing = draw(self.width);
+        self.foot = format!("<g transform=\"translate({left} {top})\">{drawing}</g>");
+        self.foot_height = height;
+    }
+
+    /// The whole drawing; `description` is read out in its place.
+    pub(super) fn finish(self, labels: &Labels, description: &str) -> String {
+        let [left, right] = [self.left, self.left + self.width].map(coordinate);
+        let [top, bottom] = [MARGIN, MARGIN + self.height].map(coordinate);
+        let [width, height] = [self.width, self.height].map(coordinate);
+        let total = coordinate(MARGIN + self.height + FOOT + self.foot_height);
+        let id = &self.id;
+        format!(
+            "<svg class=\"plot\" role=\"img\" aria-label=\"{description}\" \
+             viewBox=\"0 0 {WIDTH} {total}\">\
+             <clipPath id=\"{id}-clip\"><path d=\"M{left} {top}H{right}V{bottom}H{left}Z\"/></clipPath>\
+             {axes}<g clip-path=\"url(#{id}-clip)\">{clipped}</g>\
+             <rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\"/>\
+             {marks}{foot}</svg>",
+            description = escape(description),
+            axes = self.axes(labels),
+            clipped = self.clipped,
+            marks = self.marks,
+            foot = self.foot,
+        )
+    }
+
+    fn axes(&self, labels: &Labels) -> String {
+        let bottom = MARGIN + self.height;
+        let parts = (self.width / 52.0).max(1.0);
+        let parts = if labels.whole {
+            parts.min(self.x.width())
+        } else {
+            parts
+        };
+        let (ticks, decimals) = self.x.ticks(parts.max(1.0));
+        let mut axes = String::new();
+        for tick in ticks {
+            let at = coordinate(self.across(tick));
+            let (from, to, base) = (coordinate(MARGIN), coordinate(bottom + 4.0), bottom + 17.0);
+            axes += &format!(
+                "<path class=\"grid\" d=\"M{at} {from}V{to}\"/>\
+                 <text class=\"tick\" x=\"{at}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+                coordinate(base),
+                label(tick, decimals)
+            );
+        }
+        let (ticks, decimals) = self.y.ticks((self.height / 46.0).max(1.0));
+        for tick in ticks {
+            let at = self.down(tick);
+            let (from, to) = (
+                coordinate(self.left - 4.0),
+                coordinate(self.left + self.width),
+            );
+            axes += &format!(
+                "<path class=\"grid\" d=\"M{from} {}H{to}\"/>\
+                 <text class=\"tick\" x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
+                coordinate(at),
+                coordinate(self.left - 7.0),
+                coordinate(at + 4.0),
+                label(tick, decimals)
+            );
+        }
+        axes + &self.names(labels)
+    }
+
+    fn names(&self, labels: &Labels) -> String {
+        let [x, y] = [labels.x, labels.y].map(|name| escape(&shorten(name, NAME)));
+        let bottom = MARGIN + self.height;
+        let (middle, half) = (self.left + self.width / 2.0, MARGIN + self.height / 2.0);
+        // A long name of a low plot is squeezed into its height.
+        let long = 6.6 * labels.y.chars().count().min(NAME) as f64 > self.height;
+        let squeeze = if long {
+            format!(
+                " textLength=\"{}\" lengthAdjust=\"spacingAndGlyphs\"",
+                coordinate(self.height)
+            )
+        } else {
+            String::new()
+        };
+        let longest = self.left - 7.0 - self.tick_room();
+        format!(
+            "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{x}</text>\
+             <text class=\"name\" transform=\"translate({} {}) rotate(-90)\" \
+             text-anchor=\"middle\"{squeeze}>{y}</text>",
+            coordinate(middle),
+            coordinate(bottom + 37.0),
+            coordinate(longest.max(12.0)),
+            coordinate(half)
+        )
+    }
+
+    /// Room that the labels left of the plot take.
+    fn tick_room(&self) -> f64 {
+        let (ticks, decimals) = self.y.ticks((self.height / 46.0).max(1.0));
+        let longest = ticks
+            .iter()
+            .map(|&tick| label(tick, decimals).chars().count());
+        CHARACTER * longest.max().unwrap_or(1) as f64 + 6.0
+    }
+}
+
+/// A tick's value with a true minus sign.
+fn label(tick: f64, decimals: usize) -> String {
+    // Zero comes out of the multiplication with a sign, now and then.
+    let tick = if tick.abs() < 1e-12 { 0.0 } else { tick };
+    let text = if tick != 0.0 && !(1e-4..1e6).contains(&tick.abs()) {
+        format!("{tick:.1e}")
+    } else {
+        format!("{tick:.decimals$}")
+    };
+    text.replace('-', "−")
+}
+
+/// A coordinate of the drawing, to a hundredth; far points are brought near, outside the axes.
+pub(super) fn coordinate(value: f64) -> String {
+    let value = if value.is_nan() {
+        0.0
+    } else {
+        value.clamp(-1e4, 1e4)
+    };
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" {
+        "0".to_owned()
+    } else {
+        text.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Labels, Plot, Shape, Span, coordinate};
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let span = Span {
+            low: -2.65,
+            high: -0.05,
+        };
+        let (ticks, decimals) = span.ticks(6.0);
+        assert_eq!(decimals, 1);
+        assert_eq!(ticks.len(), 5);
+        for (tick, expected) in ticks.iter().zip([-2.5, -2.0, -1.5, -1.0, -0.5]) {
+            assert!((tick - expected).abs() < 1e-12, "{tick}");
+        }
+    }
+
+    #[test]
+    fn an_equal_plot_has_one_scale() {
+        let (x, y) = (
+            Span {
+                low: -1.0,
+                high: 1.0,
+            },
+            Span {
+                low: 0.0,
+                high: 3.0,
+            },
+        );
+        let plot = Plot::new("p", x, y, Shape::Equal);
+        let [across, down] = plot.lengths(1.0);
+        assert!((across - down).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_that_is_not_finite_reaches_the_drawing() {
+        let point = Span::of([f64::NAN, 2.0, 1e30]).expect("2 is a number");
+        assert_eq!(
+            point,
+            Span {
+                low: 2.0,
+                high: 2.0
+            }
+        );
+        assert_eq!(Span::of([f64::NAN]), None);
+        let mut plot = Plot::new("p", point, point, Shape::Free(100.0));
+        let line = plot.line([[2.0, 2.0], [f64::NAN, 2.0], [2.0, 1e30], [2.0, 2.0]]);
+        assert_eq!(line.matches('M').count(), 2);
+        plot.path("line", &line);
+        plot.mark([f64::NAN, 2.0], "never");
+        plot.ellipse("line", [2.0, f64::INFINITY], [1.0, 1.0]);
+        let labels = Labels {
+            x: "x",
+            y: "y",
+            whole: false,
+        };
+        let drawing = plot.finish(&labels, "a point");
+        assert!(!drawing.contains("NaN") && !drawing.contains("inf") && !drawing.contains("never"));
+        assert_eq!(coordinate(f64::NAN), "0");
+        assert_eq!(coordinate(-0.001), "0");
+        assert_eq!(coordinate(1e300), "10000");
+    }
+}

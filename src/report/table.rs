@@ -1,0 +1,379 @@
+//! The tables of the page: every number that the record holds.
+
+use super::text::{count, escape, interval, lower, number, or_dash, upper};
+use super::words;
+use crate::scenario::record::{Claim, Record};
+
+/// A table in a box of its own that scrolls; the first row holds headings, cells are text.
+fn table(title: &str, rows: &[Vec<String>]) -> String {
+    let row = |cells: &Vec<String>, head: bool| {
+        let cells = cells.iter().enumerate().map(|(index, cell)| {
+            let cell = escape(cell);
+            match (head, index) {
+                (true, _) => format!("<th scope=\"col\">{cell}</th>"),
+                (false, 0) => format!("<th scope=\"row\">{cell}</th>"),
+                (false, _) => format!("<td>{cell}</td>"),
+            }
+        });
+        format!("<tr>{}</tr>", cells.collect::<String>())
+    };
+    let Some((head, body)) = rows.split_first() else {
+        return String::new();
+    };
+    let body: String = body.iter().map(|cells| row(cells, false)).collect();
+    let wide = if head.len() > 3 { " wide" } else { "" };
+    format!(
+        "<section class=\"numbers{wide}\"><h3>{title}</h3>\
+         <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{title}\">\
+         <table><thead>{}</thead><tbody>{body}</tbody></table></div></section>\n",
+        row(head, true)
+    )
+}
+
+/// A table of names and values.
+fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
+    let head = vec!["quantity".to_owned(), "value".to_owned()];
+    let rows = pairs
+        .iter()
+        .map(|(name, value)| vec![(*name).to_owned(), value.clone()]);
+    table(
+        title,
+        &std::iter::once(head).chain(rows).collect::<Vec<_>>(),
+    )
+}
+
+/// The claims side by side.
+pub(super) fn claims(record: &Record) -> String {
+    let growth = record.growth.claim.as_ref();
+    let claims: Vec<&Claim> = [&record.deviation.claim, &record.global.claim]
+        .into_iter()
+        .chain(growth)
+        .collect();
+    let row = |name: &str, value: &dyn Fn(&Claim) -> String| {
+        let values = claims.iter().map(|claim| value(claim));
+        std::iter::once(name.to_owned()).chain(values).collect()
+    };
+    table(
+        "Claims",
+        &[
+            row("quantity", &|claim| claim.name.clone()),
+            row("certified risk", &|claim| upper(claim.certified_risk)),
+            row("risk asked for, epsilon", &|claim| number(claim.epsilon)),
+            row("one minus confidence, beta", &|claim| number(claim.beta)),
+            row("beta of this draw", &|claim| number(claim.beta_used)),
+            row("scenarios N", &|claim| count(claim.scenarios)),
+            row("failures k", &|claim| count(claim.failures)),
+            row("decision variables d", &|claim| {
+                claim.decision_vars.to_string()
+            }),
+            row("N asked by the simple bound", &|claim| {
+                or_dash(claim.required_simple.map(count))
+            }),
+            row("N asked by the exact bound", &|claim| {
+                or_dash(claim.required_exact.map(count))
+            }),
+            row("sampling measure", &|claim| claim.measure.clone()),
+            row("coordinates that vary", &|claim| {
+                claim.dimension.to_string()
+            }),
+            row("frozen coordinates", &|claim| {
+                if claim.frozen.is_empty() {
+                    "none".to_owned()
+                } else {
+                    claim.frozen.join(", ")
+                }
+            }),
+        ],
+    )
+}
+
+/// The tables of two or three columns.
+pub(super) fn narrow(record: &Record) -> String {
+    [
+        setting(record),
+        deviation(record),
+        certified_set(record),
+        growth(record),
+        state(record),
+        ledger(record),
+        provenance(record),
+    ]
+    .concat()
+}
+
+/// The tables that need the width of the page.
+pub(super) fn wide(record: &Record) -> String {
+    [constants(record), rounds(record), system(record)].concat()
+}
+
+fn setting(record: &Record) -> String {
+    pairs(
+        "Setting",
+        &[
+            ("horizon T", format!("{} steps", record.horizon)),
+            ("discount gamma", number(record.gamma)),
+            ("seed", record.provenance.seed.to_string()),
+            ("generator", record.provenance.generator.clone()),
+            ("backend", record.provenance.backend.clone()),
+            ("device", record.provenance.device.clone()),
+            (
+                "wall time",
+                format!("{} s", number(record.timing.wall_seconds)),
+            ),
+            ("threads", record.timing.threads.to_string()),
+            ("rollouts", count(record.timing.rollouts)),
+        ],
+    )
+}
+
+fn constants(record: &Record) -> String {
+    let head = [
+        "constant",
+        "used",
+        "from",
+        "computed bound",
+        "largest sampled gradient",
+    ];
+    let rows = [
+        ("L_r of the target margin", &record.constants.target),
+        ("L_c of the constraint margin", &record.constants.constraint),
+    ]
+    .map(|(name, constant)| {
+        vec![
+            name.to_owned(),
+            number(constant.used),
+            constant.source.clone(),
+            upper(constant.computed),
+            number(constant.sampled),
+        ]
+    });
+    let [target, constraint] = rows;
+    let head = head.map(str::to_owned).to_vec();
+    table("Lipschitz constants", &[head, target, constraint])
+}
+
+fn deviation(record: &Record) -> String {
+    let deviation = &record.deviation;
+    pairs(
+        "Deviation bound",
+        &[
+            ("radius around a nominal start", number(deviation.radius)),
+            (
+                "perturbed rollouts",
+                words::control(deviation.control).to_owned(),
+            ),
+            (
+                "joint over the steps",
+                words::joint(deviation.joint).to_owned(),
+            ),
+            (
+                "bound that tightens the margins",
+                words::source(deviation.source).to_owned(),
+            ),
+            ("pilot pairs", count(deviation.pilot)),
+            (
+                "scale of the fixed shape",
+                or_dash(deviation.scale.map(upper)),
+            ),
+            ("support scenarios", count(deviation.support)),
+            (
+                "a posteriori risk (wait and judge)",
+                upper(deviation.posterior_risk),
+            ),
+            ("pairs not finite", count(deviation.non_finite)),
+        ],
+    )
+}
+
+fn certified_set(record: &Record) -> String {
+    let global = &record.global;
+    pairs(
+        "Certified set",
+        &[
+            ("pairs drawn from the box", count(global.draws)),
+            ("nominal starts with V_check > 0", count(global.accepted)),
+            ("P(V_global)", interval(global.share_interval)),
+            ("volume of the box", number(global.box_volume)),
+            ("volume of V_global", interval(global.volume_interval)),
+            (
+                "perturbed starts that reach the target",
+                count(global.reached),
+            ),
+            ("failures that are not finite", count(global.non_finite)),
+            ("measured f32 error of the measure", upper(global.f32_error)),
+            ("band of f64 re-runs", number(global.band)),
+            ("f64 re-runs", count(global.f64_reruns)),
+        ],
+    )
+}
+
+fn state(record: &Record) -> String {
+    let state = &record.state;
+    pairs(
+        "The state of slice and growth",
+        &[
+            ("tier", words::tier(state.tier).to_owned()),
+            ("V_check", number(state.check_margin)),
+            ("target margin", number(state.target_margin)),
+            ("constraint margin", number(state.constraint_margin)),
+        ],
+    )
+}
+
+fn growth(record: &Record) -> String {
+    let growth = &record.growth;
+    pairs(
+        "Local growth",
+        &[
+            ("centre from", words::boundary(growth.boundary).to_owned()),
+            (
+                "distance of the centre from the state",
+                or_dash(growth.distance.map(number)),
+            ),
+            ("radius of the verified ball", lower(growth.radius)),
+            ("volume of the verified ball", number(growth.volume)),
+            ("coordinates that vary", {
+                growth
+                    .varies
+                    .iter()
+                    .filter(|&&varies| varies)
+                    .count()
+                    .to_string()
+            }),
+        ],
+    )
+}
+
+fn rounds(record: &Record) -> String {
+    let head = [
+        "round",
+        "radius",
+        "starts",
+        "failures",
+        "nearest",
+        "not finite",
+        "f64 re-runs",
+    ];
+    let rows = record
+        .growth
+        .rounds
+        .iter()
+        .enumerate()
+        .map(|(index, round)| {
+            vec![
+                (index + 1).to_string(),
+                number(round.radius),
+                count(round.scenarios),
+                count(round.failures),
+                or_dash(round.nearest_failure.map(number)),
+                count(round.non_finite),
+                count(round.f64_reruns),
+            ]
+        });
+    let head = head.map(str::to_owned).to_vec();
+    if record.growth.rounds.is_empty() {
+        return String::new();
+    }
+    table(
+        "Rounds of growth",
+        &std::iter::once(head).chain(rows).collect::<Vec<_>>(),
+    )
+}
+
+fn ledger(record: &Record) -> String {
+    let head = ["claim", "item", "beta spent"].map(str::to_owned).to_vec();
+    let row = |claim: &str, item: &str, beta| vec![claim.to_owned(), item.to_owned(), beta];
+    let lines = record
+        .ledger
+        .iter()
+        .map(|line| row(&line.claim, &line.item, number(line.beta)));
+    let total = row("total", "", upper(record.beta_total));
+    let rows: Vec<_> = std::iter::once(head).chain(lines).chain([total]).collect();
+    table("Ledger of beta", &rows)
+}
+
+fn provenance(record: &Record) -> String {
+    let provenance = &record.provenance;
+    pairs(
+        "Provenance",
+        &[
+            ("reachcast", provenance.version.clone()),
+            ("layout of the record", record.schema.to_string()),
+            ("policy", provenance.policy.clone()),
+            ("policy SHA-256", provenance.policy_sha256.clone()),
+            ("physics SHA-256", provenance.physics_sha256.clone()),
+        ],
+    )
+}
+
+fn system(record: &Record) -> String {
+    let head = [
+        "state",
+        "unit",
+        "box low",
+        "box high",
+        "at the state",
+        "ball centre",
+        "in the ball",
+    ];
+    let at = |x: &[f32], index: usize| or_dash(x.get(index).map(|&value| number(value.into())));
+    let rows = record
+        .system
+        .states
+        .iter()
+        .enumerate()
+        .map(|(index, axis)| {
+            let center = record.growth.center.as_deref().unwrap_or_default();
+            let varies = record.growth.varies.get(index).copied().unwrap_or(true);
+            vec![
+                axis.name.clone(),
+                axis.unit.clone(),
+                number(axis.low.into()),
+                number(axis.high.into()),
+                at(&record.state.x, index),
+                at(center, index),
+                if varies { "varies" } else { "frozen" }.to_owned(),
+            ]
+        });
+    let controls = record.system.controls.iter().map(|axis| {
+        vec![
+            format!("control {}", axis.name),
+            axis.unit.clone(),
+            number(axis.low.into()),
+            number(axis.high.into()),
+            "–".to_owned(),
+            "–".to_owned(),
+            "–".to_owned(),
+        ]
+    });
+    let head = head.map(str::to_owned).to_vec();
+    table(
+        "States and controls",
+        &std::iter::once(head)
+            .chain(rows)
+            .chain(controls)
+            .collect::<Vec<_>>(),
+    )
+}
+
+/// The deviation bound step by step.
+pub(super) fn steps(record: &Record) -> String {
+    let deviation = &record.deviation;
+    let exact = deviation.exact.as_deref();
+    let mut head = vec![
+        "step".to_owned(),
+        "bound used".to_owned(),
+        "largest seen".to_owned(),
+    ];
+    head.extend(exact.map(|_| "exact supremum".to_owned()));
+    let rows = deviation.bound.iter().enumerate().map(|(step, &bound)| {
+        let at = |series: &[f64]| or_dash(series.get(step).map(|&value| number(value)));
+        let mut row = vec![step.to_string(), upper(bound), at(&deviation.largest)];
+        row.extend(exact.map(at));
+        row
+    });
+    table(
+        "Deviation at each step",
+        &std::iter::once(head).chain(rows).collect::<Vec<_>>(),
+    )
+}

@@ -1,0 +1,163 @@
+//! Words for what a record stores as numbers and modes.
+
+use super::text::{interval, lower, upper};
+use crate::rollout::PairControl;
+use crate::scenario::record::{Claim, GrowthOutcome, Record};
+use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
+
+/// Name and unit of a state, as `ego_x (m)`.
+pub(super) fn axis(record: &Record, state: usize) -> String {
+    record.system.states.get(state).map_or_else(
+        || format!("state {state}"),
+        |axis| format!("{} ({})", axis.name, axis.unit),
+    )
+}
+
+/// Name of a state.
+pub(super) fn name(record: &Record, state: usize) -> String {
+    let axis = record.system.states.get(state);
+    axis.map_or_else(|| format!("state {state}"), |axis| axis.name.clone())
+}
+
+/// Unit of the Euclidean norm over the states that `counts` picks.
+pub(super) fn norm_unit(record: &Record, counts: impl Fn(usize) -> bool) -> String {
+    let mut units: Vec<&str> = Vec::new();
+    for (state, axis) in record.system.states.iter().enumerate() {
+        if counts(state) && !units.contains(&axis.unit.as_str()) {
+            units.push(&axis.unit);
+        }
+    }
+    units.join(", ")
+}
+
+/// Unit of the ball of local growth.
+pub(super) fn ball_unit(record: &Record) -> String {
+    let varies = &record.growth.varies;
+    norm_unit(record, |state| varies.get(state).copied().unwrap_or(true))
+}
+
+/// A claim beside the answer to the question whether it was obtained.
+pub(super) struct Verdict<'a> {
+    /// Short title.
+    pub(super) title: &'static str,
+    /// Whether the claim was obtained.
+    pub(super) obtained: bool,
+    /// The outcome in a few words.
+    pub(super) headline: String,
+    /// What it means, in one sentence.
+    pub(super) detail: String,
+    /// The claim, where one was made.
+    pub(super) claim: Option<&'a Claim>,
+}
+
+/// The three claims in the order of the method.
+pub(super) fn verdicts(record: &Record) -> [Verdict<'_>; 3] {
+    [deviation(record), global(record), growth(record)]
+}
+
+fn deviation(record: &Record) -> Verdict<'_> {
+    let claim = &record.deviation.claim;
+    Verdict {
+        title: "Deviation bound",
+        obtained: claim.certified_risk <= claim.epsilon,
+        headline: format!("risk ≤ {}", upper(claim.certified_risk)),
+        detail: format!(
+            "Chance that a start within {} drifts further than the bound; {} was asked for.",
+            upper(record.deviation.radius),
+            upper(claim.epsilon)
+        ),
+        claim: Some(claim),
+    }
+}
+
+fn global(record: &Record) -> Verdict<'_> {
+    let global = &record.global;
+    let found = global.accepted > 0;
+    Verdict {
+        title: "Certified set",
+        obtained: found,
+        headline: if found {
+            format!("risk ≤ {}", upper(global.claim.certified_risk))
+        } else {
+            "empty".to_owned()
+        },
+        detail: format!(
+            "Chance of failure inside the set, which fills {} of the sampled box.",
+            interval(global.share_interval)
+        ),
+        claim: Some(&global.claim),
+    }
+}
+
+fn growth(record: &Record) -> Verdict<'_> {
+    let growth = &record.growth;
+    let (headline, detail) = match growth.outcome {
+        GrowthOutcome::Verified => (
+            format!("radius {}", lower(growth.radius)),
+            growth.claim.as_ref().map_or_else(String::new, |claim| {
+                let risk = upper(claim.certified_risk);
+                format!("Chance of failure for a start in the verified ball: at most {risk}.")
+            }),
+        ),
+        GrowthOutcome::Exhausted => (
+            "not verified".to_owned(),
+            "Every round had failures, so no ball is certified.".to_owned(),
+        ),
+        GrowthOutcome::NoBoundary => (
+            "no boundary".to_owned(),
+            "No boundary of the certified set was found, so there was nothing to grow from."
+                .to_owned(),
+        ),
+    };
+    Verdict {
+        title: "Local growth",
+        obtained: growth.outcome == GrowthOutcome::Verified,
+        headline,
+        detail,
+        claim: growth.claim.as_ref(),
+    }
+}
+
+/// How the steps of the deviation bound hold together.
+pub(super) fn joint(joint: Joint) -> &'static str {
+    match joint {
+        Joint::FixedShape => "fixed shape from a pilot sample, one scalar (all steps at once)",
+        Joint::Variables => "one decision variable per step (all steps at once)",
+        Joint::Bonferroni => "each step on its own, risk and beta divided (all steps at once)",
+        Joint::Separate => "each step on its own at full risk (no joint statement)",
+    }
+}
+
+/// How perturbed rollouts were driven.
+pub(super) fn control(control: PairControl) -> &'static str {
+    match control {
+        PairControl::Replay => "replay of the nominal rollout's controls",
+        PairControl::ClosedLoop => "closed loop: the policy in feedback",
+    }
+}
+
+/// Which bound tightened the margins.
+pub(super) fn source(source: DeviationSource) -> &'static str {
+    match source {
+        DeviationSource::Scenario => "scenario bound",
+        DeviationSource::Exact => "exact supremum of the linear system",
+    }
+}
+
+/// Where the centre of the ball was looked for.
+pub(super) fn boundary(boundary: BoundarySearch) -> &'static str {
+    match boundary {
+        BoundarySearch::Slice => "a boundary cell of the slice",
+        BoundarySearch::Rays => "bisection along many directions in the coordinates that vary",
+    }
+}
+
+/// Where a state stands in the hierarchy.
+pub(super) fn tier(tier: u8) -> &'static str {
+    match tier {
+        0 => "0, in the target set",
+        1 => "1, V_check is positive there",
+        2 => "2, in the verified ball",
+        _ => "3, none of target set, certified set and verified ball",
+    }
+}

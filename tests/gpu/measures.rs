@@ -1,0 +1,180 @@
+//! Measures of trajectories against f32 on the host and against the f64 oracle.
+
+use reachcast::backend::gpu::{AdapterKind, Gpu};
+use reachcast::policy::{Activation, Policy};
+use reachcast::rollout::{
+    Fold, Plant, Query, ReachAvoidTask, RolloutSpec, Tightening, measure, trajectory,
+};
+use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+
+use crate::{band, drawn, gpu, measures, race_policy, ramp, random_network, whole_box};
+
+/// Whether the adapter rounds every sum and product and contracts none: measured for lavapipe.
+fn rounds_like_the_host(gpu: &Gpu) -> bool {
+    gpu.adapter().kind == AdapterKind::Software
+}
+
+/// The measure in f32 on the host, one state after the other.
+fn measure_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
+    plant: Plant<'_, S, P>,
+    start: [f32; NX],
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f32 {
+    let mut fold = Fold::new();
+    let states = trajectory::<f32, S, P, NX, NU>(plant, start, spec.horizon);
+    for (t, x) in states.into_iter().enumerate() {
+        fold.add(
+            plant.system.target(x) - tightening.target[t],
+            plant.system.constraint(x) - tightening.constraint[t],
+            spec.gamma,
+        );
+    }
+    fold.measure()
+}
+
+/// Every GPU measure lies within [`band`].
+fn assert_close_to_f64<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
+    plant: Plant<'_, S, P>,
+    task: &ReachAvoidTask<'_, NX>,
+    gpu: &[f32],
+) {
+    let starts = task.range.clone().map(|index| task.starts.start(index));
+    let both: Vec<(f64, f32)> = starts
+        .map(|start| {
+            let oracle = measure(plant, start, &task.spec, task.tightening);
+            let host = measure_f32(plant, start, &task.spec, task.tightening);
+            (oracle, host)
+        })
+        .collect();
+    let band = band(both.iter().map(|(oracle, host)| (*host, *oracle)));
+    for (i, ((oracle, _), &gpu)) in both.iter().zip(gpu).enumerate() {
+        let distance = (f64::from(gpu) - oracle).abs();
+        assert!(
+            distance <= band,
+            "start {i}: gpu {gpu}, f64 {oracle}, band {band}"
+        );
+    }
+}
+
+#[test]
+fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
+    let Some(gpu) = gpu() else { return };
+    let exact = rounds_like_the_host(&gpu);
+    let system = DoubleIntegrator::default();
+    let policy = BangBang { acceleration: 1.0 };
+    let plant = Plant {
+        system: &system,
+        policy: &policy,
+    };
+    let spec = RolloutSpec::new(40, 0.95).expect("a horizon");
+    let tightening = ramp(&spec);
+    let task = ReachAvoidTask {
+        starts: drawn(whole_box(&system), 21),
+        range: 0..1000,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let (_, found) = measures(gpu, plant, &task);
+    let host = |i| measure_f32(plant, task.starts.start(i), &spec, &tightening);
+    let equal = (0..1000).filter(|&i| found[i as usize] == host(i)).count();
+    // A contracted product can flip the bang-bang control, but only next to the switch.
+    let least = if exact { 1000 } else { 900 };
+    assert!(equal >= least, "{equal} of 1000 measures equal the host's");
+}
+
+#[test]
+fn race_measures_lie_within_a_band_around_f64() {
+    let Some(gpu) = gpu() else { return };
+    let (system, policy) = (DroneRace::default(), race_policy());
+    let plant = Plant {
+        system: &system,
+        policy: &policy,
+    };
+    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+    let tightening = ramp(&spec);
+    let task = ReachAvoidTask {
+        starts: drawn(whole_box(&system), 22),
+        range: 0..300,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let (_, found) = measures(gpu, plant, &task);
+    assert_close_to_f64(plant, &task, &found);
+}
+
+#[test]
+fn wide_networks_of_every_activation() {
+    let Some(mut gpu) = gpu() else { return };
+    let system = DroneRace::default();
+    let spec = RolloutSpec::new(3, 0.95).expect("a horizon");
+    let tightening = ramp(&spec);
+    let cases = [
+        (vec![12, 512, 512, 512, 512, 3], Activation::Relu, 40),
+        (vec![12, 67, 3], Activation::Tanh, 270),
+        (vec![12, 5, 9, 3], Activation::Silu, 270),
+        (vec![12, 3], Activation::Relu, 10),
+    ];
+    for (widths, activation, count) in cases {
+        let policy = random_network(&widths, activation);
+        let plant = Plant {
+            system: &system,
+            policy: &policy,
+        };
+        let task = ReachAvoidTask {
+            starts: drawn(whole_box(&system), 23),
+            range: 0..count,
+            spec,
+            tightening: &tightening,
+            query: Query::Measure,
+        };
+        let (back, found) = measures(gpu, plant, &task);
+        gpu = back;
+        assert_close_to_f64(plant, &task, &found);
+    }
+}
+
+#[test]
+fn sign_query_equals_the_sign_of_the_measure() {
+    let Some(gpu) = gpu() else { return };
+    let (race, network) = (DroneRace::default(), race_policy());
+    let integrator = DoubleIntegrator::default();
+    let formula = BangBang { acceleration: 1.0 };
+    let gpu = assert_signs(gpu, &race, &network, 30, 700);
+    assert_signs(gpu, &integrator, &formula, 100, 3000);
+}
+
+fn assert_signs<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
+    gpu: Gpu,
+    system: &S,
+    policy: &P,
+    horizon: u32,
+    count: u64,
+) -> Gpu {
+    let plant = Plant { system, policy };
+    let spec = RolloutSpec::new(horizon, 0.95).expect("a horizon");
+    let tightening = Tightening::none(&spec);
+    let mut task = ReachAvoidTask {
+        starts: drawn(whole_box(system), 24),
+        range: 40..40 + count,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let (gpu, dense) = measures(gpu, plant, &task);
+    task.query = Query::Sign;
+    let (gpu, signs) = measures(gpu, plant, &task);
+    let expected: Vec<f32> = dense
+        .iter()
+        .map(|g| if *g > 0.0 { 1.0 } else { -1.0 })
+        .collect();
+    assert_eq!(signs, expected);
+    let passed = expected.iter().filter(|sign| **sign > 0.0).count();
+    assert!(
+        passed > 0 && passed < expected.len(),
+        "{passed} of {count}: one sign only"
+    );
+    gpu
+}
