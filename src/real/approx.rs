@@ -35,8 +35,8 @@ fn cos_octant<R: Real>(angle: R) -> R {
 #[inline(always)]
 fn principal<R: Real>(angle: R) -> R {
     let turns = (angle * R::lit(std::f32::consts::FRAC_1_PI * 0.5) + R::lit(0.5)).floor();
-    let [a, b, c] = TAU_PARTS.map(R::lit);
-    ((angle - turns * a) - turns * b) - turns * c
+    let [a, b, c] = TAU_PARTS;
+    ((angle - turns * R::lit(a)) - turns * R::lit(b)) - turns * R::lit(c)
 }
 
 /// Sine and cosine of half an angle in `[-pi, pi]`, by folding at `pi/4`.

@@ -1,9 +1,23 @@
 //! SIMD lanes: a plain array that the compiler vectorises for whatever the caller enabled.
 
-use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::Real;
+
+/// An array of length `$n` whose element `$i` is `$value`, filled in a plain loop.
+///
+/// Not `array::from_fn` or `map`: they are not always inlined, and outside of the
+/// `#[target_feature]` function they would be compiled for the baseline instructions.
+macro_rules! per_lane {
+    ($n:expr, $i:ident => $value:expr) => {{
+        let mut lanes = [Default::default(); $n];
+        for $i in 0..$n {
+            lanes[$i] = $value;
+        }
+        lanes
+    }};
+}
+pub(crate) use per_lane;
 
 /// `N` f32 numbers that go through the same formula side by side.
 ///
@@ -39,7 +53,7 @@ impl<const N: usize> Lanes<N> {
     /// Tests exponent bits: a compiler or driver may remove `x != x`.
     #[inline(always)]
     pub fn non_finite(self) -> [u32; N] {
-        from_fn(|i| u32::from(self.0[i].to_bits() & EXPONENT == EXPONENT))
+        per_lane!(N, i => u32::from(self.0[i].to_bits() & EXPONENT == EXPONENT))
     }
 }
 
@@ -52,7 +66,7 @@ macro_rules! lanewise {
             type Output = Self;
             #[inline(always)]
             fn $method(self, rhs: Self) -> Self {
-                Self(from_fn(|i| self.0[i] $op rhs.0[i]))
+                Self(per_lane!(N, i => self.0[i] $op rhs.0[i]))
             }
         }
     };
@@ -66,7 +80,7 @@ impl<const N: usize> Neg for Lanes<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(from_fn(|i| -self.0[i]))
+        Self(per_lane!(N, i => -self.0[i]))
     }
 }
 
@@ -77,19 +91,19 @@ impl<const N: usize> Real for Lanes<N> {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(from_fn(|i| self.0[i].abs()))
+        Self(per_lane!(N, i => self.0[i].abs()))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(from_fn(|i| self.0[i].sqrt()))
+        Self(per_lane!(N, i => self.0[i].sqrt()))
     }
     #[inline(always)]
     fn floor(self) -> Self {
-        Self(from_fn(|i| self.0[i].floor()))
+        Self(per_lane!(N, i => self.0[i].floor()))
     }
     #[inline(always)]
     fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self(from_fn(|i| {
+        Self(per_lane!(N, i => {
             if self.0[i] < rhs.0[i] {
                 yes.0[i]
             } else {

@@ -10,6 +10,7 @@ pub mod wgsl;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use lanes::Lanes;
+pub(crate) use lanes::per_lane;
 
 /// A real number as far as a system, cost or policy formula may know it.
 ///

@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use super::philox::philox;
 use crate::error::{Error, Result};
-use crate::real::{Lanes, Real};
+use crate::real::{Lanes, Real, per_lane};
 
 /// Name of the generator, as certificates state it.
 pub const GENERATOR: &str = "Philox4x32-10";
@@ -76,10 +76,9 @@ impl Stream {
     /// of one sample. Counter: index low, index high, block, stream id.
     #[inline(always)]
     pub fn words<const N: usize>(&self, first: u64, block: u32) -> [[u32; N]; 4] {
-        let index: [u64; N] = from_fn(|i| first.wrapping_add(i as u64));
         let counter = [
-            from_fn(|i| index[i] as u32),
-            from_fn(|i| (index[i] >> 32) as u32),
+            per_lane!(N, i => first.wrapping_add(i as u64) as u32),
+            per_lane!(N, i => (first.wrapping_add(i as u64) >> 32) as u32),
             [block; N],
             [self.id; N],
         ];
@@ -105,9 +104,7 @@ impl Stream {
 /// Uniform numbers in `[0, 1)` from random words: the upper 23 bits become the mantissa.
 #[inline(always)]
 fn unit<const N: usize>(words: [u32; N]) -> Lanes<N> {
-    Lanes(from_fn(|i| {
-        f32::from_bits(words[i] >> 9 | 0x3f80_0000) - 1.0
-    }))
+    Lanes(per_lane!(N, i => f32::from_bits(words[i] >> 9 | 0x3f80_0000) - 1.0))
 }
 
 /// Two independent standard normal numbers from uniforms in `(0, 1]` and `[0, 1)` (Box and
@@ -225,12 +222,18 @@ impl<const NX: usize> Region<NX> {
     pub fn sample<const N: usize>(&self, stream: Stream, first: u64) -> [Lanes<N>; NX] {
         match self {
             Self::Box { low, high } => {
-                let unit = stream.uniforms::<N, NX>(first);
-                from_fn(|i| Lanes::lit(low[i]) + unit[i] * Lanes::lit(high[i] - low[i]))
+                let mut x = stream.uniforms::<N, NX>(first);
+                for (i, x) in x.iter_mut().enumerate() {
+                    *x = Lanes::lit(low[i]) + *x * Lanes::lit(high[i] - low[i]);
+                }
+                x
             }
             Self::Ball(ball) => {
-                let offset = sample_ball::<N, NX>(stream, first, &ball.varies);
-                from_fn(|i| Lanes::lit(ball.center[i]) + Lanes::lit(ball.radius) * offset[i])
+                let mut x = sample_ball::<N, NX>(stream, first, &ball.varies);
+                for (x, center) in x.iter_mut().zip(ball.center) {
+                    *x = Lanes::lit(center) + Lanes::lit(ball.radius) * *x;
+                }
+                x
             }
         }
     }
@@ -273,7 +276,10 @@ pub fn sample_ball<const N: usize, const NX: usize>(
         }
     }
     let scale = one / square.sqrt();
-    normal.map(|z| z * scale)
+    for z in &mut normal {
+        *z = *z * scale;
+    }
+    normal
 }
 
 /// Where the starts of a batch come from.
@@ -297,8 +303,14 @@ impl<const NX: usize> Starts<'_, NX> {
         match self {
             Self::Drawn { region, stream } => region.sample(*stream, first),
             Self::Listed(list) => {
-                let row = |i: usize| &list[(first as usize + i).min(list.len() - 1)];
-                from_fn(|k| Lanes(from_fn(|i| row(i)[k])))
+                let mut x = [Lanes([0.0; N]); NX];
+                for i in 0..N {
+                    let row = &list[(first as usize + i).min(list.len() - 1)];
+                    for (x, value) in x.iter_mut().zip(row) {
+                        x.0[i] = *value;
+                    }
+                }
+                x
             }
         }
     }
@@ -325,8 +337,10 @@ impl<const NX: usize> Pairs<'_, NX> {
     #[inline(always)]
     pub fn load<const N: usize>(&self, first: u64) -> [[Lanes<N>; NX]; 2] {
         let nominal = self.nominal.load::<N>(first);
-        let offset = sample_ball::<N, NX>(self.stream, first, &[true; NX]);
-        let radius = Lanes::lit(self.radius);
-        [nominal, from_fn(|i| nominal[i] + radius * offset[i])]
+        let mut perturbed = sample_ball::<N, NX>(self.stream, first, &[true; NX]);
+        for (x, nominal) in perturbed.iter_mut().zip(&nominal) {
+            *x = *nominal + Lanes::lit(self.radius) * *x;
+        }
+        [nominal, perturbed]
     }
 }

@@ -72,6 +72,12 @@ impl DroneRace {
     }
 }
 
+/// What a control, clipped to its bounds, adds to a velocity.
+#[inline(always)]
+fn push<R: Real>(gain: R, u: R) -> R {
+    gain * u.clamp(R::lit(-1.0), R::lit(1.0))
+}
+
 impl System<12, 3> for DroneRace {
     fn name(&self) -> &str {
         "drone-race"
@@ -104,9 +110,13 @@ impl System<12, 3> for DroneRace {
         let [ego_x, ego_vx, ego_y, ego_vy, ego_z, ego_vz, ..] = x;
         let [.., opp_x, opp_vx, opp_y, opp_vy, opp_z, opp_vz] = x;
         let dt = R::lit(DT);
-        let [ux, uy, uz] =
-            u.map(|u| R::lit(DT * self.ego_gain) * u.clamp(R::lit(-1.0), R::lit(1.0)));
-        let [position, velocity, along] = GAINS.map(|gain| R::lit(DT * self.opponent_gain * gain));
+        let gain = R::lit(DT * self.ego_gain);
+        let [ux, uy, uz] = [push(gain, u[0]), push(gain, u[1]), push(gain, u[2])];
+        let scale = DT * self.opponent_gain;
+        let [position, velocity, along] = GAINS;
+        let position = R::lit(scale * position);
+        let velocity = R::lit(scale * velocity);
+        let along = R::lit(scale * along);
         [
             ego_x + dt * ego_vx,
             ego_vx + ux,

@@ -1,21 +1,19 @@
 //! Signs of reach-avoid measures: a decided trajectory leaves the tile, and the next start takes
 //! its lane.
 
-use std::array::from_fn;
-
 use super::kernel::Kernel;
+use super::load::LoadStarts;
 use super::reach_avoid::ReachAvoid;
 use super::tile::{Driver, Loss, Score};
 use crate::policy::Policy;
-use crate::real::{Lanes, Real};
-use crate::rollout::{NON_FINITE, Plant, ReachAvoidTask};
+use crate::real::{Lanes, Real, per_lane};
+use crate::rollout::{NON_FINITE, ReachAvoidTask};
 use crate::system::System;
 
 /// The signs of the unit's measures.
 ///
 /// Each lane has a clock of its own, so the tile stays full until no start is left, and then
 /// shrinks. A trajectory does not see which lane it is in.
-#[inline(always)]
 pub(super) fn signs<S, P, K, const N: usize, const NX: usize, const NU: usize>(
     unit: ReachAvoid<'_, S, P, NX, NU>,
     mut driver: Driver<'_, S, P, K, N, NU>,
@@ -24,13 +22,12 @@ pub(super) fn signs<S, P, K, const N: usize, const NX: usize, const NU: usize>(
     P: Policy<NX, NU>,
     K: Kernel,
 {
-    let Plant { system, .. } = unit.plant;
     let mut queue = Queue::<N, NX>::new(unit.task, unit.first, unit.out.len());
     let mut x = vec![[Lanes([0.0; N]); NX]; unit.width.div_ceil(N)];
     let mut groups = vec![Group::<N>::new(); x.len()];
     let mut live = 0;
     loop {
-        while live < unit.width && queue.fill(system, unit.out) {
+        while live < unit.width && queue.fill(&driver, unit.out) {
             queue.waiting -= 1;
             let (to, lane) = (live / N, queue.waiting);
             copy_lane(&mut x[to], live % N, &queue.x, lane);
@@ -40,12 +37,12 @@ pub(super) fn signs<S, P, K, const N: usize, const NX: usize, const NU: usize>(
         if live == 0 {
             return;
         }
-        driver.decide(&x[..live.div_ceil(N)], live);
-        for (index, (x, group)) in x.iter_mut().zip(&mut groups).enumerate() {
-            if index * N < live {
-                driver.step(index, x);
-                group.advance(system, x, unit.task);
-            }
+        let active = &mut x[..live.div_ceil(N)];
+        driver.decide(active, live);
+        driver.step(active);
+        for (x, group) in active.iter().zip(&mut groups) {
+            group.tick(unit.task.spec.horizon);
+            group.judge(&driver, x, unit.task);
         }
         live = retire(&mut x, &mut groups, live, unit.out);
     }
@@ -64,7 +61,6 @@ struct Group<const N: usize> {
 }
 
 impl<const N: usize> Group<N> {
-    #[inline(always)]
     fn new() -> Self {
         Self {
             score: Score::new(),
@@ -74,30 +70,34 @@ impl<const N: usize> Group<N> {
         }
     }
 
-    /// Adds the states after one more step.
-    #[inline(always)]
-    fn advance<S: System<NX, NU>, const NX: usize, const NU: usize>(
+    /// Counts a step.
+    fn tick(&mut self, horizon: u32) {
+        // An empty lane runs on: its clock must stay within the tightening.
+        self.step = per_lane!(N, i => (self.step[i] + 1).min(horizon));
+    }
+
+    /// Adds the states `x`.
+    fn judge<S, P, K, const NX: usize, const NU: usize>(
         &mut self,
-        system: &S,
+        driver: &Driver<'_, S, P, K, N, NU>,
         x: &[Lanes<N>; NX],
         task: &ReachAvoidTask<'_, NX>,
-    ) {
-        let horizon = task.spec.horizon;
-        // An empty lane runs on: its clock must stay within the tightening.
-        self.step = self.step.map(|step| (step + 1).min(horizon));
+    ) where
+        S: System<NX, NU>,
+        K: Kernel,
+    {
         let loss = Loss::at_each(task.tightening, &self.step);
-        self.score.add(system, x, loss, &task.spec);
-        let decided = self.score.decided();
-        self.done = from_fn(|i| decided[i] | u32::from(self.step[i] == horizon));
+        driver.judge(x, &mut self.score, &loss, task.spec.gamma);
+        let (decided, horizon) = (self.score.decided(), task.spec.horizon);
+        self.done = per_lane!(N, i => decided[i] | u32::from(self.step[i] == horizon));
     }
 
     /// The sign of each measure, [`NON_FINITE`] as it is.
-    #[inline(always)]
     fn signs(&self) -> [f32; N] {
-        self.score.measure().0.map(sign)
+        let measure = self.score.measure().0;
+        per_lane!(N, i => sign(measure[i]))
     }
 
-    #[inline(always)]
     fn copy_lane(&mut self, to: usize, source: &Self, from: usize) {
         self.score.copy_lane(to, &source.score, from);
         self.step[to] = source.step[from];
@@ -107,7 +107,6 @@ impl<const N: usize> Group<N> {
 }
 
 /// 1 or -1, or [`NON_FINITE`] as it is.
-#[inline(always)]
 fn sign(measure: f32) -> f32 {
     if measure > 0.0 {
         1.0
@@ -118,7 +117,6 @@ fn sign(measure: f32) -> f32 {
     }
 }
 
-#[inline(always)]
 fn copy_lane<const N: usize, const NX: usize>(
     x: &mut [Lanes<N>; NX],
     to: usize,
@@ -131,7 +129,6 @@ fn copy_lane<const N: usize, const NX: usize>(
 }
 
 /// Writes the results of decided trajectories and closes the gaps; returns how many are left.
-#[inline(always)]
 fn retire<const N: usize, const NX: usize>(
     x: &mut [[Lanes<N>; NX]],
     groups: &mut [Group<N>],
@@ -174,7 +171,6 @@ struct Queue<'a, const N: usize, const NX: usize> {
 }
 
 impl<'a, const N: usize, const NX: usize> Queue<'a, N, NX> {
-    #[inline(always)]
     fn new(task: &'a ReachAvoidTask<'a, NX>, first: u64, count: usize) -> Self {
         Self {
             task,
@@ -188,19 +184,28 @@ impl<'a, const N: usize, const NX: usize> Queue<'a, N, NX> {
     }
 
     /// Loads starts until one waits; false if none is left.
-    #[inline(always)]
-    fn fill<S: System<NX, NU>, const NU: usize>(&mut self, system: &S, out: &mut [f32]) -> bool {
+    fn fill<S, P, K, const NU: usize>(
+        &mut self,
+        driver: &Driver<'_, S, P, K, N, NU>,
+        out: &mut [f32],
+    ) -> bool
+    where
+        S: System<NX, NU>,
+        K: Kernel,
+    {
         while self.waiting == 0 {
             if self.loaded == self.count {
                 return false;
             }
             let live = N.min(self.count - self.loaded);
-            self.x = self.task.starts.load(self.first + self.loaded as u64);
+            driver.kernel().call(LoadStarts {
+                starts: &self.task.starts,
+                first: self.first + self.loaded as u64,
+                x: &mut self.x,
+            });
             self.group = Group::new();
-            self.group.place = from_fn(|i| (self.loaded + i) as u32);
-            let loss = Loss::at(self.task.tightening, 0);
-            self.group.score.add(system, &self.x, loss, &self.task.spec);
-            self.group.done = self.group.score.decided();
+            self.group.place = per_lane!(N, i => (self.loaded + i) as u32);
+            self.group.judge(driver, &self.x, self.task);
             self.loaded += live;
             let (x, group) = (
                 std::slice::from_mut(&mut self.x),

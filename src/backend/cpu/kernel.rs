@@ -1,5 +1,7 @@
 //! Dense-layer kernels: a panel of neurons times a block of trajectories, summed in registers.
 
+use super::dispatch::Body;
+
 /// Smallest number of trajectories that a kernel computes at once; blocks are multiples of it.
 pub(super) const GRANULE: usize = 16;
 
@@ -14,7 +16,7 @@ pub(super) struct Panel<'a> {
     pub(super) floor: f32,
 }
 
-/// The kernel of one instruction set.
+/// One instruction set: what is compiled for it, and its dense-layer kernel.
 ///
 /// A value is the proof that the processor has it. Each sum starts with the bias and takes the
 /// inputs in order, so the bits depend neither on the place of a trajectory in its block nor on
@@ -24,6 +26,10 @@ pub(super) trait Kernel: Copy + Send + Sync {
     const ROWS: usize;
     /// Trajectories of a block, a multiple of [`GRANULE`].
     const BLOCK: usize;
+
+    /// Calls `body`, compiled for these instructions, with the lanes per group that the compiler
+    /// vectorises best.
+    fn call<B: Body>(self, body: B) -> B::Output;
 
     /// Writes `max(floor, W x + b)`, `[rows, BLOCK]`, of the inputs `[inputs, BLOCK]`; NaN stays.
     ///
@@ -43,7 +49,11 @@ impl Kernel for Portable {
     const ROWS: usize = if FUSED { 4 } else { 2 };
     const BLOCK: usize = GRANULE;
 
-    #[inline(always)]
+    #[inline(never)]
+    fn call<B: Body>(self, body: B) -> B::Output {
+        body.run()
+    }
+
     fn panel(self, panel: Panel<'_>, _lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
         match panel.bias.len() {
             1 => portable::<1>(panel, inputs, outputs),
@@ -79,6 +89,8 @@ fn portable<const R: usize>(panel: Panel<'_>, inputs: &[f32], outputs: &mut [f32
         }
     }
     for (outputs, sums) in outputs.as_chunks_mut::<GRANULE>().0.iter_mut().zip(sums) {
-        *outputs = sums.map(|sum| if sum < panel.floor { panel.floor } else { sum });
+        for (output, sum) in outputs.iter_mut().zip(sums) {
+            *output = if sum < panel.floor { panel.floor } else { sum };
+        }
     }
 }

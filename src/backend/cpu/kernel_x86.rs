@@ -1,13 +1,17 @@
 //! The dense-layer kernels for AVX-512 and for AVX2 with fused multiply-add.
 
+use super::dispatch::Body;
+use super::kernel::{Kernel, Panel};
+
+/// Rows of inputs that are fetched ahead of their use.
+const AHEAD: usize = 8;
+/// Numbers in a cache line.
+const LINE: usize = 16;
 use std::arch::x86_64::{
-    __m256, __m512, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_set1_ps,
+    _MM_HINT_T0, _mm_prefetch, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_set1_ps,
     _mm256_storeu_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_max_ps, _mm512_set1_ps,
     _mm512_storeu_ps,
 };
-use std::array::from_fn;
-
-use super::kernel::{Kernel, Panel};
 
 /// The processor has AVX-512 as in x86-64-v4.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +44,7 @@ impl Avx2 {
 /// A kernel of `R` neurons by `V` vectors of trajectories in blocks of `$block`.
 macro_rules! x86_kernel {
     (
-        $name:ident, $features:literal, $block:expr, $vector:ty, $width:literal,
+        $name:ident, $features:literal, $block:expr, $width:literal,
         $load:ident, $store:ident, $splat:ident, $fma:ident, $max:ident
     ) => {
         #[target_feature(enable = $features)]
@@ -54,13 +58,24 @@ macro_rules! x86_kernel {
             assert_eq!(panel.weights.len(), count * R, "weights [inputs, rows]");
             assert_eq!(inputs.len(), count * $block, "inputs [inputs, BLOCK]");
             assert_eq!(outputs.len(), R * $block, "outputs [rows, BLOCK]");
-            let mut sums: [[$vector; V]; R] = from_fn(|r| [$splat(panel.bias[r]); V]);
+            let mut sums = [[$splat(0.0); V]; R];
+            for (sums, bias) in sums.iter_mut().zip(panel.bias) {
+                *sums = [$splat(*bias); V];
+            }
             let (weights, x) = (panel.weights.as_ptr(), inputs.as_ptr());
             for i in 0..count {
                 // SAFETY: i < count, so with the shapes asserted above each vector ends within
-                // the `$block` inputs of row i, and each weight is one of the R of column i.
+                // the `$block` inputs of row i, and each weight is one of the R of column i. A
+                // prefetch may go anywhere.
                 unsafe {
-                    let lanes: [$vector; V] = from_fn(|v| $load(x.add(i * $block + v * $width)));
+                    let mut lanes = [$splat(0.0); V];
+                    for (v, lanes) in lanes.iter_mut().enumerate() {
+                        *lanes = $load(x.add(i * $block + v * $width));
+                    }
+                    for line in 0..V * $width / LINE {
+                        let ahead = x.wrapping_add((i + AHEAD) * $block + line * LINE);
+                        _mm_prefetch::<_MM_HINT_T0>(ahead.cast());
+                    }
                     for r in 0..R {
                         let weight = $splat(*weights.add(i * R + r));
                         for v in 0..V {
@@ -82,7 +97,10 @@ macro_rules! x86_kernel {
     };
 }
 
-#[allow(unsafe_code, reason = "vector loads and stores at checked offsets")]
+#[allow(
+    unsafe_code,
+    reason = "vector instructions behind a proof of their presence"
+)]
 mod kernels {
     use super::*;
 
@@ -90,7 +108,6 @@ mod kernels {
         avx512,
         "avx512f",
         Avx512::BLOCK,
-        __m512,
         16,
         _mm512_loadu_ps,
         _mm512_storeu_ps,
@@ -102,7 +119,6 @@ mod kernels {
         avx2,
         "avx2,fma",
         Avx2::BLOCK,
-        __m256,
         8,
         _mm256_loadu_ps,
         _mm256_storeu_ps,
@@ -122,12 +138,26 @@ mod kernels {
         };
     }
 
+    #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma")]
+    fn call_avx512<B: Body>(body: B) -> B::Output {
+        body.run()
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    fn call_avx2<B: Body>(body: B) -> B::Output {
+        body.run()
+    }
+
     impl Kernel for Avx512 {
         // 24 of 32 registers hold sums.
         const ROWS: usize = 8;
         const BLOCK: usize = 48;
 
-        #[inline]
+        fn call<B: Body>(self, body: B) -> B::Output {
+            // SAFETY: `self` proves that the processor has the instructions.
+            unsafe { call_avx512(body) }
+        }
+
         fn panel(self, panel: Panel<'_>, lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
             match lanes {
                 0..=16 => by_rows!(avx512, 1, panel, inputs, outputs: 1 2 3 4 5 6 7 8),
@@ -142,7 +172,11 @@ mod kernels {
         const ROWS: usize = 6;
         const BLOCK: usize = 16;
 
-        #[inline]
+        fn call<B: Body>(self, body: B) -> B::Output {
+            // SAFETY: `self` proves that the processor has the instructions.
+            unsafe { call_avx2(body) }
+        }
+
         fn panel(self, panel: Panel<'_>, _lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
             by_rows!(avx2, 2, panel, inputs, outputs: 1 2 3 4 5 6)
         }

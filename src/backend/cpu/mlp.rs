@@ -1,10 +1,11 @@
 //! A network for a tile of trajectories in lockstep: weights packed in panels, activations in
 //! blocks.
 
+use super::dispatch::Body;
 use super::kernel::{GRANULE, Kernel, Panel};
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
-use crate::real::Lanes;
+use crate::real::{Lanes, Real};
 
 /// A network whose weights are in the order in which a kernel reads them.
 #[derive(Debug)]
@@ -96,7 +97,6 @@ impl PackedLayer {
     }
 
     /// The layer for `lanes` trajectories; `inputs` and `outputs` are `[blocks, features, BLOCK]`.
-    #[inline(always)]
     fn forward<K: Kernel, const N: usize>(
         &self,
         kernel: K,
@@ -121,54 +121,51 @@ impl PackedLayer {
                 let first = block * block_out + p * K::ROWS * K::BLOCK;
                 let y = &mut outputs[first..][..bias.len() * K::BLOCK];
                 kernel.panel(panel, lanes - block * K::BLOCK, x, y);
-                self.squash.apply::<N>(y);
+                if !self.squash.done_by_kernel() {
+                    let squash = self.squash;
+                    kernel.call(Squashing::<N> { squash, values: y });
+                }
             }
         }
     }
 }
 
 impl Squash {
-    /// Applies it to `values`, but for the rectifier, which the kernel has applied.
+    /// Whether nothing is left to do once the kernel has bounded the sums.
+    fn done_by_kernel(self) -> bool {
+        matches!(
+            self,
+            Self::Hidden(Activation::Relu) | Self::Output(OutputActivation::Identity)
+        )
+    }
+
     #[inline(always)]
-    fn apply<const N: usize>(self, values: &mut [f32]) {
+    fn apply<R: Real>(self, x: R) -> R {
         match self {
-            Self::Hidden(Activation::Relu) | Self::Output(OutputActivation::Identity) => {}
-            Self::Hidden(Activation::Tanh) => {
-                in_lanes::<N>(
-                    values,
-                    |x| Activation::Tanh.apply(x),
-                    |x| Activation::Tanh.apply(x),
-                );
-            }
-            Self::Hidden(Activation::Silu) => {
-                in_lanes::<N>(
-                    values,
-                    |x| Activation::Silu.apply(x),
-                    |x| Activation::Silu.apply(x),
-                );
-            }
-            Self::Output(OutputActivation::Tanh) => in_lanes::<N>(
-                values,
-                |x| OutputActivation::Tanh.apply(x),
-                |x| OutputActivation::Tanh.apply(x),
-            ),
+            Self::Hidden(activation) => activation.apply(x),
+            Self::Output(activation) => activation.apply(x),
         }
     }
 }
 
-/// Maps `values`, a multiple of a granule, by the widest lanes that fit.
-#[inline(always)]
-fn in_lanes<const N: usize>(
-    values: &mut [f32],
-    wide: impl Fn(Lanes<N>) -> Lanes<N>,
-    narrow: impl Fn(Lanes<GRANULE>) -> Lanes<GRANULE>,
-) {
-    let (groups, rest) = values.as_chunks_mut::<N>();
-    for group in groups {
-        *group = wide(Lanes(*group)).0;
-    }
-    for group in rest.as_chunks_mut::<GRANULE>().0 {
-        *group = narrow(Lanes(*group)).0;
+/// Activation of a panel's sums, a multiple of a granule, by the widest lanes that fit.
+struct Squashing<'a, const N: usize> {
+    squash: Squash,
+    values: &'a mut [f32],
+}
+
+impl<const N: usize> Body for Squashing<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (groups, rest) = self.values.as_chunks_mut::<N>();
+        for group in groups {
+            *group = self.squash.apply(Lanes(*group)).0;
+        }
+        for group in rest.as_chunks_mut::<GRANULE>().0 {
+            *group = self.squash.apply(Lanes(*group)).0;
+        }
     }
 }
 
@@ -194,7 +191,6 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
     }
 
     /// The outputs for the first `lanes` trajectories of the groups `x`.
-    #[inline(always)]
     pub(super) fn forward<const N: usize, const NX: usize, const NU: usize>(
         &mut self,
         x: &[[Lanes<N>; NX]],

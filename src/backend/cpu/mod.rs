@@ -6,6 +6,7 @@ mod early_exit;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;
+mod load;
 mod mlp;
 mod reach_avoid;
 mod schedule;

@@ -1,8 +1,9 @@
 //! Reach-avoid measures of a unit of starts, tile by tile.
 
-use super::dispatch::Body;
+use super::dispatch::Unit;
 use super::early_exit::signs;
 use super::kernel::Kernel;
+use super::load::LoadStarts;
 use super::mlp::Packed;
 use super::tile::{Driver, Loss, Score};
 use crate::policy::Policy;
@@ -27,14 +28,13 @@ pub(super) struct ReachAvoid<'a, S, P, const NX: usize, const NU: usize> {
     pub(super) out: &'a mut [f32],
 }
 
-impl<S, P, const NX: usize, const NU: usize> Body for ReachAvoid<'_, S, P, NX, NU>
+impl<S, P, const NX: usize, const NU: usize> Unit for ReachAvoid<'_, S, P, NX, NU>
 where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
     type Output = ();
 
-    #[inline(always)]
     fn run<K: Kernel, const N: usize>(self, kernel: K) {
         let driver = Driver::<S, P, K, N, NU>::new(self.plant, self.network, kernel, self.width);
         match self.task.query {
@@ -45,7 +45,6 @@ where
 }
 
 /// The measures, by tiles of trajectories that start and end together.
-#[inline(always)]
 fn measures<S, P, K, const N: usize, const NX: usize, const NU: usize>(
     unit: ReachAvoid<'_, S, P, NX, NU>,
     mut driver: Driver<'_, S, P, K, N, NU>,
@@ -54,30 +53,28 @@ fn measures<S, P, K, const N: usize, const NX: usize, const NU: usize>(
     P: Policy<NX, NU>,
     K: Kernel,
 {
-    let ReachAvoid {
-        plant: Plant { system, .. },
-        task,
-        width,
-        ..
-    } = unit;
+    let (task, width) = (unit.task, unit.width);
     let mut x = vec![[Lanes([0.0; N]); NX]; width.div_ceil(N)];
     let mut scores = vec![Score::<N>::new(); x.len()];
     for (tile, out) in unit.out.chunks_mut(width).enumerate() {
         let groups = out.len().div_ceil(N);
         let (x, scores) = (&mut x[..groups], &mut scores[..groups]);
-        for (group, (x, score)) in x.iter_mut().zip(&mut *scores).enumerate() {
-            *x = task
-                .starts
-                .load(unit.first + (tile * width + group * N) as u64);
-            *score = Score::new();
-            score.add(system, x, Loss::at(task.tightening, 0), &task.spec);
+        scores.fill(Score::new());
+        for (group, x) in x.iter_mut().enumerate() {
+            driver.kernel().call(LoadStarts {
+                starts: &task.starts,
+                first: unit.first + (tile * width + group * N) as u64,
+                x,
+            });
         }
-        for t in 1..=task.spec.horizon as usize {
-            driver.decide(x, out.len());
+        for t in 0..=task.spec.horizon as usize {
+            if t > 0 {
+                driver.decide(x, out.len());
+                driver.step(x);
+            }
             let loss = Loss::at(task.tightening, t);
-            for (group, (x, score)) in x.iter_mut().zip(&mut *scores).enumerate() {
-                driver.step(group, x);
-                score.add(system, x, loss, &task.spec);
+            for (x, score) in x.iter().zip(&mut *scores) {
+                driver.judge(x, score, &loss, task.spec.gamma);
             }
         }
         for (out, score) in out.chunks_mut(N).zip(scores) {

@@ -1,12 +1,11 @@
 //! A tile of trajectories in groups of lanes: their controls and their scores.
 
-use std::array::from_fn;
-
+use super::dispatch::Body;
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use crate::policy::Policy;
-use crate::real::{Lanes, Real};
-use crate::rollout::{Fold, HUGE, NON_FINITE, Plant, RolloutSpec, Tightening};
+use crate::real::{Lanes, Real, per_lane};
+use crate::rollout::{Fold, HUGE, NON_FINITE, Plant, Tightening};
 use crate::system::System;
 
 /// Exponent bits of an f32: all set for infinities and NaN.
@@ -24,6 +23,7 @@ pub(super) fn is_finite(value: f32) -> bool {
 pub(super) struct Driver<'a, S, P, K, const N: usize, const NU: usize> {
     plant: Plant<'a, S, P>,
     network: Option<Evaluator<'a, K>>,
+    kernel: K,
     controls: Vec<[Lanes<N>; NU]>,
 }
 
@@ -38,44 +38,122 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
         Self {
             plant,
             network: network.map(|network| Evaluator::new(network, kernel, lanes)),
+            kernel,
             controls: vec![[Lanes([0.0; N]); NU]; lanes.div_ceil(N)],
         }
     }
 
     /// Evaluates the policy at the first `lanes` states of the groups `x`.
-    #[inline(always)]
     pub(super) fn decide<const NX: usize>(&mut self, x: &[[Lanes<N>; NX]], lanes: usize)
     where
         P: Policy<NX, NU>,
     {
-        match &mut self.network {
-            Some(network) => network.forward(x, lanes, &mut self.controls),
-            None => {
-                for (u, x) in self.controls.iter_mut().zip(x) {
-                    *u = self.plant.policy.control(*x);
-                }
-            }
+        if let Some(network) = &mut self.network {
+            network.forward(x, lanes, &mut self.controls);
+            return;
+        }
+        let policy = self.plant.policy;
+        for (u, x) in self.controls.iter_mut().zip(x) {
+            self.kernel.call(Control { policy, x, u });
         }
     }
 
-    /// Moves the states of a group one step on, by the controls decided last.
-    #[inline(always)]
-    pub(super) fn step<const NX: usize>(&self, group: usize, x: &mut [Lanes<N>; NX])
+    /// Moves the states of the groups one step on, by the controls decided last.
+    pub(super) fn step<const NX: usize>(&self, x: &mut [[Lanes<N>; NX]])
     where
         S: System<NX, NU>,
     {
-        *x = self.plant.system.step(*x, self.controls[group]);
+        let system = self.plant.system;
+        for (x, u) in x.iter_mut().zip(&self.controls) {
+            self.kernel.call(Step { system, x, u });
+        }
     }
 
-    /// The same for all groups of a tile.
-    #[inline(always)]
-    pub(super) fn step_all<const NX: usize>(&self, x: &mut [[Lanes<N>; NX]])
-    where
+    /// Adds the states `x` of a group to its scores.
+    pub(super) fn judge<const NX: usize>(
+        &self,
+        x: &[Lanes<N>; NX],
+        score: &mut Score<N>,
+        loss: &Loss<N>,
+        gamma: f32,
+    ) where
         S: System<NX, NU>,
     {
-        for (group, x) in x.iter_mut().enumerate() {
-            self.step(group, x);
+        self.kernel.call(Judge {
+            system: self.plant.system,
+            x,
+            score,
+            loss,
+            gamma,
+        });
+    }
+
+    /// The kernel, for other bodies.
+    pub(super) fn kernel(&self) -> K {
+        self.kernel
+    }
+}
+
+/// The policy's formula for a group.
+struct Control<'a, P, const N: usize, const NX: usize, const NU: usize> {
+    policy: &'a P,
+    x: &'a [Lanes<N>; NX],
+    u: &'a mut [Lanes<N>; NU],
+}
+
+impl<P: Policy<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
+    for Control<'_, P, N, NX, NU>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        *self.u = self.policy.control(*self.x);
+    }
+}
+
+/// The system's dynamics for a group.
+struct Step<'a, S, const N: usize, const NX: usize, const NU: usize> {
+    system: &'a S,
+    x: &'a mut [Lanes<N>; NX],
+    u: &'a [Lanes<N>; NU],
+}
+
+impl<S: System<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
+    for Step<'_, S, N, NX, NU>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        *self.x = self.system.step(*self.x, *self.u);
+    }
+}
+
+/// The system's margins for a group, folded.
+struct Judge<'a, S, const N: usize, const NX: usize, const NU: usize> {
+    system: &'a S,
+    x: &'a [Lanes<N>; NX],
+    score: &'a mut Score<N>,
+    loss: &'a Loss<N>,
+    gamma: f32,
+}
+
+impl<S: System<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
+    for Judge<'_, S, N, NX, NU>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Loss([target_loss, constraint_loss]) = *self.loss;
+        let target = self.system.target(*self.x) - target_loss;
+        let constraint = self.system.constraint(*self.x) - constraint_loss;
+        let mut largest = [0; N];
+        for values in self.x.iter().chain([&target, &constraint]) {
+            largest = per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]));
         }
+        self.score.add(target, constraint, largest, self.gamma);
     }
 }
 
@@ -90,14 +168,18 @@ impl<const N: usize> Loss<N> {
     /// At step `t`, the same for all lanes.
     #[inline(always)]
     pub(super) fn at(tightening: &Tightening, t: usize) -> Self {
-        Self([tightening.target[t], tightening.constraint[t]].map(Lanes::lit))
+        let (target, constraint) = (tightening.target[t], tightening.constraint[t]);
+        Self([Lanes::lit(target), Lanes::lit(constraint)])
     }
 
     /// At a step of its own for each lane.
     #[inline(always)]
     pub(super) fn at_each(tightening: &Tightening, steps: &[u32; N]) -> Self {
-        let gather = |values: &[f32]| Lanes(from_fn(|i| values[steps[i] as usize]));
-        Self([gather(&tightening.target), gather(&tightening.constraint)])
+        let Tightening { target, constraint } = tightening;
+        Self([
+            Lanes(per_lane!(N, i => target[steps[i] as usize])),
+            Lanes(per_lane!(N, i => constraint[steps[i] as usize])),
+        ])
     }
 }
 
@@ -119,38 +201,22 @@ impl<const N: usize> Score<N> {
         }
     }
 
-    /// Adds the states `x`; one that is not finite fails its rollout from there on.
+    /// Adds the margins of the next states; fails the rollouts where `largest`, the largest bits
+    /// without sign of margins and states, belong to no finite number.
     #[inline(always)]
-    pub(super) fn add<S: System<NX, NU>, const NX: usize, const NU: usize>(
-        &mut self,
-        system: &S,
-        x: &[Lanes<N>; NX],
-        Loss([target_loss, constraint_loss]): Loss<N>,
-        spec: &RolloutSpec,
-    ) {
-        let target = system.target(*x) - target_loss;
-        let constraint = system.constraint(*x) - constraint_loss;
-        let mut largest = [0; N];
-        for values in x.iter().chain([&target, &constraint]) {
-            largest = from_fn(|i| values.0[i].abs().to_bits().max(largest[i]));
-        }
-        self.failed = from_fn(|i| self.failed[i] | u32::from(largest[i] >= EXPONENT));
+    fn add(&mut self, target: Lanes<N>, constraint: Lanes<N>, largest: [u32; N], gamma: f32) {
+        self.failed = per_lane!(N, i => self.failed[i] | u32::from(largest[i] >= EXPONENT));
         // Margins of -HUGE leave a positive measure as it is and make no other one positive.
-        let failed = self.failed;
-        let or_lost = |margin: Lanes<N>| {
-            Lanes(from_fn(
-                |i| if failed[i] != 0 { -HUGE } else { margin.0[i] },
-            ))
-        };
-        self.fold
-            .add(or_lost(target), or_lost(constraint), Lanes::lit(spec.gamma));
+        let target = lost(&self.failed, target);
+        let constraint = lost(&self.failed, constraint);
+        self.fold.add(target, constraint, Lanes::lit(gamma));
     }
 
     /// The measures; [`NON_FINITE`] where the rollout failed before it reached the target.
     #[inline(always)]
     pub(super) fn measure(&self) -> Lanes<N> {
         let measure = self.fold.measure().0;
-        Lanes(from_fn(|i| {
+        Lanes(per_lane!(N, i => {
             if self.failed[i] != 0 && measure[i] <= 0.0 {
                 NON_FINITE
             } else {
@@ -163,7 +229,7 @@ impl<const N: usize> Score<N> {
     #[inline(always)]
     pub(super) fn decided(&self) -> [u32; N] {
         let (measure, safe) = (self.fold.measure().0, self.fold.safe().0);
-        from_fn(|i| u32::from(measure[i] > 0.0) | u32::from(safe[i] <= 0.0))
+        per_lane!(N, i => u32::from(measure[i] > 0.0) | u32::from(safe[i] <= 0.0))
     }
 
     /// Copies lane `from` of `source` to lane `to`.
@@ -172,4 +238,10 @@ impl<const N: usize> Score<N> {
         self.fold.copy_lane(to, &source.fold, from);
         self.failed[to] = source.failed[from];
     }
+}
+
+/// `margin`, or -[`HUGE`] where the rollout failed.
+#[inline(always)]
+fn lost<const N: usize>(failed: &[u32; N], margin: Lanes<N>) -> Lanes<N> {
+    Lanes(per_lane!(N, i => if failed[i] != 0 { -HUGE } else { margin.0[i] }))
 }
