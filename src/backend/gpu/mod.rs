@@ -1,48 +1,106 @@
 //! The GPU backend: recorded physics spliced into the WGSL kernels, run through wgpu.
 
+mod buffer;
+pub mod compose;
+mod deviation;
+mod device;
+mod kernel;
+mod network;
+mod plan;
+mod reach_avoid;
+mod run;
+
+use std::fmt;
+use std::sync::Arc;
+
 use super::{MeasureSink, PairSink};
 use crate::error::Result;
 use crate::policy::Policy;
 use crate::rollout::{DeviationTask, Farthest, Plant, ReachAvoidTask};
 use crate::system::System;
 
-/// An adapter with its queue and pipelines.
-#[derive(Debug)]
+use buffer::Pool;
+use device::Device;
+use kernel::Pipelines;
+
+pub use buffer::Params;
+pub use device::{Adapter, AdapterKind, Choice, adapters};
+
+/// An opened adapter with its pipelines and buffers.
 pub struct Gpu {
-    name: String,
+    device: Device,
+    pipelines: Pipelines,
+    pool: Pool,
 }
 
 impl Gpu {
-    /// The adapter in words.
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if none fits the choice or it does not open; it names those found.
+    pub fn open(choice: &Choice) -> Result<Self> {
+        Ok(Self {
+            device: Device::open(choice)?,
+            pipelines: Pipelines::default(),
+            pool: Pool::default(),
+        })
+    }
+
+    /// The same adapter, with the text of every kernel changed by `edit` before it is compiled.
+    ///
+    /// For tests that must fail: a comparison that does not notice a changed kernel proves
+    /// nothing.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_shader_edit(
+        mut self,
+        edit: impl Fn(&str) -> String + Send + Sync + 'static,
+    ) -> Self {
+        self.pipelines = Pipelines::edited(Arc::new(edit));
+        self
+    }
+
+    /// The adapter in figures.
+    pub fn adapter(&self) -> &Adapter {
+        &self.device.adapter
+    }
+
+    /// The adapter in words: name, interface, kind and driver.
     pub fn device(&self) -> String {
-        self.name.clone()
+        self.device.adapter.to_string()
     }
 
     /// See [`super::Backend::reach_avoid`].
     pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
         &self,
-        _plant: Plant<'_, S, P>,
-        _task: &ReachAvoidTask<'_, NX>,
-        _sink: MeasureSink<'_>,
+        plant: Plant<'_, S, P>,
+        task: &ReachAvoidTask<'_, NX>,
+        sink: MeasureSink<'_>,
     ) -> Result<()>
     where
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        Ok(())
+        reach_avoid::reach_avoid(self, plant, task, sink)
     }
 
     /// See [`super::Backend::deviation`].
     pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
         &self,
-        _plant: Plant<'_, S, P>,
-        _task: &DeviationTask<'_, NX>,
-        _sink: PairSink<'_>,
+        plant: Plant<'_, S, P>,
+        task: &DeviationTask<'_, NX>,
+        sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>>
     where
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        Ok(Vec::new())
+        deviation::deviation(self, plant, task, sink)
+    }
+}
+
+impl fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Gpu").field(&self.device.adapter).finish()
     }
 }

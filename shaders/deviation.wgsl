@@ -1,0 +1,50 @@
+// One thread rolls one pair side by side over the states t = step .. step + steps - 1. The
+// nominal trajectory stands in column i, the perturbed one in column stride + i. Reads the
+// schedule and, for a network, its controls; writes both states and folds, the pair's measures
+// and its distance at each of these steps. Twin: backend/cpu/deviation.rs.
+
+@group(0) @binding(2) var<storage, read> schedule: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> folds: array<Fold>;
+@group(0) @binding(7) var<storage, read_write> pair_measures: array<vec2<f32>>;
+@group(0) @binding(8) var<storage, read_write> distances: array<f32>;
+
+// Distance of two states; HUGE where something is not finite.
+fn gap(nominal: State, perturbed: State) -> f32 {
+    let distance = state_distance(nominal, perturbed);
+    let sound = state_finite(nominal) && state_finite(perturbed) && finite(distance);
+    return select(HUGE, distance, sound);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn deviation(@builtin(global_invocation_id) id: vec3<u32>) {
+    let column = id.x;
+    if column >= params.columns {
+        return;
+    }
+    let second = params.stride + column;
+    var nominal = load_state(column);
+    var perturbed = load_state(second);
+    var nominal_fold = folds[column];
+    var perturbed_fold = folds[second];
+    for (var t = params.step; t < params.step + params.steps; t += 1u) {
+        let row = schedule[t].xyz;
+        distances[(t - params.segment_start) * params.stride + column] = gap(nominal, perturbed);
+        nominal_fold = judge(nominal_fold, nominal, row);
+        perturbed_fold = judge(perturbed_fold, perturbed, vec3<f32>(row.x, 0.0, 0.0));
+        if t < params.horizon {
+            let replayed = drive(column, nominal);
+            if params.closed_loop != 0u {
+                perturbed = advance(perturbed, drive(second, perturbed));
+            } else {
+                perturbed = advance(perturbed, replayed);
+            }
+            nominal = advance(nominal, replayed);
+        }
+    }
+    store_state(column, nominal);
+    store_state(second, perturbed);
+    folds[column] = nominal_fold;
+    folds[second] = perturbed_fold;
+    pair_measures[column] = vec2<f32>(nominal_fold.best, perturbed_fold.best);
+}

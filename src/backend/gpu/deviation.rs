@@ -1,0 +1,160 @@
+//! Pairs on the device: both rollouts of each side by side, the farthest pair of each step.
+
+use super::Gpu;
+use super::buffer::Params;
+use super::compose::{Kernel, Slot};
+use super::kernel::Bound;
+use super::network::Network;
+use super::plan::Work;
+use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
+use crate::backend::PairSink;
+use crate::error::Result;
+use crate::policy::Policy;
+use crate::rollout::{DeviationTask, Farthest, PairControl, PairMeasure, Plant};
+use crate::system::System;
+
+/// See [`crate::backend::Backend::deviation`].
+pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
+    gpu: &Gpu,
+    plant: Plant<'_, S, P>,
+    task: &DeviationTask<'_, NX>,
+    sink: PairSink<'_>,
+) -> Result<Vec<Farthest>>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let rows = task.spec.horizon as usize + 1;
+    let mut farthest = vec![Farthest::NONE; rows];
+    let count = task.range.end.saturating_sub(task.range.start);
+    if count == 0 {
+        return Ok(farthest);
+    }
+    check_starts(&task.pairs.nominal)?;
+    let job = Job::new(gpu, plant, Work::Pairs, count)?;
+    let row = u64::from(job.plan.row);
+    let schedule = job.uploaded(&schedule(&task.spec, task.tightening)?);
+    let region = job.uploaded(&region_vectors(&task.pairs.nominal));
+    let network = plant
+        .policy
+        .network()
+        .map(|mlp| Network::new(&job, mlp, job.plan.row));
+    let state = job.storage(16 * NX.div_ceil(4) as u64 * row);
+    let folds = job.storage(8 * row);
+    let origin = job.storage(4 * row);
+    let measures = job.storage(4 * row);
+    let distances = job.storage(2 * row * u64::from(job.plan.segment));
+    let partial = job.storage(8 * rows as u64);
+    let buffer = |slot| match slot {
+        Slot::Region => &region,
+        Slot::Schedule => &schedule,
+        Slot::State => &state,
+        Slot::Folds => &folds,
+        Slot::Origin => &origin,
+        Slot::Distances => &distances,
+        Slot::Farthest => &partial,
+        Slot::Control => network.as_ref().map_or(&measures, Network::control),
+        _ => &measures,
+    };
+    let chunks = Chunks {
+        sample: job.bind(Kernel::Sample, buffer)?,
+        rollout: job.bind(Kernel::Deviation, buffer)?,
+        reduce: job.bind(Kernel::Reduce, buffer)?,
+        layers: match &network {
+            Some(network) => network.bind(&job, &state)?,
+            None => Vec::new(),
+        },
+        job: &job,
+        network: network.as_ref(),
+        params: pair_params(task, job.plan.stride),
+    };
+    let mut first = task.range.start;
+    while first < task.range.end {
+        let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
+        job.upload_starts(&task.pairs.nominal, first, columns, &state);
+        chunks.run(first, columns)?;
+        let found: Vec<[u32; 2]> = partial.read(job.device, rows)?;
+        for (farthest, [bits, column]) in farthest.iter_mut().zip(found) {
+            *farthest = farthest.merge(Farthest {
+                distance: f32::from_bits(bits),
+                pair: first + u64::from(column),
+            });
+        }
+        let values: Vec<PairMeasure> = measures.read(job.device, columns as usize)?;
+        sink(first, &values)?;
+        first += u64::from(columns);
+    }
+    Ok(farthest)
+}
+
+/// Parameters of the pairs.
+fn pair_params<const NX: usize>(task: &DeviationTask<'_, NX>, stride: u32) -> Params {
+    let [pair_key_low, pair_key_high] = task.pairs.stream.key();
+    Params {
+        stride,
+        pair_key_low,
+        pair_key_high,
+        pair_stream: task.pairs.stream.id(),
+        pair_radius: task.pairs.radius,
+        paired: 1,
+        closed_loop: u32::from(task.control == PairControl::ClosedLoop),
+        ..start_params(&task.pairs.nominal, &task.spec)
+    }
+}
+
+/// What the chunks of a call share.
+struct Chunks<'a> {
+    job: &'a Job<'a>,
+    network: Option<&'a Network>,
+    sample: Bound,
+    rollout: Bound,
+    reduce: Bound,
+    layers: Vec<Bound>,
+    params: Params,
+}
+
+impl Chunks<'_> {
+    /// Rolls out the pairs `first..first + columns`.
+    fn run(&self, first: u64, columns: u32) -> Result<()> {
+        let plan = self.job.plan;
+        let params = self.params.at(first, columns);
+        let mut batch = Batch::default();
+        batch.push_columns(Kernel::Sample, &self.sample, &params);
+        let mut step = 0;
+        while step <= params.horizon {
+            let count = plan.segment.min(params.horizon + 1 - step);
+            self.segment(&mut batch, params, step, count);
+            self.job.submit(&batch, None)?;
+            batch = Batch::default();
+            step += count;
+        }
+        Ok(())
+    }
+
+    /// Adds the dispatches of `count` steps, and the reduction of their distances.
+    fn segment<'a>(&'a self, batch: &mut Batch<'a>, params: Params, first: u32, count: u32) {
+        let plan = self.job.plan;
+        let params = Params {
+            segment_start: first,
+            ..params
+        };
+        let mut step = first;
+        while step < first + count {
+            let steps = plan.steps.min(first + count - step);
+            if let Some(network) = self.network
+                && step < params.horizon
+            {
+                // Perturbed states stand `stride` columns after the nominal ones.
+                let columns = if params.closed_loop == 0 {
+                    params.columns
+                } else {
+                    plan.row
+                };
+                network.forward(batch, &self.layers, columns, plan.row);
+            }
+            batch.push_columns(Kernel::Deviation, &self.rollout, &params.over(step, steps));
+            step += steps;
+        }
+        batch.push(&self.reduce, &params.over(first, count), [count, 1]);
+    }
+}

@@ -1,0 +1,189 @@
+//! Pipelines: one per kernel text, built when first needed.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::buffer::Params;
+use super::compose::{Access, Kernel, Shape, Slot, compose};
+use super::device::Device;
+use crate::error::Result;
+
+/// Changes the text of a kernel before it is compiled.
+pub(super) type Edit = Arc<dyn Fn(&str) -> String + Send + Sync>;
+
+/// A compiled kernel and what it binds.
+pub(super) struct Pipeline {
+    kernel: Kernel,
+    layout: wgpu::BindGroupLayout,
+    bindings: Vec<(Slot, Access)>,
+    pipeline: wgpu::ComputePipeline,
+}
+
+/// Pipelines by kernel and text. The text holds the physics and the network's activations; the
+/// network's widths are parameters.
+#[derive(Default)]
+pub(super) struct Pipelines {
+    edit: Option<Edit>,
+    built: Mutex<HashMap<(Kernel, String), Arc<Pipeline>>>,
+}
+
+impl Pipelines {
+    /// Pipelines whose texts go through `edit` first.
+    pub(super) fn edited(edit: Edit) -> Self {
+        Self {
+            edit: Some(edit),
+            built: Mutex::default(),
+        }
+    }
+
+    /// The pipeline of `kernel`, from the cache or built now.
+    ///
+    /// # Errors
+    /// [`crate::Error::DeviceFailed`] if the driver refuses the text.
+    pub(super) fn pipeline(
+        &self,
+        device: &Device,
+        kernel: Kernel,
+        shape: &Shape,
+        physics: &str,
+    ) -> Result<Arc<Pipeline>> {
+        let composed = compose(kernel, shape, physics);
+        let text = match &self.edit {
+            Some(edit) => edit(&composed),
+            None => composed,
+        };
+        let key = (kernel, text);
+        let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = built.get(&key) {
+            return Ok(Arc::clone(pipeline));
+        }
+        let bindings = kernel.bindings(shape.network.is_some());
+        let module = self.module(device, kernel, &key.1);
+        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module));
+        device.check()?;
+        built.insert(key, Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+
+    /// Compiles `text`; with bounds checks if it was edited.
+    fn module(&self, device: &Device, kernel: Kernel, text: &str) -> wgpu::ShaderModule {
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(kernel.entry()),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
+        };
+        if self.edit.is_some() {
+            return device.device.create_shader_module(descriptor);
+        }
+        #[allow(
+            unsafe_code,
+            reason = "unchecked modules compile two to five times faster"
+        )]
+        // SAFETY: columns are tested against `columns` or padded to the stride, steps are bounded
+        // by the schedule's length, and `plan` sizes every buffer for that stride and length; the
+        // recorded physics has neither loops nor indices that are not constant, and every loop of
+        // the hand-written kernels ends.
+        unsafe {
+            let checks = wgpu::ShaderRuntimeChecks::unchecked();
+            device
+                .device
+                .create_shader_module_trusted(descriptor, checks)
+        }
+    }
+}
+
+impl Pipeline {
+    fn new(
+        device: &Device,
+        kernel: Kernel,
+        bindings: Vec<(Slot, Access)>,
+        module: &wgpu::ShaderModule,
+    ) -> Self {
+        let entries: Vec<_> = bindings.iter().map(layout_entry).collect();
+        let label = Some(kernel.entry());
+        let device = &device.device;
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label,
+            entries: &entries,
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&pipeline_layout),
+            module,
+            entry_point: Some(kernel.entry()),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                // Every kernel writes workgroup memory before it reads it.
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        Self {
+            kernel,
+            layout,
+            bindings,
+            pipeline,
+        }
+    }
+
+    /// Binds the buffer that `buffer` names for each slot.
+    pub(super) fn bind<'a>(
+        self: &Arc<Self>,
+        device: &Device,
+        buffer: impl Fn(Slot) -> wgpu::BufferBinding<'a>,
+    ) -> Bound {
+        let entry = |&(slot, _): &(Slot, Access)| wgpu::BindGroupEntry {
+            binding: slot as u32,
+            resource: wgpu::BindingResource::Buffer(buffer(slot)),
+        };
+        let entries: Vec<_> = self.bindings.iter().map(entry).collect();
+        let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.kernel.entry()),
+            layout: &self.layout,
+            entries: &entries,
+        });
+        Bound {
+            pipeline: Arc::clone(self),
+            group,
+        }
+    }
+}
+
+/// A pipeline with its buffers.
+pub(super) struct Bound {
+    pipeline: Arc<Pipeline>,
+    group: wgpu::BindGroup,
+}
+
+impl Bound {
+    /// Runs `groups` workgroups with the parameters at `offset`.
+    pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32, groups: [u32; 2]) {
+        pass.set_pipeline(&self.pipeline.pipeline);
+        pass.set_bind_group(0, &self.group, &[offset]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+}
+
+/// The layout of one binding.
+fn layout_entry(&(slot, access): &(Slot, Access)) -> wgpu::BindGroupLayoutEntry {
+    let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
+    let uniform = access == Access::Uniform;
+    wgpu::BindGroupLayoutEntry {
+        binding: slot as u32,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer {
+            ty: match access {
+                Access::Uniform => wgpu::BufferBindingType::Uniform,
+                Access::Read => storage(true),
+                Access::ReadWrite => storage(false),
+            },
+            has_dynamic_offset: uniform,
+            min_binding_size: uniform.then_some(Params::SIZE),
+        },
+        count: None,
+    }
+}

@@ -1,0 +1,168 @@
+//! The network's parameters as the layer kernel wants them, and its layers' dispatches.
+
+use super::buffer::{Buffer, Params, Use};
+use super::compose::{Kernel, MLP_LANES, Slot, TILE_COLUMNS, TILE_QUADS};
+use super::kernel::Bound;
+use super::run::{Batch, Job};
+use crate::error::Result;
+use crate::policy::{Layer, Mlp};
+
+/// Vectors of 4 inputs.
+pub(super) fn input_quads(width: usize) -> usize {
+    width.div_ceil(4)
+}
+
+/// Vectors of 4 neurons, up to a whole tile.
+pub(super) fn output_quads(width: usize) -> usize {
+    width.div_ceil(4).next_multiple_of(TILE_QUADS as usize)
+}
+
+/// Vectors that the parameters of all layers take.
+pub(super) fn parameter_quads(mlp: &Mlp) -> usize {
+    mlp.layers().iter().map(layer_quads).sum()
+}
+
+fn layer_quads(layer: &Layer) -> usize {
+    output_quads(layer.outputs) * (1 + 4 * input_quads(layer.inputs))
+}
+
+/// Appends biases `[outputs / 4]`, then weights `[inputs / 4, outputs / 4]` in blocks of 4 columns
+/// of 4 neurons, padded with 0: a padded neuron stays 0 under every activation.
+fn pack(layer: &Layer, out: &mut Vec<[f32; 4]>) {
+    let neuron = |quad: usize, i: usize| Some(4 * quad + i).filter(|&row| row < layer.outputs);
+    let quads = output_quads(layer.outputs);
+    let bias = |quad, i| neuron(quad, i).map_or(0.0, |row| layer.bias[row]);
+    out.extend((0..quads).map(|quad| std::array::from_fn(|i| bias(quad, i))));
+    for k in 0..input_quads(layer.inputs) {
+        for quad in 0..quads {
+            for column in 4 * k..4 * k + 4 {
+                let weight = |row: usize| {
+                    if column < layer.inputs {
+                        layer.weight[row * layer.inputs + column]
+                    } else {
+                        0.0
+                    }
+                };
+                out.push(std::array::from_fn(|i| neuron(quad, i).map_or(0.0, weight)));
+            }
+        }
+    }
+}
+
+/// A network on the device.
+pub(super) struct Network {
+    weights: Buffer,
+    activations: [Buffer; 2],
+    layers: Vec<[u32; 3]>,
+}
+
+impl Network {
+    /// Uploads `mlp`; its activations have `row` columns.
+    pub(super) fn new(job: &Job<'_>, mlp: &Mlp, row: u32) -> Self {
+        let mut packed = Vec::with_capacity(parameter_quads(mlp));
+        let mut layers = Vec::new();
+        for layer in mlp.layers() {
+            let shape = [
+                packed.len(),
+                input_quads(layer.inputs),
+                output_quads(layer.outputs),
+            ];
+            layers.push(shape.map(|number| number as u32));
+            pack(layer, &mut packed);
+        }
+        let weights = job.storage(16 * packed.len() as u64);
+        weights.write(job.device, &packed);
+        let widest = layers
+            .iter()
+            .map(|[.., outputs]| *outputs)
+            .max()
+            .unwrap_or(0);
+        let bytes = 16 * u64::from(widest) * u64::from(row);
+        Self {
+            weights,
+            activations: [(); 2].map(|()| job.pool.take(job.device, Use::Storage, bytes)),
+            layers,
+        }
+    }
+
+    /// Where the last layer leaves the controls.
+    pub(super) fn control(&self) -> &Buffer {
+        &self.activations[(self.layers.len() + 1) % 2]
+    }
+
+    /// The layers bound to `state` as their input.
+    pub(super) fn bind(&self, job: &Job<'_>, state: &Buffer) -> Result<Vec<Bound>> {
+        let bind = |i: usize| {
+            let last = i + 1 == self.layers.len();
+            let kernel = if last {
+                Kernel::OutputLayer
+            } else {
+                Kernel::HiddenLayer
+            };
+            let source = if i == 0 {
+                state
+            } else {
+                &self.activations[(i + 1) % 2]
+            };
+            job.bind(kernel, |slot| match slot {
+                Slot::Weights => &self.weights,
+                Slot::Source => source,
+                _ => &self.activations[i % 2],
+            })
+        };
+        (0..self.layers.len()).map(bind).collect()
+    }
+
+    /// Adds the dispatches of all layers over the first `columns` columns, in rows of `row`.
+    pub(super) fn forward<'a>(
+        &self,
+        batch: &mut Batch<'a>,
+        bound: &'a [Bound],
+        columns: u32,
+        row: u32,
+    ) {
+        for (layer, [offset, inputs, outputs]) in bound.iter().zip(&self.layers) {
+            let params = Params {
+                columns,
+                stride: row,
+                layer_offset: *offset,
+                layer_inputs: *inputs,
+                layer_outputs: *outputs,
+                ..Params::default()
+            };
+            let across = columns.div_ceil(MLP_LANES * TILE_COLUMNS);
+            batch.push(layer, &params, [across, outputs / TILE_QUADS]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packed_by_columns_of_four_neurons() {
+        let layer = Layer {
+            weight: (0..15).map(|i| i as f32).collect(),
+            bias: vec![10.0, 20.0, 30.0],
+            inputs: 5,
+            outputs: 3,
+        };
+        let mut packed = Vec::new();
+        pack(&layer, &mut packed);
+        assert_eq!(packed.len(), layer_quads(&layer));
+        assert_eq!(packed[0], [10.0, 20.0, 30.0, 0.0]);
+        assert_eq!(packed[1], [0.0; 4], "bias of the padded tile");
+        assert_eq!(
+            packed[2 + 1],
+            [1.0, 6.0, 11.0, 0.0],
+            "column 1 of the weights"
+        );
+        assert_eq!(
+            packed[2 + 8],
+            [4.0, 9.0, 14.0, 0.0],
+            "column 4 of the weights"
+        );
+        assert_eq!(packed[2 + 9], [0.0; 4], "padded input");
+    }
+}

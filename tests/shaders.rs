@@ -1,0 +1,422 @@
+//! Without a GPU: every composed kernel is valid WGSL and agrees with the Rust side; the layers.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use bytemuck::Zeroable;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{AddressSpace, StorageAccess, TypeInner};
+use reachcast::backend::gpu::Params;
+use reachcast::backend::gpu::compose::{Access, Kernel, Shape, Slot, compose};
+use reachcast::backend::physics;
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::real::Real;
+use reachcast::rollout::Plant;
+use reachcast::system::{Axis, BangBang, Cone, DoubleIntegrator, DroneRace, System};
+
+/// One state, one control: the recorded functions take and return plain numbers.
+struct Scalar;
+
+impl System<1, 1> for Scalar {
+    fn name(&self) -> &str {
+        "scalar"
+    }
+    fn states(&self) -> [Axis; 1] {
+        [Axis::new("x", "m", -1.0, 1.0)]
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("u", "m", -1.0, 1.0)]
+    }
+    fn step<R: Real>(&self, [x]: [R; 1], [u]: [R; 1]) -> [R; 1] {
+        [x.sin() + u]
+    }
+    fn target<R: Real>(&self, [x]: [R; 1]) -> R {
+        x
+    }
+    fn constraint<R: Real>(&self, [x]: [R; 1]) -> R {
+        x.cos()
+    }
+}
+
+/// A formula for any system: the control is the first states, clamped.
+struct Clamped;
+
+impl<const NX: usize, const NU: usize> Policy<NX, NU> for Clamped {
+    fn name(&self) -> String {
+        "clamped".to_owned()
+    }
+    fn control<R: Real>(&self, x: [R; NX]) -> [R; NU] {
+        std::array::from_fn(|i| x[i % NX].clamp(R::lit(-1.0), R::lit(1.0)))
+    }
+}
+
+/// A network with one hidden layer of 5 neurons.
+fn network(states: usize, controls: usize, activation: Activation) -> Mlp {
+    let layer = |inputs: usize, outputs: usize| Layer {
+        weight: vec![0.1; inputs * outputs],
+        bias: vec![0.0; outputs],
+        inputs,
+        outputs,
+    };
+    let layers = vec![layer(states, 5), layer(5, controls)];
+    Mlp::new(layers, activation, OutputActivation::Tanh).expect("a whole network")
+}
+
+/// Shape and physics under a formula and under a network of each activation.
+fn plants<S: System<NX, NU>, const NX: usize, const NU: usize>(
+    system: &S,
+) -> Vec<(String, Shape, String)> {
+    let formula = physics::<_, _, NX, NU>(Plant {
+        system,
+        policy: &Clamped,
+    });
+    let mut all = vec![(
+        format!("{} clamped", system.name()),
+        Shape::new(NX, NU, None),
+        formula,
+    )];
+    for activation in [Activation::Relu, Activation::Tanh, Activation::Silu] {
+        let mlp = network(NX, NU, activation);
+        let text = physics::<_, _, NX, NU>(Plant {
+            system,
+            policy: &mlp,
+        });
+        let name = format!("{} {activation:?}", system.name());
+        all.push((name, Shape::new(NX, NU, Some(&mlp)), text));
+    }
+    all
+}
+
+/// Every plant that the kernels are composed for here.
+fn all_plants() -> Vec<(String, Shape, String)> {
+    let mut all = plants(&Scalar);
+    all.extend(plants(&DoubleIntegrator::default()));
+    let integrator = DoubleIntegrator::default();
+    let policy = BangBang { acceleration: 1.0 };
+    let text = physics(Plant {
+        system: &integrator,
+        policy: &policy,
+    });
+    all.push(("bang-bang".to_owned(), Shape::new(2, 1, None), text));
+    for cone in [Cone::Distance, Cone::Squared, Cone::Root] {
+        let speed_limit = cone == Cone::Distance;
+        all.extend(plants(&DroneRace {
+            cone,
+            speed_limit,
+            ..DroneRace::default()
+        }));
+    }
+    all
+}
+
+/// Parses and validates; the panic shows the place.
+fn validated(name: &str, text: &str) -> (naga::Module, ModuleInfo) {
+    let module = naga::front::wgsl::parse_str(text)
+        .unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(text)));
+    // No capabilities: what every adapter offers must do.
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let info = validator
+        .validate(&module)
+        .unwrap_or_else(|e| panic!("{name}:\n{}", e.emit_to_string(text)));
+    (module, info)
+}
+
+fn each_kernel(mut see: impl FnMut(&str, Kernel, &Shape, &naga::Module, &ModuleInfo)) {
+    for (plant, shape, physics) in all_plants() {
+        for kernel in Kernel::ALL {
+            let name = format!("{kernel:?} of {plant}");
+            let (module, info) = validated(&name, &compose(kernel, &shape, &physics));
+            see(&name, kernel, &shape, &module, &info);
+        }
+    }
+}
+
+/// The name under which the shaders declare a slot.
+fn declared_names(slot: Slot) -> &'static [&'static str] {
+    match slot {
+        Slot::Params => &["params"],
+        Slot::Region => &["region"],
+        Slot::Schedule => &["schedule"],
+        Slot::State => &["state"],
+        Slot::Folds => &["folds"],
+        Slot::Origin => &["origin"],
+        Slot::Control => &["control"],
+        Slot::Measures => &["measures", "pair_measures"],
+        Slot::Distances => &["distances"],
+        Slot::Farthest => &["farthest"],
+        Slot::KeptState => &["kept_state"],
+        Slot::KeptFolds => &["kept_folds"],
+        Slot::KeptOrigin => &["kept_origin"],
+        Slot::Survivors => &["survivors"],
+        Slot::Weights => &["weights"],
+        Slot::Source => &["source"],
+        Slot::Sink => &["sink"],
+    }
+}
+
+#[test]
+fn bindings_are_those_that_rust_lists() {
+    each_kernel(|name, kernel, shape, module, info| {
+        let listed = kernel.bindings(shape.network.is_some());
+        let entry = info.get_entry_point(0);
+        let mut declared = 0;
+        for (handle, variable) in module.global_variables.iter() {
+            let Some(binding) = &variable.binding else {
+                assert_eq!(variable.space, AddressSpace::WorkGroup, "{name}");
+                continue;
+            };
+            declared += 1;
+            let variable_name = variable.name.as_deref().unwrap_or_default();
+            assert_eq!(binding.group, 0, "{name}: {variable_name}");
+            let found = listed
+                .iter()
+                .find(|(slot, _)| *slot as u32 == binding.binding);
+            let (slot, access) =
+                found.unwrap_or_else(|| panic!("{name}: {variable_name} unlisted"));
+            assert!(
+                declared_names(*slot).contains(&variable_name),
+                "{name}: {variable_name} stands in the slot of {slot:?}"
+            );
+            let expected = match variable.space {
+                AddressSpace::Uniform => Access::Uniform,
+                AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
+                    Access::ReadWrite
+                }
+                AddressSpace::Storage { .. } => Access::Read,
+                other => panic!("{name}: {variable_name} lies in {other:?}"),
+            };
+            assert_eq!(*access, expected, "{name}: {variable_name}");
+            let used = !entry[handle].is_empty();
+            assert!(used, "{name}: {variable_name} is declared and never used");
+        }
+        assert_eq!(declared, listed.len(), "{name}: listed but not declared");
+    });
+}
+
+#[test]
+fn entry_points_and_workgroups() {
+    each_kernel(|name, kernel, _, module, _| {
+        let [entry] = module.entry_points.as_slice() else {
+            panic!("{name} has not one entry point");
+        };
+        assert_eq!(entry.name, kernel.entry(), "{name}");
+        assert_eq!(entry.workgroup_size, [kernel.workgroup(), 1, 1], "{name}");
+    });
+}
+
+#[test]
+fn storage_fits_the_least_that_adapters_offer() {
+    for network in [false, true] {
+        for kernel in Kernel::ALL {
+            let storage = kernel
+                .bindings(network)
+                .iter()
+                .filter(|(_, access)| *access != Access::Uniform)
+                .count();
+            assert!(storage <= 8, "{kernel:?} binds {storage} storage buffers");
+        }
+    }
+}
+
+#[test]
+fn uniform_block_has_the_layout_of_params() {
+    // Each field in turn, in the order of the Rust struct.
+    let zero = Params::zeroed();
+    macro_rules! offsets {
+        ($($field:ident),*) => {{
+            // Fails to compile if a field is missing.
+            let Params { $($field: _),* } = zero;
+            vec![$((stringify!($field), std::mem::offset_of!(Params, $field))),*]
+        }};
+    }
+    let expected = offsets!(
+        key_low,
+        key_high,
+        stream,
+        zero,
+        pair_key_low,
+        pair_key_high,
+        pair_stream,
+        pair_radius,
+        first_low,
+        first_high,
+        columns,
+        stride,
+        step,
+        steps,
+        horizon,
+        region_kind,
+        paired,
+        closed_loop,
+        sign_only,
+        layer_offset,
+        layer_inputs,
+        layer_outputs,
+        segment_start,
+        pad
+    );
+    each_kernel(|name, _, _, module, _| {
+        let (_, params) = module
+            .types
+            .iter()
+            .find(|(_, kind)| kind.name.as_deref() == Some("Params"))
+            .unwrap_or_else(|| panic!("{name} has no Params"));
+        let TypeInner::Struct { members, span } = &params.inner else {
+            panic!("{name}: Params is not a struct");
+        };
+        let declared: Vec<(&str, usize)> = members
+            .iter()
+            .map(|member| (member.name.as_deref().unwrap_or(""), member.offset as usize))
+            .collect();
+        assert_eq!(declared, expected, "{name}");
+        assert_eq!(*span as usize, size_of::<Params>(), "{name}");
+        for member in members {
+            let float = member.name.as_deref() == Some("pair_radius");
+            let scalar = if float {
+                naga::Scalar::F32
+            } else {
+                naga::Scalar::U32
+            };
+            let inner = &module.types[member.ty].inner;
+            assert_eq!(*inner, TypeInner::Scalar(scalar), "{name}");
+        }
+    });
+}
+
+#[test]
+fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
+    use reachcast::backend::gpu::compose::{TILE_COLUMNS, TILE_QUADS};
+    let (_, shape, physics) = all_plants().swap_remove(1);
+    let text = compose(Kernel::HiddenLayer, &shape, &physics);
+    assert!(text.contains(&format!("const TILE_COLUMNS: u32 = {TILE_COLUMNS}u;")));
+    let stores = text.matches("sink[there").count() as u32;
+    assert_eq!(stores, TILE_COLUMNS * TILE_QUADS);
+}
+
+/// Layer of each top-level module; a file may name its own layer and those above it.
+const LAYERS: [(&str, u32); 13] = [
+    ("real", 1),
+    ("error", 1),
+    ("digest", 1),
+    ("system", 2),
+    ("policy", 2),
+    ("rollout", 3),
+    ("backend", 4),
+    ("scenario", 5),
+    ("report", 8),
+    ("cli", 9),
+    ("config", 9),
+    ("main", 9),
+    ("lib", 9),
+];
+
+fn layer(module: &str) -> Option<u32> {
+    LAYERS
+        .iter()
+        .find(|(name, _)| *name == module)
+        .map(|(_, layer)| *layer)
+}
+
+fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("the source folder") {
+        let path = entry.expect("an entry of the source folder").path();
+        if path.is_dir() {
+            rust_files(&path, out);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+/// Files of `src` as (path within it, text without comment lines).
+fn sources() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    rust_files(&root, &mut files);
+    let read = |path: PathBuf| {
+        let text = fs::read_to_string(&path).expect("a source file");
+        let code = text
+            .lines()
+            .filter(|line| !line.trim_start().starts_with("//"));
+        let code = code.collect::<Vec<_>>().join("\n");
+        let name = path.strip_prefix(&root).expect("a file of src");
+        (name.to_string_lossy().replace('\\', "/"), code)
+    };
+    files.into_iter().map(read).collect()
+}
+
+/// Top-level modules that `code` names after `crate::` or `reachcast::`, also in braces.
+fn imports(code: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for (prefix, rest) in ["crate::", "reachcast::"].iter().flat_map(|prefix| {
+        code.match_indices(prefix)
+            .map(|(at, p)| (p, &code[at + p.len()..]))
+    }) {
+        let _ = prefix;
+        let word = |text: &str| -> String {
+            text.chars()
+                .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
+                .collect()
+        };
+        match rest.strip_prefix('{') {
+            None => found.push(word(rest)),
+            Some(list) => {
+                let (mut depth, mut start) = (0, true);
+                for (at, c) in list.char_indices() {
+                    match c {
+                        '{' => depth += 1,
+                        '}' if depth == 0 => break,
+                        '}' => depth -= 1,
+                        ',' if depth == 0 => start = true,
+                        c if start && !c.is_whitespace() => {
+                            found.push(word(&list[at..]));
+                            start = false;
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn imports_of_braces_and_paths_are_seen() {
+    let code = "use crate::{error::{Error, Result}, real::Real};\nlet x = crate::cli::run();";
+    assert_eq!(imports(code), ["error", "real", "cli"]);
+}
+
+#[test]
+fn a_file_imports_only_from_its_layer_and_above() {
+    let files = sources();
+    assert!(files.len() > 20, "only {} files seen", files.len());
+    for (name, code) in files {
+        let module = name.split(['/', '.']).next().unwrap_or_default();
+        let own = layer(module).unwrap_or_else(|| panic!("{name} belongs to no layer"));
+        for import in imports(&code) {
+            // Names that are not modules are re-exports of `lib.rs` from the first layer.
+            let theirs = layer(&import).unwrap_or(1);
+            assert!(
+                theirs <= own,
+                "{name} (layer {own}) imports {import} ({theirs})"
+            );
+        }
+    }
+}
+
+#[test]
+fn only_the_gpu_backend_names_wgpu() {
+    let mut inside = 0;
+    for (name, code) in sources() {
+        if name.starts_with("backend/gpu/") {
+            inside += code.matches("wgpu").count();
+        } else {
+            assert!(!code.contains("wgpu"), "{name} names the GPU library");
+        }
+    }
+    assert!(
+        inside > 0,
+        "the search finds nothing, not even where it must"
+    );
+}
