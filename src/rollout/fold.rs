@@ -1,6 +1,6 @@
 //! The reach-avoid measure of a trajectory, folded step by step.
 
-use crate::real::Real;
+use crate::real::{Lanes, Real};
 
 /// Larger than any margin: stands for infinity, which shaders must not count on.
 pub const HUGE: f32 = 1.0e30;
@@ -46,6 +46,16 @@ impl<R: Real> Fold<R> {
     #[inline(always)]
     pub fn safe(&self) -> R {
         self.safe
+    }
+}
+
+impl<const N: usize> Fold<Lanes<N>> {
+    /// Copies lane `from` of `source` to lane `to`.
+    #[inline(always)]
+    pub fn copy_lane(&mut self, to: usize, source: &Self, from: usize) {
+        self.discount.0[to] = source.discount.0[from];
+        self.safe.0[to] = source.safe.0[from];
+        self.best.0[to] = source.best.0[from];
     }
 }
 

@@ -210,7 +210,7 @@ impl<const NX: usize> Region<NX> {
             Self::Ball(ball) => {
                 // V_n = V_{n-2} 2 pi / n, from V_0 = 1 and V_1 = 2.
                 let unit = |n: usize| {
-                    let first = if n % 2 == 0 { 1.0 } else { 2.0 };
+                    let first = if n.is_multiple_of(2) { 1.0 } else { 2.0 };
                     let factors = (2..=n).filter(|k| k % 2 == n % 2);
                     factors.fold(first, |v, k| v * std::f64::consts::TAU / k as f64)
                 };

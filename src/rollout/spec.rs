@@ -81,7 +81,8 @@ impl Tightening {
 pub enum Query {
     /// The reach-avoid measure.
     Measure,
-    /// Its sign, 1 or -1 ([`super::NON_FINITE`] as it is); a decided rollout stops early.
+    /// Its sign, 1 or -1, of a rollout that stops once it is decided; [`super::NON_FINITE`] where
+    /// a state that is not finite decides.
     Sign,
 }
 

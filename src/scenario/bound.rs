@@ -1,7 +1,7 @@
 //! Scenario counts and certified risks: how many samples a claim needs and what a count supports.
 //!
 //! `epsilon` is the risk, `beta` the chance that the sample misleads: both strictly between 0
-//! and 1. Counts are exact up to rounding: a tail within 1e-13 (relative) of `beta` may go
+//! and 1. Counts are exact up to rounding: a tail within 1e-11 (relative) of `beta` may go
 //! either way.
 
 use super::tail::{ln_at_least, ln_at_most, ln_term};

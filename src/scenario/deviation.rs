@@ -262,12 +262,18 @@ where
         PairControl::Replay => "the same controls replayed",
         PairControl::ClosedLoop => "the policy in feedback on both",
     };
-    let statement = format!(
-        "With confidence 1 - {}, a fresh pair stays within the bound {joint} with probability at \
-         least {}, {driven}.",
+    let confidence = format!(
+        "With confidence 1 - {}, a fresh pair stays within the scenario bound {joint} with \
+         probability at least {}, {driven}.",
         asked.beta,
         1.0 - asked.epsilon
     );
+    let statement = match asked.source {
+        DeviationSource::Scenario => confidence,
+        DeviationSource::Exact => format!(
+            "The margins are tightened with the exact supremum, which no pair exceeds. {confidence}"
+        ),
+    };
     let region = Region::new_box(settings.low, settings.high)?;
     let (dimension, frozen) = super::certify::coordinates(system, &region.varies());
     // Risk of one program, times the programs whose risks add up.

@@ -242,7 +242,7 @@ where
         ),
         measure: format!(
             "start uniform in the Euclidean ball of radius {:.4} in {dimension} of {NX} \
-             coordinates, the others frozen at the state's values",
+             coordinates, the others frozen at the centre's values",
             ball.radius
         ),
         dimension,

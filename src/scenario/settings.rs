@@ -3,6 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::rollout::{PairControl, RolloutSpec};
+use crate::system::System;
+
+/// Cells of a default slice along each axis.
+const SLICE_CELLS: u16 = 21;
 
 /// How the deviation bounds of all steps hold together, `docs/method.md` section 8.1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,4 +138,64 @@ pub struct Settings<const NX: usize> {
     pub state: [f32; NX],
     /// Local growth.
     pub growth: GrowthSettings<NX>,
+}
+
+impl<const NX: usize> Settings<NX> {
+    /// Sound settings for `system` around `state`, to be adjusted field by field: risk 0.1 and
+    /// beta 1e-3 throughout, computed constants, a joint deviation bound of radius 0.05 by fixed
+    /// shape under replayed controls, 20,000 draws, a slice of 21 by 21 cells over the first two
+    /// states, growth in all coordinates from radius 0.5 in at most 10 rounds with beta split.
+    ///
+    /// # Panics
+    /// If the system has a single state: there is no slice.
+    pub fn new<S, const NU: usize>(system: &S, state: [f32; NX], spec: RolloutSpec) -> Self
+    where
+        S: System<NX, NU>,
+    {
+        assert!(NX > 1, "a slice needs two states");
+        let axes = system.states();
+        let (epsilon, beta, scenarios) = (0.1, 1e-3, 159);
+        let slice = [0, 1].map(|state| {
+            let step = (axes[state].high - axes[state].low) / f32::from(SLICE_CELLS - 1);
+            let value = |i| axes[state].low + f32::from(i) * step;
+            SliceAxis {
+                state,
+                values: (0..SLICE_CELLS).map(value).collect(),
+            }
+        });
+        Self {
+            seed: 1,
+            spec,
+            low: std::array::from_fn(|i| axes[i].low),
+            high: std::array::from_fn(|i| axes[i].high),
+            constants: ConstantSettings::default(),
+            deviation: DeviationSettings {
+                radius: 0.05,
+                epsilon,
+                beta,
+                scenarios,
+                pilot: scenarios,
+                joint: Joint::FixedShape,
+                control: PairControl::Replay,
+                source: DeviationSource::Scenario,
+            },
+            global: GlobalSettings {
+                draws: 20_000,
+                beta,
+            },
+            slice,
+            state,
+            growth: GrowthSettings {
+                radius: 0.5,
+                rounds: 10,
+                scenarios,
+                epsilon,
+                beta,
+                split_beta: true,
+                varies: [true; NX],
+                boundary: BoundarySearch::Rays,
+                heading: None,
+            },
+        }
+    }
 }

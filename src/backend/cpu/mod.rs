@@ -1,32 +1,55 @@
 //! The native CPU backend: tiles of trajectories in SIMD lanes, tiles spread over threads.
 
+mod deviation;
+mod dispatch;
+mod early_exit;
+mod kernel;
+#[cfg(target_arch = "x86_64")]
+mod kernel_x86;
+mod mlp;
+mod reach_avoid;
+mod schedule;
+#[cfg(test)]
+mod tests;
+mod tile;
+
 use rayon::prelude::*;
 
+use self::deviation::Deviation;
+use self::dispatch::Instructions;
+use self::mlp::Packed;
+use self::reach_avoid::ReachAvoid;
+use self::schedule::{Schedule, chunks};
 use super::{MeasureSink, PairSink};
 use crate::error::{Error, Result};
 use crate::policy::Policy;
 use crate::rollout::{
-    DeviationTask, Farthest, Fold, HUGE, NON_FINITE, PairControl, PairMeasure, Plant, Query,
-    ReachAvoidTask,
+    DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };
 use crate::system::System;
-
-/// Starts whose results are held at a time.
-const CHUNK: u64 = 65_536;
 
 /// The host's processor.
 #[derive(Debug)]
 pub struct Cpu {
     pool: rayon::ThreadPool,
+    instructions: Instructions,
     model: String,
 }
 
 impl Cpu {
     /// The processor with `threads` threads of its own; by default as many as it runs at once.
     ///
+    /// The widest instructions that it has are used, whatever the program was compiled for. The
+    /// results do not depend on the threads.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for 0 threads, [`Error::Device`] if the system refuses them.
     pub fn new(threads: Option<usize>) -> Result<Self> {
+        Self::with_instructions(threads, Instructions::detect()[0])
+    }
+
+    /// The same with an instruction set of choice.
+    fn with_instructions(threads: Option<usize>, instructions: Instructions) -> Result<Self> {
         if threads == Some(0) {
             let problem = "0 threads cannot do any work; give at least 1, or leave it out";
             return Err(Error::invalid("threads", problem));
@@ -40,6 +63,7 @@ impl Cpu {
             .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
         Ok(Self {
             pool,
+            instructions,
             model: model_name(),
         })
     }
@@ -48,7 +72,8 @@ impl Cpu {
     pub fn device(&self) -> String {
         let threads = self.pool.current_num_threads();
         let plural = if threads == 1 { "" } else { "s" };
-        format!("{}, {threads} thread{plural}", self.model)
+        let instructions = self.instructions.name();
+        format!("{}, {threads} thread{plural}, {instructions}", self.model)
     }
 
     /// See [`super::Backend::reach_avoid`].
@@ -62,22 +87,28 @@ impl Cpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        let mut first = task.range.start;
-        while first < task.range.end {
-            let end = task.range.end.min(first + CHUNK);
-            let measure = |index: u64| {
-                let measure = rollout(plant, task, task.starts.start(index));
-                match task.query {
-                    Query::Sign if measure > 0.0 => 1.0,
-                    Query::Sign if measure > NON_FINITE => -1.0,
-                    _ => measure,
-                }
-            };
-            let values: Vec<f32> = self
-                .pool
-                .install(|| (first..end).into_par_iter().map(measure).collect());
-            sink(first, &values)?;
-            first = end;
+        check(&task.starts, task.range.end, task.tightening, &task.spec)?;
+        let network = self.pack::<P, NX, NU>(plant.policy)?;
+        let network = network.as_ref();
+        let mut measures = Vec::new();
+        for chunk in chunks(&task.range) {
+            let schedule = self.schedule(chunk.count, network);
+            measures.resize(chunk.count, 0.0);
+            let units = measures.chunks_mut(schedule.unit).enumerate();
+            let units: Vec<_> = units.collect();
+            self.pool.install(|| {
+                units.into_par_iter().for_each(|(unit, out)| {
+                    self.instructions.run(ReachAvoid {
+                        plant,
+                        network,
+                        task,
+                        width: schedule.width,
+                        first: chunk.first + (unit * schedule.unit) as u64,
+                        out,
+                    });
+                });
+            });
+            sink(chunk.first, &measures)?;
         }
         Ok(())
     }
@@ -93,110 +124,78 @@ impl Cpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
+        check(
+            &task.pairs.nominal,
+            task.range.end,
+            task.tightening,
+            &task.spec,
+        )?;
+        let network = self.pack::<P, NX, NU>(plant.policy)?;
+        let network = network.as_ref();
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
-        let mut first = task.range.start;
-        while first < task.range.end {
-            let end = task.range.end.min(first + CHUNK);
-            let both: Vec<(PairMeasure, Vec<f32>)> = self.pool.install(|| {
-                let pairs = (first..end).into_par_iter();
-                pairs.map(|pair| side_by_side(plant, task, pair)).collect()
+        let mut measures = Vec::new();
+        for chunk in chunks(&task.range) {
+            let schedule = self.schedule(chunk.count, network);
+            measures.resize(chunk.count, PairMeasure::default());
+            let units: Vec<_> = measures.chunks_mut(schedule.unit).enumerate().collect();
+            let found: Vec<Vec<Farthest>> = self.pool.install(|| {
+                let units = units.into_par_iter().map(|(unit, out)| {
+                    self.instructions.run(Deviation {
+                        plant,
+                        network,
+                        task,
+                        width: schedule.width,
+                        first: chunk.first + (unit * schedule.unit) as u64,
+                        out,
+                    })
+                });
+                units.collect()
             });
-            for (pair, (_, distances)) in (first..end).zip(&both) {
-                for (farthest, &distance) in farthest.iter_mut().zip(distances) {
-                    *farthest = farthest.merge(Farthest { distance, pair });
-                }
+            for found in found {
+                let steps = farthest.iter_mut().zip(found);
+                steps.for_each(|(farthest, found)| *farthest = farthest.merge(found));
             }
-            let measures: Vec<PairMeasure> = both.into_iter().map(|(measure, _)| measure).collect();
-            sink(first, &measures)?;
-            first = end;
+            sink(chunk.first, &measures)?;
         }
         Ok(farthest)
     }
+
+    /// The network of `policy`, if it is one, packed for the kernel.
+    fn pack<P, const NX: usize, const NU: usize>(&self, policy: &P) -> Result<Option<Packed>>
+    where
+        P: Policy<NX, NU>,
+    {
+        let network = Packed::of::<P, NX, NU>(policy)?;
+        Ok(network.map(|network| Packed::new(network, self.instructions.rows())))
+    }
+
+    fn schedule(&self, count: usize, network: Option<&Packed>) -> Schedule {
+        let threads = self.pool.current_num_threads();
+        Schedule::new(count, threads, network.map(Packed::widest))
+    }
 }
 
-/// Fold of one trajectory that a state or margin that is not finite ends.
-struct Judge {
-    fold: Fold<f32>,
-    failed: bool,
-}
-
-impl Judge {
-    fn add<S: System<NX, NU>, const NX: usize, const NU: usize>(
-        &mut self,
-        system: &S,
-        x: [f32; NX],
-        less: [f32; 2],
-        gamma: f32,
-    ) {
-        let (target, constraint) = (system.target(x) - less[0], system.constraint(x) - less[1]);
-        let finite = |x: &f32| x.to_bits() & 0x7f80_0000 != 0x7f80_0000;
-        self.failed |= !x.iter().chain(&[target, constraint]).all(finite);
-        if !self.failed {
-            self.fold.add(target, constraint, gamma);
+/// Checks a task against its list of starts and its horizon.
+fn check<const NX: usize>(
+    starts: &Starts<'_, NX>,
+    end: u64,
+    tightening: &Tightening,
+    spec: &RolloutSpec,
+) -> Result<()> {
+    if let Starts::Listed(list) = starts
+        && end > list.len() as u64
+    {
+        let problem = format!("ends at {end}, but the list has {} starts", list.len());
+        return Err(Error::invalid("range of starts", problem));
+    }
+    let steps = spec.horizon as usize + 1;
+    for values in [&tightening.target, &tightening.constraint] {
+        if values.len() != steps {
+            let problem = format!("has {} values, expected {steps}, T + 1", values.len());
+            return Err(Error::invalid("tightening", problem));
         }
     }
-
-    fn measure(&self) -> f32 {
-        let measure = self.fold.measure();
-        if self.failed && measure <= 0.0 {
-            NON_FINITE
-        } else {
-            measure
-        }
-    }
-}
-
-fn rollout<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    Plant { system, policy }: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
-    mut x: [f32; NX],
-) -> f32 {
-    let mut judge = Judge {
-        fold: Fold::new(),
-        failed: false,
-    };
-    for t in 0..=task.spec.horizon as usize {
-        let less = [task.tightening.target[t], task.tightening.constraint[t]];
-        judge.add(system, x, less, task.spec.gamma);
-        x = system.step(x, policy.control(x));
-    }
-    judge.measure()
-}
-
-fn side_by_side<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    Plant { system, policy }: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
-    pair: u64,
-) -> (PairMeasure, Vec<f32>) {
-    let [mut nominal, mut perturbed] = task.pairs.load::<1>(pair).map(|x| x.map(|x| x.0[0]));
-    let new = || Judge {
-        fold: Fold::new(),
-        failed: false,
-    };
-    let [mut first, mut second] = [new(), new()];
-    let mut distances = Vec::new();
-    for t in 0..=task.spec.horizon as usize {
-        let square = (0..NX).fold(0.0, |sum, i| {
-            let gap = perturbed[i] - nominal[i];
-            sum + gap * gap
-        });
-        let distance: f32 = f32::sqrt(square);
-        distances.push(if distance.is_finite() { distance } else { HUGE });
-        let less = [task.tightening.target[t], task.tightening.constraint[t]];
-        first.add(system, nominal, less, task.spec.gamma);
-        second.add(system, perturbed, [0.0; 2], task.spec.gamma);
-        let u = policy.control(nominal);
-        perturbed = match task.control {
-            PairControl::Replay => system.step(perturbed, u),
-            PairControl::ClosedLoop => system.step(perturbed, policy.control(perturbed)),
-        };
-        nominal = system.step(nominal, u);
-    }
-    let measure = PairMeasure {
-        nominal: first.measure(),
-        perturbed: second.measure(),
-    };
-    (measure, distances)
+    Ok(())
 }
 
 /// The processor's name as the system knows it, else its architecture.

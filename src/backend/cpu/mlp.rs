@@ -1,0 +1,231 @@
+//! A network for a tile of trajectories in lockstep: weights packed in panels, activations in
+//! blocks.
+
+use super::kernel::{GRANULE, Kernel, Panel};
+use crate::error::{Error, Result};
+use crate::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use crate::real::Lanes;
+
+/// A network whose weights are in the order in which a kernel reads them.
+#[derive(Debug)]
+pub(super) struct Packed {
+    layers: Vec<PackedLayer>,
+    /// Widest layer or input.
+    widest: usize,
+}
+
+/// A layer cut into panels of the kernel's rows, each `[inputs, rows]`; the last may have fewer.
+#[derive(Debug)]
+struct PackedLayer {
+    weights: Vec<f32>,
+    bias: Vec<f32>,
+    inputs: usize,
+    squash: Squash,
+}
+
+/// What comes after the sums.
+#[derive(Clone, Copy, Debug)]
+enum Squash {
+    Hidden(Activation),
+    Output(OutputActivation),
+}
+
+impl Packed {
+    /// The network of `policy`, if it is one.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the network does not map `NX` states to `NU` controls.
+    pub(super) fn of<P, const NX: usize, const NU: usize>(policy: &P) -> Result<Option<&Mlp>>
+    where
+        P: Policy<NX, NU>,
+    {
+        let Some(network) = policy.network() else {
+            return Ok(None);
+        };
+        let widths = network.widths();
+        let (inputs, outputs) = (widths[0], widths[widths.len() - 1]);
+        if (inputs, outputs) != (NX, NU) {
+            let problem = format!(
+                "the network maps {inputs} inputs to {outputs} outputs, \
+                 the system has {NX} states and {NU} controls"
+            );
+            return Err(Error::invalid("policy", problem));
+        }
+        Ok(Some(network))
+    }
+
+    /// Packs `network` for panels of `rows` neurons.
+    pub(super) fn new(network: &Mlp, rows: usize) -> Self {
+        let last = network.layers().len() - 1;
+        let squash = |i| {
+            if i == last {
+                Squash::Output(network.output())
+            } else {
+                Squash::Hidden(network.activation())
+            }
+        };
+        let layers = network.layers().iter().enumerate();
+        Self {
+            layers: layers
+                .map(|(i, layer)| PackedLayer::new(layer, rows, squash(i)))
+                .collect(),
+            widest: network.widths().into_iter().max().unwrap_or(0),
+        }
+    }
+
+    /// Widest layer or input: it decides how many trajectories fit the caches.
+    pub(super) fn widest(&self) -> usize {
+        self.widest
+    }
+}
+
+impl PackedLayer {
+    fn new(layer: &Layer, rows: usize, squash: Squash) -> Self {
+        let mut weights = Vec::with_capacity(layer.weight.len());
+        for panel in layer.weight.chunks(rows * layer.inputs) {
+            for column in 0..layer.inputs {
+                weights.extend(panel[column..].iter().step_by(layer.inputs));
+            }
+        }
+        Self {
+            weights,
+            bias: layer.bias.clone(),
+            inputs: layer.inputs,
+            squash,
+        }
+    }
+
+    /// The layer for `lanes` trajectories; `inputs` and `outputs` are `[blocks, features, BLOCK]`.
+    #[inline(always)]
+    fn forward<K: Kernel, const N: usize>(
+        &self,
+        kernel: K,
+        lanes: usize,
+        inputs: &[f32],
+        outputs: &mut [f32],
+    ) {
+        let floor = match self.squash {
+            Squash::Hidden(Activation::Relu) => 0.0,
+            _ => f32::NEG_INFINITY,
+        };
+        let (block_in, block_out) = (self.inputs * K::BLOCK, self.bias.len() * K::BLOCK);
+        let panels = self.weights.chunks(K::ROWS * self.inputs);
+        for (p, (weights, bias)) in panels.zip(self.bias.chunks(K::ROWS)).enumerate() {
+            let panel = Panel {
+                weights,
+                bias,
+                floor,
+            };
+            for block in 0..lanes.div_ceil(K::BLOCK) {
+                let x = &inputs[block * block_in..][..block_in];
+                let first = block * block_out + p * K::ROWS * K::BLOCK;
+                let y = &mut outputs[first..][..bias.len() * K::BLOCK];
+                kernel.panel(panel, lanes - block * K::BLOCK, x, y);
+                self.squash.apply::<N>(y);
+            }
+        }
+    }
+}
+
+impl Squash {
+    /// Applies it to `values`, but for the rectifier, which the kernel has applied.
+    #[inline(always)]
+    fn apply<const N: usize>(self, values: &mut [f32]) {
+        match self {
+            Self::Hidden(Activation::Relu) | Self::Output(OutputActivation::Identity) => {}
+            Self::Hidden(Activation::Tanh) => {
+                in_lanes::<N>(
+                    values,
+                    |x| Activation::Tanh.apply(x),
+                    |x| Activation::Tanh.apply(x),
+                );
+            }
+            Self::Hidden(Activation::Silu) => {
+                in_lanes::<N>(
+                    values,
+                    |x| Activation::Silu.apply(x),
+                    |x| Activation::Silu.apply(x),
+                );
+            }
+            Self::Output(OutputActivation::Tanh) => in_lanes::<N>(
+                values,
+                |x| OutputActivation::Tanh.apply(x),
+                |x| OutputActivation::Tanh.apply(x),
+            ),
+        }
+    }
+}
+
+/// Maps `values`, a multiple of a granule, by the widest lanes that fit.
+#[inline(always)]
+fn in_lanes<const N: usize>(
+    values: &mut [f32],
+    wide: impl Fn(Lanes<N>) -> Lanes<N>,
+    narrow: impl Fn(Lanes<GRANULE>) -> Lanes<GRANULE>,
+) {
+    let (groups, rest) = values.as_chunks_mut::<N>();
+    for group in groups {
+        *group = wide(Lanes(*group)).0;
+    }
+    for group in rest.as_chunks_mut::<GRANULE>().0 {
+        *group = narrow(Lanes(*group)).0;
+    }
+}
+
+/// A packed network with the activations of a tile, `[blocks, features, BLOCK]` twice.
+#[derive(Debug)]
+pub(super) struct Evaluator<'a, K> {
+    network: &'a Packed,
+    kernel: K,
+    inputs: Vec<f32>,
+    outputs: Vec<f32>,
+}
+
+impl<'a, K: Kernel> Evaluator<'a, K> {
+    /// Room for tiles of up to `lanes` trajectories.
+    pub(super) fn new(network: &'a Packed, kernel: K, lanes: usize) -> Self {
+        let size = lanes.next_multiple_of(K::BLOCK) * network.widest();
+        Self {
+            network,
+            kernel,
+            inputs: vec![0.0; size],
+            outputs: vec![0.0; size],
+        }
+    }
+
+    /// The outputs for the first `lanes` trajectories of the groups `x`.
+    #[inline(always)]
+    pub(super) fn forward<const N: usize, const NX: usize, const NU: usize>(
+        &mut self,
+        x: &[[Lanes<N>; NX]],
+        lanes: usize,
+        u: &mut [[Lanes<N>; NU]],
+    ) {
+        for granule in 0..lanes.div_ceil(GRANULE) {
+            let (group, lane, at) = places::<K, N, NX>(granule);
+            for (feature, x) in x[group].iter().enumerate() {
+                self.inputs[at + feature * K::BLOCK..][..GRANULE]
+                    .copy_from_slice(&x.0[lane..][..GRANULE]);
+            }
+        }
+        for layer in &self.network.layers {
+            layer.forward::<K, N>(self.kernel, lanes, &self.inputs, &mut self.outputs);
+            std::mem::swap(&mut self.inputs, &mut self.outputs);
+        }
+        for granule in 0..lanes.div_ceil(GRANULE) {
+            let (group, lane, at) = places::<K, N, NU>(granule);
+            for (feature, u) in u[group].iter_mut().enumerate() {
+                u.0[lane..][..GRANULE]
+                    .copy_from_slice(&self.inputs[at + feature * K::BLOCK..][..GRANULE]);
+            }
+        }
+    }
+}
+
+/// Where a granule lies: its group, its first lane there, and its offset in `[blocks, F, BLOCK]`.
+#[inline(always)]
+fn places<K: Kernel, const N: usize, const F: usize>(granule: usize) -> (usize, usize, usize) {
+    let first = granule * GRANULE;
+    let at = first / K::BLOCK * F * K::BLOCK + first % K::BLOCK;
+    (first / N, first % N, at)
+}
