@@ -5,6 +5,7 @@
 use nalgebra::DMatrix;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
+use reachcast::backend::gpu::{Choice, Gpu};
 use reachcast::policy::Mlp;
 use reachcast::real::Real;
 use reachcast::rollout::{PairControl, RolloutSpec};
@@ -24,22 +25,17 @@ pub(crate) fn cpu(threads: usize) -> Backend {
     Backend::Cpu(Cpu::new(Some(threads)).expect("threads start"))
 }
 
-/// Every backend of this machine.
+/// Every backend of this machine: the CPU, and an adapter (software included) where one opens.
 pub(crate) fn backends() -> Vec<Backend> {
     let mut all = vec![cpu(2)];
-    match adapter() {
-        Some(gpu) => all.push(gpu),
-        None if std::env::var_os("REACHCAST_REQUIRE_GPU").is_some_and(|v| v == "1") => {
-            panic!("REACHCAST_REQUIRE_GPU=1, but no adapter opens")
+    match Gpu::open(&Choice::Any) {
+        Ok(gpu) => all.push(Backend::Gpu(gpu)),
+        Err(error) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
+            panic!("REACHCAST_REQUIRE_GPU is 1: {error}")
         }
-        None => println!("SKIPPED: no adapter"),
+        Err(_) => println!("SKIPPED: no adapter"),
     }
     all
-}
-
-/// The machine's adapter, software included.
-fn adapter() -> Option<Backend> {
-    None
 }
 
 /// The trained race policy of the repository.
