@@ -69,12 +69,10 @@ impl Cpu {
         })
     }
 
-    /// The processor in words: model, threads and instruction set.
+    /// The processor in words: model and instruction set. Not the number of threads: nothing that a
+    /// certificate says depends on it.
     pub fn device(&self) -> String {
-        let threads = self.pool.current_num_threads();
-        let plural = if threads == 1 { "" } else { "s" };
-        let instructions = self.instructions.name();
-        format!("{}, {threads} thread{plural}, {instructions}", self.model)
+        format!("{}, {}", self.model, self.instructions.name())
     }
 
     /// See [`super::Backend::reach_avoid`].
