@@ -17,11 +17,8 @@ impl System<3, 1> for Dubins {
         "dubins"
     }
     fn states(&self) -> [Axis; 3] {
-        [
-            Axis::new("x", "m", -2.5, -1.5),
-            Axis::new("y", "m", -1.0, 1.0),
-            Axis::new("heading", "rad", -0.5, 0.5),
-        ]
+        let axis = Axis::new;
+        [axis("x", "m", -2.5, -1.5), axis("y", "m", -1.0, 1.0), axis("heading", "rad", -0.5, 0.5)]
     }
     fn controls(&self) -> [Axis; 1] {
         [Axis::new("turn_rate", "rad/s", -1.0, 1.0)]
@@ -30,11 +27,7 @@ impl System<3, 1> for Dubins {
     fn step<R: Real>(&self, [x, y, heading]: [R; 3], [turn]: [R; 1]) -> [R; 3] {
         let dt = R::lit(0.1);
         let turn = turn.clamp(R::lit(-1.0), R::lit(1.0));
-        [
-            x + dt * heading.cos(),
-            y + dt * heading.sin(),
-            heading + dt * turn,
-        ]
+        [x + dt * heading.cos(), y + dt * heading.sin(), heading + dt * turn]
     }
     #[inline(always)]
     fn target<R: Real>(&self, [x, y, _]: [R; 3]) -> R {
@@ -45,11 +38,7 @@ impl System<3, 1> for Dubins {
         x.hypot(y) - R::lit(0.5)
     }
     fn bodies(&self) -> Vec<Body> {
-        vec![Body {
-            name: "car".to_owned(),
-            x: 0,
-            y: 1,
-        }]
+        vec![Body { name: "car".to_owned(), x: 0, y: 1 }]
     }
 }
 
@@ -72,32 +61,17 @@ impl Policy<3, 1> for Steer {
 }
 
 /// The certificate for starts left of the obstacle, 6 seconds to reach the target.
-fn certificate(backend: &Backend) -> Result<Record> {
+pub(crate) fn certificate(backend: &Backend) -> Result<Record> {
     let spec = RolloutSpec::new(60, 0.98)?;
     let mut settings = Settings::new(&Dubins, [-2.4, 0.9, 0.4], spec);
     settings.deviation.radius = 0.02;
     settings.global.draws = 4000;
-    let plant = Plant {
-        system: &Dubins,
-        policy: &Steer,
-    };
-    certify(
-        backend,
-        plant,
-        &settings,
-        serde_json::Value::Null,
-        &Unwatched,
-    )
+    let (system, policy) = (&Dubins, &Steer);
+    certify(backend, Plant { system, policy }, &settings, "dubins".into(), &Unwatched)
 }
 
 fn main() -> Result<()> {
     let record = certificate(&Backend::Cpu(Cpu::new(None)?))?;
-    for statement in &record.statements {
-        println!("{statement}");
-    }
-    println!(
-        "{:?} {} {:?} {}",
-        record.deviation.bound, record.global.reached, record.constants, record.state.check_margin
-    );
+    println!("{}", record.statements.join("\n"));
     Ok(())
 }

@@ -69,18 +69,12 @@ pub enum Error {
 impl Error {
     /// An [`Error::Invalid`] at `place`.
     pub fn invalid(place: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self::Invalid {
-            place: place.into(),
-            problem: problem.into(),
-        }
+        Self::Invalid { place: place.into(), problem: problem.into() }
     }
 
     /// An [`Error::File`] about `path`.
     pub fn file(path: &Path, problem: impl std::fmt::Display) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            problem: problem.to_string(),
-        }
+        Self::File { path: path.to_owned(), problem: problem.to_string() }
     }
 
     /// Exit code of the command line: 2 for wrong usage, config or input, 1 for failed work.

@@ -71,10 +71,7 @@ struct Visit {
 fn browser() -> bool {
     let found = Path::new(CHROMIUM).exists();
     let required = std::env::var("REACHCAST_REQUIRE_CHROMIUM").is_ok_and(|value| value == "1");
-    assert!(
-        found || !required,
-        "{CHROMIUM} is missing: apt-get install chromium"
-    );
+    assert!(found || !required, "{CHROMIUM} is missing: apt-get install chromium");
     if !found {
         println!("SKIPPED: no chromium");
     }
@@ -86,25 +83,12 @@ fn visit(folder: &Path, page: &str, scheme: Scheme) -> Visit {
     let profile = tempfile::tempdir().unwrap();
     let color = if scheme == Scheme::Dark { 0 } else { 1 };
     let mut child = Command::new(CHROMIUM)
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-quic",
-            "--no-first-run",
-        ])
-        .args([
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-sync",
-        ])
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
+        .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
         .args(["--allow-file-access-from-files", "--enable-logging=stderr"])
         .arg(format!("--blink-settings=preferredColorScheme={color}"))
         .arg(format!("--user-data-dir={}", profile.path().display()))
-        .args([
-            "--dump-dom",
-            &format!("file://{}", folder.join(page).display()),
-        ])
+        .args(["--dump-dom", &format!("file://{}", folder.join(page).display())])
         .stdin(Stdio::null())
         .stdout(File::create(&document).unwrap())
         .stderr(File::create(&log).unwrap())
@@ -193,17 +177,9 @@ fn figures_have_size_and_labels_at_every_width_in_both_schemes() {
 fn check(page: &Value, width: u32, scheme: Scheme) {
     assert_eq!(page["window"], width);
     let scroll = page["scroll"].as_u64().unwrap();
-    assert!(
-        scroll <= u64::from(width),
-        "{scroll} px wide on a {width} px screen"
-    );
+    assert!(scroll <= u64::from(width), "{scroll} px wide on a {width} px screen");
     let dark = light(page["background"].as_str().unwrap()) < 0.5;
-    assert_eq!(
-        dark,
-        scheme == Scheme::Dark,
-        "background {}",
-        page["background"]
-    );
+    assert_eq!(dark, scheme == Scheme::Dark, "background {}", page["background"]);
     let figures = page["figures"].as_array().unwrap();
     assert_eq!(figures.len(), 5);
     for figure in figures {
@@ -213,20 +189,14 @@ fn check(page: &Value, width: u32, scheme: Scheme) {
         assert!(number("labels") >= 4.0, "{figure}");
         assert!(number("smallest") >= LEGIBLE, "{width} px: {figure}");
         assert_eq!(figure["cut"], serde_json::json!([]), "{width} px: {figure}");
-        assert_eq!(
-            figure["covered"],
-            serde_json::json!([]),
-            "{width} px: {figure}"
-        );
+        assert_eq!(figure["covered"], serde_json::json!([]), "{width} px: {figure}");
     }
 }
 
 /// Mean of the channels of `rgb(r, g, b)`, between 0 and 1.
 fn light(color: &str) -> f64 {
     let channels = color.split(|character: char| !character.is_ascii_digit());
-    let channels: Vec<f64> = channels
-        .filter_map(|channel| channel.parse().ok())
-        .collect();
+    let channels: Vec<f64> = channels.filter_map(|channel| channel.parse().ok()).collect();
     channels.iter().take(3).sum::<f64>() / 3.0 / 255.0
 }
 
@@ -242,10 +212,6 @@ fn the_page_runs_no_script_and_console_messages_are_seen() {
     fs::write(folder.path().join("index.html"), page).unwrap();
     let visit = visit(folder.path(), "index.html", Scheme::Light);
     assert_eq!(visit.console.len(), 1, "{:?}", visit.console);
-    assert!(
-        visit.console[0].contains("Content Security Policy"),
-        "{:?}",
-        visit.console
-    );
+    assert!(visit.console[0].contains("Content Security Policy"), "{:?}", visit.console);
     assert!(visit.document.contains("Reachcast certificate"));
 }

@@ -12,10 +12,7 @@ fn reachcast(arguments: &[&str]) -> Output {
 
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_reachcast"));
-    command
-        .args(arguments)
-        .args(["--backend", "cpu"])
-        .current_dir(env!("CARGO_MANIFEST_DIR"));
+    command.args(arguments).args(["--backend", "cpu"]).current_dir(env!("CARGO_MANIFEST_DIR"));
     command
 }
 
@@ -30,11 +27,7 @@ fn certify(config: &str, out: &Path, more: &[&str]) -> Value {
     assert_eq!(text(&output.stderr), "");
     let record: Value = serde_json::from_slice(&output.stdout).unwrap();
     // 3 where a claim was not obtained.
-    let expected = if record["holds"].as_bool().unwrap() {
-        0
-    } else {
-        3
-    };
+    let expected = if record["holds"].as_bool().unwrap() { 0 } else { 3 };
     assert_eq!(output.status.code(), Some(expected));
     record
 }
@@ -46,11 +39,7 @@ fn stored(folder: &Path) -> Value {
 
 /// `record` without the part that a second run may change.
 fn untimed(mut record: Value) -> Value {
-    record
-        .as_object_mut()
-        .unwrap()
-        .shift_remove("timing")
-        .unwrap();
+    record.as_object_mut().unwrap().shift_remove("timing").unwrap();
     record
 }
 
@@ -69,13 +58,8 @@ fn a_certificate_is_written_queried_and_checked() {
     let out = folder.path().join("race");
     let record = certify("configs/smoke.toml", &out, &[]);
     assert_eq!(record, stored(&out));
-    let files = [
-        "certificate.json",
-        "deviation.csv",
-        "policy.safetensors",
-        "report.html",
-        "slice.npy",
-    ];
+    let files =
+        ["certificate.json", "deviation.csv", "policy.safetensors", "report.html", "slice.npy"];
     assert_eq!(names(&out), files);
     let config = &record["provenance"]["config"];
     // Defaults are filled in.
@@ -86,12 +70,8 @@ fn a_certificate_is_written_queried_and_checked() {
     let bytes = std::fs::read(out.join("slice.npy")).unwrap();
     let slice = npyz::NpyFile::new(bytes.as_slice()).unwrap();
     assert_eq!(slice.shape(), [13, 6]);
-    let margins: Vec<Value> = slice
-        .into_vec::<f32>()
-        .unwrap()
-        .into_iter()
-        .map(Value::from)
-        .collect();
+    let margins: Vec<Value> =
+        slice.into_vec::<f32>().unwrap().into_iter().map(Value::from).collect();
     let recorded = record["slice"]["check_margin"].as_array().unwrap();
     let same = |(a, b): (&Value, &Value)| a.as_f64().unwrap() as f32 == b.as_f64().unwrap() as f32;
     assert!(recorded.len() == 78 && recorded.iter().zip(&margins).all(same));
@@ -99,10 +79,7 @@ fn a_certificate_is_written_queried_and_checked() {
     let table = std::fs::read_to_string(out.join("deviation.csv")).unwrap();
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!((lines[0], lines.len()), ("step,bound,largest,exact", 32));
-    let last: Vec<f64> = lines[31]
-        .split(',')
-        .map(|field| field.parse().unwrap())
-        .collect();
+    let last: Vec<f64> = lines[31].split(',').map(|field| field.parse().unwrap()).collect();
     assert_eq!(last[0], 30.0);
     assert_eq!(last[1], record["deviation"]["bound"][30].as_f64().unwrap());
 
@@ -121,24 +98,11 @@ fn a_certificate_is_written_queried_and_checked() {
     let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(rows[0]["tier"], record["state"]["tier"]);
     let plain = text(&reachcast(&["query", dir, "--states", states]).stdout);
-    assert!(
-        plain.starts_with("tier,check_margin,target_margin\n"),
-        "{plain}"
-    );
+    assert!(plain.starts_with("tier,check_margin,target_margin\n"), "{plain}");
     let answers = folder.path().join("answers");
-    let output = reachcast(&[
-        "query",
-        dir,
-        "--states",
-        states,
-        "--out",
-        answers.to_str().unwrap(),
-    ]);
+    let output = reachcast(&["query", dir, "--states", states, "--out", answers.to_str().unwrap()]);
     assert!(text(&output.stdout).contains("tier 0 (in the target)"));
-    assert_eq!(
-        std::fs::read_to_string(answers.join("query.csv")).unwrap(),
-        plain
-    );
+    assert_eq!(std::fs::read_to_string(answers.join("query.csv")).unwrap(), plain);
 
     let output = reachcast(&["check", dir]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
@@ -223,11 +187,7 @@ fn certificates_that_are_not_theirs_are_refused() {
     check(&["certificate.json", "No such file"], 2);
     let output = reachcast(&["check", dir, "--seed", "3"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(
-        text(&output.stderr).contains("--seed"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(text(&output.stderr).contains("--seed"), "{}", text(&output.stderr));
 }
 
 /// Ctrl-C in the middle of the work: exit code 1, the old result whole, nothing beside it.
@@ -242,13 +202,7 @@ fn an_interrupted_run_leaves_the_old_result() {
         .map(|name| (std::fs::read(out.join(&name)).unwrap(), name))
         .collect();
     // Hours of work.
-    let draws = [
-        "certify",
-        "configs/smoke.toml",
-        "--set",
-        "global.draws=100000000000",
-        "--out",
-    ];
+    let draws = ["certify", "configs/smoke.toml", "--set", "global.draws=100000000000", "--out"];
     let run = command(&[&draws[..], &[out.to_str().unwrap()]].concat())
         .stderr(std::process::Stdio::piped())
         .spawn()
@@ -256,27 +210,17 @@ fn an_interrupted_run_leaves_the_old_result() {
     let status = format!("/proc/{}/status", run.id());
     // Until the program handles SIGINT, number 2: the second bit of the mask of caught signals.
     let catches = |status: &str| {
-        let mask = status
-            .lines()
-            .find_map(|line| line.strip_prefix("SigCgt:"))
-            .unwrap();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
         u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0
     };
     while !catches(&std::fs::read_to_string(&status).unwrap()) {
         std::thread::yield_now();
     }
-    let kill = Command::new("kill")
-        .args(["-INT", &run.id().to_string()])
-        .status()
-        .unwrap();
+    let kill = Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap();
     assert!(kill.success());
     let output = run.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
-    assert!(
-        text(&output.stderr).contains("interrupted"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(text(&output.stderr).contains("interrupted"), "{}", text(&output.stderr));
     let after: Vec<_> = names(&out)
         .into_iter()
         .map(|name| (std::fs::read(out.join(&name)).unwrap(), name))

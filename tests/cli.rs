@@ -27,12 +27,7 @@ fn text(bytes: &[u8]) -> String {
 /// Runs and expects exit code 0; standard output.
 fn done(arguments: &[&str]) -> String {
     let output = reachcast(arguments);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{arguments:?}: {}",
-        text(&output.stderr)
-    );
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
     text(&output.stdout)
 }
 
@@ -43,10 +38,7 @@ fn refused(arguments: &[&str], words: &[&str]) {
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     assert_eq!(text(&output.stdout), "", "{arguments:?}");
     for word in words {
-        assert!(
-            message.contains(word),
-            "{arguments:?}: no `{word}` in: {message}"
-        );
+        assert!(message.contains(word), "{arguments:?}: no `{word}` in: {message}");
     }
 }
 
@@ -87,14 +79,7 @@ impl Folder {
 fn certify_refused(set: &[&str], words: &[&str]) {
     let folder = Folder::new();
     let out = folder.path("out");
-    let mut arguments = vec![
-        "certify",
-        "configs/smoke.toml",
-        "--backend",
-        "cpu",
-        "--out",
-        &out,
-    ];
+    let mut arguments = vec!["certify", "configs/smoke.toml", "--backend", "cpu", "--out", &out];
     for assignment in set {
         arguments.extend(["--set", assignment]);
     }
@@ -109,23 +94,16 @@ fn network(widths: &[usize], weight: f32) -> Vec<u8> {
         .windows(2)
         .map(|pair| {
             let bytes = |count: usize| weight.to_le_bytes().repeat(count);
-            (
-                vec![pair[1], pair[0]],
-                bytes(pair[0] * pair[1]),
-                bytes(pair[1]),
-            )
+            (vec![pair[1], pair[0]], bytes(pair[0] * pair[1]), bytes(pair[1]))
         })
         .collect();
-    let tensors = layers
-        .iter()
-        .enumerate()
-        .flat_map(|(i, (shape, weights, bias))| {
-            let view = |shape, bytes| TensorView::new(Dtype::F32, shape, bytes).unwrap();
-            [
-                (format!("layers.{i}.weight"), view(shape.clone(), weights)),
-                (format!("layers.{i}.bias"), view(vec![shape[0]], bias)),
-            ]
-        });
+    let tensors = layers.iter().enumerate().flat_map(|(i, (shape, weights, bias))| {
+        let view = |shape, bytes| TensorView::new(Dtype::F32, shape, bytes).unwrap();
+        [
+            (format!("layers.{i}.weight"), view(shape.clone(), weights)),
+            (format!("layers.{i}.bias"), view(vec![shape[0]], bias)),
+        ]
+    });
     let words = [("activation", "relu"), ("output", "tanh")];
     let metadata = words.map(|(key, value)| (key.to_owned(), value.to_owned()));
     safetensors::serialize(tensors, Some(metadata.into_iter().collect())).unwrap()
@@ -134,10 +112,7 @@ fn network(widths: &[usize], weight: f32) -> Vec<u8> {
 /// A .npy file.
 fn npy<T: npyz::AutoSerialize + Copy>(values: &[T], shape: &[u64], order: npyz::Order) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let options = npyz::WriteOptions::new()
-        .default_dtype()
-        .order(order)
-        .shape(shape);
+    let options = npyz::WriteOptions::new().default_dtype().order(order).shape(shape);
     let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
     writer.extend(values.iter().copied()).unwrap();
     writer.finish().unwrap();
@@ -147,15 +122,7 @@ fn npy<T: npyz::AutoSerialize + Copy>(values: &[T], shape: &[u64], order: npyz::
 #[test]
 fn usage_is_explained() {
     let help = done(&["--help"]);
-    for word in [
-        "certify",
-        "rollout",
-        "query",
-        "check",
-        "scenarios",
-        "devices",
-        "Exit codes",
-    ] {
+    for word in ["certify", "rollout", "query", "check", "scenarios", "devices", "Exit codes"] {
         assert!(help.contains(word), "{word}");
     }
     // Only what is built is offered.
@@ -179,68 +146,28 @@ fn scenarios_prints_the_published_counts() {
         serde_json::from_str(&done(&all)).unwrap()
     };
     let plain = counts(&["--epsilon", "0.1", "--beta", "1e-3"]);
-    assert_eq!(
-        (plain["simple"].as_u64(), plain["exact"].as_u64()),
-        (Some(159), Some(66))
-    );
+    assert_eq!((plain["simple"].as_u64(), plain["exact"].as_u64()), (Some(159), Some(66)));
     let rounds = counts(&["--epsilon", "0.1", "--beta", "1e-3", "--rounds", "5"]);
     assert_eq!(rounds["exact"], 81);
     let joint = counts(&["--epsilon", "0.1", "--beta", "1e-3", "--dim", "31"]);
-    assert_eq!(
-        (joint["simple"].as_u64(), joint["exact"].as_u64()),
-        (Some(759), Some(501))
-    );
+    assert_eq!((joint["simple"].as_u64(), joint["exact"].as_u64()), (Some(759), Some(501)));
     let failures = counts(&["--epsilon", "0.1", "--beta", "1e-3", "--failures", "2"]);
     assert_eq!(failures["with_failures"], 108);
     let words = done(&["scenarios", "--epsilon", "0.01", "--beta", "1e-6"]);
     assert!(words.contains("2964") && words.contains("1375"), "{words}");
-    assert_eq!(
-        done(&["scenarios", "--epsilon", "0.1", "--beta", "1e-3", "-q"]),
-        ""
-    );
+    assert_eq!(done(&["scenarios", "--epsilon", "0.1", "--beta", "1e-3", "-q"]), "");
 
-    refused(
-        &["scenarios", "--epsilon", "1.5", "--beta", "1e-3"],
-        &["--epsilon", "1.5"],
-    );
-    refused(
-        &["scenarios", "--epsilon", "0.1", "--beta", "0"],
-        &["--beta"],
-    );
-    refused(
-        &[
-            "scenarios",
-            "--epsilon",
-            "0.1",
-            "--beta",
-            "0.1",
-            "--dim",
-            "0",
-        ],
-        &["--dim"],
-    );
-    refused(
-        &[
-            "scenarios",
-            "--epsilon",
-            "0.1",
-            "--beta",
-            "0.1",
-            "--rounds",
-            "0",
-        ],
-        &["--rounds"],
-    );
+    refused(&["scenarios", "--epsilon", "1.5", "--beta", "1e-3"], &["--epsilon", "1.5"]);
+    refused(&["scenarios", "--epsilon", "0.1", "--beta", "0"], &["--beta"]);
+    refused(&["scenarios", "--epsilon", "0.1", "--beta", "0.1", "--dim", "0"], &["--dim"]);
+    refused(&["scenarios", "--epsilon", "0.1", "--beta", "0.1", "--rounds", "0"], &["--rounds"]);
 }
 
 #[test]
 fn devices_lists_the_processor() {
     let listing: serde_json::Value =
         serde_json::from_str(&done(&["devices", "--json", "--threads", "1"])).unwrap();
-    assert!(
-        listing["cpu"].as_str().unwrap().contains("1 thread"),
-        "{listing}"
-    );
+    assert!(listing["cpu"].as_str().unwrap().contains("1 thread"), "{listing}");
     assert!(listing["adapters"].is_array() && listing["auto"].is_string());
     assert!(done(&["devices"]).contains("--backend auto takes"));
 }
@@ -248,25 +175,13 @@ fn devices_lists_the_processor() {
 #[test]
 fn configurations_that_do_not_hold_together() {
     let folder = Folder::new();
-    refused(
-        &["certify", "nowhere.toml"],
-        &["nowhere.toml", "No such file"],
-    );
+    refused(&["certify", "nowhere.toml"], &["nowhere.toml", "No such file"]);
     let broken = folder.file("broken.toml", "[rollout\nhorizon = 3");
     refused(&["certify", &broken], &["broken.toml", "line 1"]);
-    let typo = folder.file(
-        "typo.toml",
-        "system.name = 'drone-race'\nrollout.horizn = 3\n",
-    );
+    let typo = folder.file("typo.toml", "system.name = 'drone-race'\nrollout.horizn = 3\n");
     let nearest = "the nearest valid key is `rollout.horizon`";
-    refused(
-        &["certify", &typo],
-        &["typo.toml", "`rollout.horizn`", nearest],
-    );
-    certify_refused(
-        &["growth.radios=1"],
-        &["--set growth.radios=1", "`growth.radius`"],
-    );
+    refused(&["certify", &typo], &["typo.toml", "`rollout.horizn`", nearest]);
+    certify_refused(&["growth.radios=1"], &["--set growth.radios=1", "`growth.radius`"]);
     certify_refused(&["rollout.horizon=0"], &["rollout.horizon", "0"]);
     certify_refused(&["rollout.horizon=ten"], &["rollout.horizon", "ten"]);
     certify_refused(&["deviation.epsilon=1.5"], &["deviation.epsilon", "1.5"]);
@@ -276,20 +191,14 @@ fn configurations_that_do_not_hold_together() {
     certify_refused(&["deviation.radius=0"], &["deviation.radius", "positive"]);
     certify_refused(&["slice.x.step=0"], &["slice.x.step", "positive"]);
     certify_refused(&["slice.y.state=ego_x"], &["slice", "both axes"]);
-    certify_refused(
-        &["slice.y.state=ego_q"],
-        &["slice.y.state", "no state `ego_q`"],
-    );
+    certify_refused(&["slice.y.state=ego_q"], &["slice.y.state", "no state `ego_q`"]);
     certify_refused(&["system.ego_gain=0"], &["system.ego_gain", "positive"]);
 }
 
 #[test]
 fn too_few_scenarios_for_the_claim() {
     // Exact counts at risk 0.1 and beta 1e-3: 66 for one variable; 81 with beta over 5 rounds.
-    certify_refused(
-        &["deviation.scenarios=65"],
-        &["65 scenarios", "at least 66"],
-    );
+    certify_refused(&["deviation.scenarios=65"], &["65 scenarios", "at least 66"]);
     certify_refused(&["growth.scenarios=80"], &["80 scenarios", "at least 81"]);
     // One decision variable per step, 30 steps.
     let joint = ["deviation.joint=variables", "deviation.scenarios=300"];
@@ -302,17 +211,7 @@ fn policies_that_do_not_fit() {
     let folder = Folder::new();
     let certify = |words: &[&str]| {
         let config = folder.race("policy.safetensors");
-        refused(
-            &[
-                "certify",
-                &config,
-                "--backend",
-                "cpu",
-                "--out",
-                &folder.path("out"),
-            ],
-            words,
-        );
+        refused(&["certify", &config, "--backend", "cpu", "--out", &folder.path("out")], words);
     };
     certify(&["policy.safetensors", "No such file"]);
     let whole = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(POLICY)).unwrap();
@@ -328,14 +227,9 @@ fn policies_that_do_not_fit() {
     folder.file("policy.safetensors", network(&[12, 16, 3], f32::NAN));
     certify(&["layers.0.weight[0] is NaN"]);
     assert!(!Path::new(&folder.path("out")).exists());
-    let formula = folder.file(
-        "formula.toml",
-        "system.name = 'drone-race'\npolicy.formula = 'bang-bang'\n",
-    );
-    refused(
-        &["certify", &formula],
-        &["policy.formula", "`bang-bang` is unknown"],
-    );
+    let formula =
+        folder.file("formula.toml", "system.name = 'drone-race'\npolicy.formula = 'bang-bang'\n");
+    refused(&["certify", &formula], &["policy.formula", "`bang-bang` is unknown"]);
 }
 
 #[test]
@@ -343,16 +237,8 @@ fn states_that_are_none() {
     let folder = Folder::new();
     let measures = folder.path("measures.npy");
     let rollout = |starts: &str, words: &[&str]| {
-        let arguments = [
-            "rollout",
-            RACE,
-            "--backend",
-            "cpu",
-            "--starts",
-            starts,
-            "--measures",
-            &measures,
-        ];
+        let arguments =
+            ["rollout", RACE, "--backend", "cpu", "--starts", starts, "--measures", &measures];
         refused(&arguments, words);
         assert!(!Path::new(&measures).exists());
     };
@@ -361,10 +247,7 @@ fn states_that_are_none() {
     rollout("nowhere.npy", &["nowhere.npy", "No such file"]);
     rollout("starts.txt", &["starts.txt", ".npy or .csv"]);
     let integers = npy(&[1_i32; 24], &[2, 12], order);
-    rollout(
-        &array("int.npy", &integers),
-        &["int.npy", "dtype <i4", "<f4 or <f8"],
-    );
+    rollout(&array("int.npy", &integers), &["int.npy", "dtype <i4", "<f4 or <f8"]);
     let narrow = npy(&[0.0_f32; 24], &[4, 6], order);
     rollout(&array("narrow.npy", &narrow), &["[4, 6]", "[N, 12]"]);
     let flat = npy(&[0.0_f32; 24], &[24], order);
@@ -374,32 +257,18 @@ fn states_that_are_none() {
     let whole = npy(&[0.0_f32; 24], &[2, 12], order);
     rollout(&array("cut.npy", &whole[..whole.len() - 4]), &["truncated"]);
     rollout(&array("cut.npy", &whole[..9]), &["not a whole .npy file"]);
-    rollout(
-        &array("cut.npy", b"PK\x03\x04 something else"),
-        &["does not begin with"],
-    );
+    rollout(&array("cut.npy", b"PK\x03\x04 something else"), &["does not begin with"]);
     let vast = npy::<f32>(&[], &[0, 12], order);
     let vast = text(&vast[10..]).replace("(0, 12, )", "(4611686018427387904, 12)");
-    let vast = [
-        b"\x93NUMPY\x01\x00".as_slice(),
-        &(vast.len() as u16).to_le_bytes(),
-        vast.as_bytes(),
-    ];
+    let vast =
+        [b"\x93NUMPY\x01\x00".as_slice(), &(vast.len() as u16).to_le_bytes(), vast.as_bytes()];
     rollout(&array("vast.npy", &vast.concat()), &["truncated"]);
-    let header = [
-        b"\x93NUMPY\x02\x00".as_slice(),
-        &u32::MAX.to_le_bytes(),
-        b"{}",
-    ]
-    .concat();
+    let header = [b"\x93NUMPY\x02\x00".as_slice(), &u32::MAX.to_le_bytes(), b"{}"].concat();
     rollout(&array("header.npy", &header), &["damaged", "4294967295"]);
     let mut values = [0.0_f64; 24];
     values[13] = f64::INFINITY;
     let infinite = npy(&values, &[2, 12], order);
-    rollout(
-        &array("infinite.npy", &infinite),
-        &["state 1", "ego_vx", "finite"],
-    );
+    rollout(&array("infinite.npy", &infinite), &["state 1", "ego_vx", "finite"]);
     let none = npy::<f32>(&[], &[0, 12], order);
     rollout(&array("none.npy", &none), &["no state"]);
 
@@ -407,10 +276,7 @@ fn states_that_are_none() {
     rollout(&csv("1,2,3\n"), &["line 1", "3 numbers", "12"]);
     rollout(&csv("# a,b,c\n1,2,3\n"), &["header `a,b,c`", "ego_x"]);
     rollout(&csv("position,velocity\n"), &["header `position,velocity`"]);
-    rollout(
-        &csv("0,0,0,0,0,0,0,0,0,0,0,0\n0,0,x,0,0,0,0,0,0,0,0,0\n"),
-        &["line 2", "`x`"],
-    );
+    rollout(&csv("0,0,0,0,0,0,0,0,0,0,0,0\n0,0,x,0,0,0,0,0,0,0,0,0\n"), &["line 2", "`x`"]);
     rollout(&csv("0,0,0,0,0,NaN,0,0,0,0,0,0\n"), &["ego_vz", "finite"]);
     rollout(&csv(""), &["no state"]);
 }
@@ -441,10 +307,7 @@ fn a_gpu_is_asked_for_and_there_is_none() {
         .unwrap();
     let message = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(
-        message.contains("--backend cpu") || message.contains("driver"),
-        "{message}"
-    );
+    assert!(message.contains("--backend cpu") || message.contains("driver"), "{message}");
     assert!(folder.entries().is_empty());
 }
 
@@ -453,38 +316,14 @@ fn results_that_cannot_be_written() {
     let folder = Folder::new();
     let file = folder.file("file", "");
     let out = format!("{file}/out");
-    let output = reachcast(&[
-        "certify",
-        "configs/smoke.toml",
-        "--backend",
-        "cpu",
-        "--out",
-        &out,
-    ]);
+    let output = reachcast(&["certify", "configs/smoke.toml", "--backend", "cpu", "--out", &out]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(
-        text(&output.stderr).contains("cannot write"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(text(&output.stderr).contains("cannot write"), "{}", text(&output.stderr));
     let measures = folder.path("nowhere/measures.npy");
-    let starts = [
-        "rollout",
-        RACE,
-        "--backend",
-        "cpu",
-        "--starts",
-        STARTS,
-        "--measures",
-        &measures,
-    ];
+    let starts = ["rollout", RACE, "--backend", "cpu", "--starts", STARTS, "--measures", &measures];
     let output = reachcast(&starts);
     assert_eq!(output.status.code(), Some(1));
-    assert!(
-        text(&output.stderr).contains("cannot write"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(text(&output.stderr).contains("cannot write"), "{}", text(&output.stderr));
 }
 
 #[test]
@@ -497,23 +336,14 @@ fn rollout_measures_every_start() {
     };
     let npy_path = folder.path("measures.npy");
     let summary = run(STARTS, &npy_path);
-    assert_eq!(
-        (summary["starts"].as_u64(), summary["non_finite"].as_u64()),
-        (Some(500), Some(0))
-    );
+    assert_eq!((summary["starts"].as_u64(), summary["non_finite"].as_u64()), (Some(500), Some(0)));
     let read = |path: &str| {
         let bytes = std::fs::read(path).unwrap();
-        npyz::NpyFile::new(bytes.as_slice())
-            .unwrap()
-            .into_vec::<f32>()
-            .unwrap()
+        npyz::NpyFile::new(bytes.as_slice()).unwrap().into_vec::<f32>().unwrap()
     };
     let measures = read(&npy_path);
     let successes = measures.iter().filter(|measure| **measure > 0.0).count();
-    assert_eq!(
-        (measures.len(), summary["successes"].as_u64()),
-        (500, Some(successes as u64))
-    );
+    assert_eq!((measures.len(), summary["successes"].as_u64()), (500, Some(successes as u64)));
     let share = successes as f64 / 500.0;
     let interval = [0, 1].map(|end| summary["success_interval"][end].as_f64().unwrap());
     assert!(interval[0] < share && share < interval[1], "{interval:?}");

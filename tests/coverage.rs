@@ -173,15 +173,8 @@ fn false_bounds<S: System<NX, 1>, const NX: usize>(
     judge: Judge,
 ) -> u64 {
     let backend = cpu(1);
-    let plant = Plant {
-        system,
-        policy: &Idle,
-    };
-    let context = Context {
-        backend: &backend,
-        plant,
-        watch: &Unwatched,
-    };
+    let plant = Plant { system, policy: &Idle };
+    let context = Context { backend: &backend, plant, watch: &Unwatched };
     let mut settings = settings(system, horizon);
     settings.deviation.epsilon = EPSILON;
     settings.deviation.beta = BETA;
@@ -276,10 +269,7 @@ fn conditional_failures(tightening: &Tightening) -> [u64; 2] {
         let mut states = [nominal, [nominal[0] + offset[0], nominal[1] + offset[1]]];
         let (mut alive, mut reached) = ([true; 2], [false; 2]);
         for t in 0..=STEPS {
-            let loss = [
-                [tightening.target[t], tightening.constraint[t]].map(f64::from),
-                [0.0; 2],
-            ];
+            let loss = [[tightening.target[t], tightening.constraint[t]].map(f64::from), [0.0; 2]];
             for (i, [position, _]) in states.iter().enumerate() {
                 alive[i] &= 1.0 - position.abs() - loss[i][1] > 0.0;
                 reached[i] |= alive[i] && 0.25 - position.abs() - loss[i][0] > 0.0;
@@ -305,10 +295,7 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     let policy = BangBang { acceleration: 1.0 };
     let context = Context {
         backend: &backend,
-        plant: Plant {
-            system: &system,
-            policy: &policy,
-        },
+        plant: Plant { system: &system, policy: &policy },
         watch: &Unwatched,
     };
     let mut settings = settings(&system, STEPS as u32);
@@ -328,10 +315,7 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     let (mut false_bounds, mut false_halves, mut false_shares) = (0, 0, 0);
     for seed in 0..SEEDS {
         settings.seed = seed;
-        let purposes = [
-            Purpose::ConditionalNominal,
-            Purpose::ConditionalPerturbation,
-        ];
+        let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
         let record = global::conditional(context, &settings, &tightening, purposes)
             .expect("conditional failure");
         let (n, k) = (record.accepted, record.claim.failures);
@@ -409,11 +393,7 @@ fn false_balls<S: System<2, 1>, P: Policy<2, 1>>(
     failure: impl Fn(f64) -> f64,
 ) -> u64 {
     let backend = cpu(1);
-    let context = Context {
-        backend: &backend,
-        plant,
-        watch: &Unwatched,
-    };
+    let context = Context { backend: &backend, plant, watch: &Unwatched };
     let mut settings = settings(plant.system, trial.horizon);
     settings.growth.radius = trial.radius;
     settings.growth.rounds = ROUNDS;
@@ -421,10 +401,7 @@ fn false_balls<S: System<2, 1>, P: Policy<2, 1>>(
     settings.growth.epsilon = EPSILON;
     settings.growth.beta = BETA;
     settings.growth.split_beta = trial.spending == Spending::Split;
-    let boundary = Boundary {
-        point: trial.center,
-        distance: 0.0,
-    };
+    let boundary = Boundary { point: trial.center, distance: 0.0 };
     let mut false_balls = 0;
     for seed in 0..SEEDS {
         settings.seed = seed;
@@ -470,10 +447,7 @@ fn round_count(spending: Spending) -> u64 {
 fn grown_balls_are_false_at_most_as_often_as_claimed() {
     let system = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let form = ClosedForm::of(&system);
     let horizon = 20;
     let loss = vec![0.0; horizon as usize + 1];
@@ -484,11 +458,7 @@ fn grown_balls_are_false_at_most_as_often_as_claimed() {
     assert!(failure(high) > EXCESS * EPSILON);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        *(if failure(middle) > EXCESS * EPSILON {
-            &mut high
-        } else {
-            &mut low
-        }) = middle;
+        *(if failure(middle) > EXCESS * EPSILON { &mut high } else { &mut low }) = middle;
     }
     let trial = Trial {
         center,
@@ -499,10 +469,7 @@ fn grown_balls_are_false_at_most_as_often_as_claimed() {
     };
     println!("radius {high}: {} fails", failure(f64::from(trial.radius)));
     assert!(failure(f64::from(trial.radius)) > EPSILON);
-    let half = Trial {
-        scenarios: trial.scenarios / 2,
-        ..trial
-    };
+    let half = Trial { scenarios: trial.scenarios / 2, ..trial };
     assert!(!violates("growth", false_balls(plant, trial, failure)));
     assert!(violates("growth, half", false_balls(plant, half, failure)));
 }
@@ -513,10 +480,7 @@ fn grown_balls_are_false_at_most_as_often_as_claimed() {
 fn every_round_of_growth_is_paid_for() {
     let share = EXCESS * EPSILON;
     let system = Wedge { share };
-    let plant = Plant {
-        system: &system,
-        policy: &Idle,
-    };
+    let plant = Plant { system: &system, policy: &Idle };
     let trial = |scenarios, spending| Trial {
         center: [0.0; 2],
         radius: 0.5,

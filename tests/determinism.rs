@@ -24,11 +24,7 @@ fn certificate<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: 
 /// The certificate as JSON, but for its timing.
 fn text(record: &Record) -> String {
     let mut record = record.clone();
-    record.timing = Timing {
-        wall_seconds: 0.0,
-        threads: 0,
-        rollouts: record.timing.rollouts,
-    };
+    record.timing = Timing { wall_seconds: 0.0, threads: 0, rollouts: record.timing.rollouts };
     serde_json::to_string(&record).expect("JSON")
 }
 
@@ -55,10 +51,7 @@ fn race() -> (DroneRace, Mlp, Settings<12>) {
 #[test]
 fn same_seed_same_certificate_with_one_and_two_threads() {
     let (system, policy, mut settings) = race();
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let one = certificate(&cpu(1), plant, &settings);
     let two = certificate(&cpu(2), plant, &settings);
     assert_same(&text(&one), &text(&two));
@@ -76,10 +69,7 @@ fn same_seed_same_certificate_with_one_and_two_threads() {
 #[test]
 fn a_certificate_survives_its_file_and_its_check() {
     let (system, policy, settings) = race();
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let backend = cpu(2);
     let record = certificate(&backend, plant, &settings);
     let stored = serde_json::to_string(&record).expect("JSON");
@@ -101,10 +91,7 @@ fn integrator() -> (DoubleIntegrator, BangBang, Settings<2>) {
 /// Whether a check of the record after `change` refuses it or finds a claim that does not hold.
 fn is_caught(change: impl Fn(&mut Record)) -> bool {
     let (system, policy, settings) = integrator();
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let backend = cpu(2);
     let mut record = certificate(&backend, plant, &settings);
     change(&mut record);
@@ -125,12 +112,8 @@ fn a_changed_certificate_is_caught() {
     assert!(is_caught(|record| record.global.accepted += 50));
     assert!(is_caught(|record| record.global.claim.certified_risk *= 0.5));
     assert!(is_caught(|record| record.constants.target.used *= 0.5));
-    assert!(is_caught(
-        |record| record.provenance.policy_sha256 = "0".repeat(64)
-    ));
-    assert!(is_caught(
-        |record| record.provenance.physics_sha256 = "0".repeat(64)
-    ));
+    assert!(is_caught(|record| record.provenance.policy_sha256 = "0".repeat(64)));
+    assert!(is_caught(|record| record.provenance.physics_sha256 = "0".repeat(64)));
     assert!(is_caught(|record| record.schema += 1));
 }
 
@@ -138,20 +121,11 @@ fn a_changed_certificate_is_caught() {
 #[test]
 fn a_certificate_of_another_plant_is_refused() {
     let (system, policy, settings) = integrator();
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let backend = cpu(2);
     let record = certificate(&backend, plant, &settings);
-    let wider = DoubleIntegrator {
-        corridor: 2.0,
-        ..system
-    };
-    let other = Plant {
-        system: &wider,
-        policy: &policy,
-    };
+    let wider = DoubleIntegrator { corridor: 2.0, ..system };
+    let other = Plant { system: &wider, policy: &policy };
     let checked = check(&backend, other, &record, &settings, &Unwatched);
     assert!(matches!(checked, Err(Error::Refused(_))), "{checked:?}");
     let queried = query(&backend, other, &record, &[[0.0; 2]]);
@@ -162,18 +136,14 @@ fn a_certificate_of_another_plant_is_refused() {
 #[test]
 fn tiers_are_those_of_their_definition() {
     let (system, policy, settings) = integrator();
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let backend = cpu(2);
     let record = certificate(&backend, plant, &settings);
     assert_eq!(record.growth.outcome, GrowthOutcome::Verified);
     let center = record.growth.center.clone().expect("centre");
     let node = |i: u16, half: f32| half * (f32::from(2 * i + 1) / 120.0 - 1.0);
-    let states: Vec<[f32; 2]> = (0..120 * 120)
-        .map(|i| [node(i / 120, 1.2), node(i % 120, 1.5)])
-        .collect();
+    let states: Vec<[f32; 2]> =
+        (0..120 * 120).map(|i| [node(i / 120, 1.2), node(i % 120, 1.5)]).collect();
     let rows = query(&backend, plant, &record, &states).expect("tiers");
     assert_eq!(rows.len(), states.len());
     let mut counts = [0; 4];

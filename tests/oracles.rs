@@ -37,20 +37,14 @@ const RACE_DEVIATION: [(usize, f64, f64); 10] = [
 const LAST_DIGIT: f64 = 5e-5;
 
 fn context<'a, S, P>(backend: &'a Backend, system: &'a S, policy: &'a P) -> Context<'a, S, P> {
-    Context {
-        backend,
-        plant: Plant { system, policy },
-        watch: &Unwatched,
-    }
+    Context { backend, plant: Plant { system, policy }, watch: &Unwatched }
 }
 
 /// A network of the race with random weights.
 fn random_policy(seed: u64) -> Mlp {
     let mut rng = StdRng::seed_from_u64(seed);
     let mut layer = |inputs: usize, outputs: usize| Layer {
-        weight: (0..inputs * outputs)
-            .map(|_| rng.random_range(-1.0..1.0))
-            .collect(),
+        weight: (0..inputs * outputs).map(|_| rng.random_range(-1.0..1.0)).collect(),
         bias: (0..outputs).map(|_| rng.random_range(-1.0..1.0)).collect(),
         inputs,
         outputs,
@@ -70,11 +64,7 @@ impl Policy<12, 3> for Steer {
     fn control<R: Real>(&self, x: [R; 12]) -> [R; 3] {
         let [x, vx, _, vy, z, vz, ..] = x;
         let gain = R::lit(1.5);
-        [
-            -(gain * x + vx),
-            R::lit(0.7) - vy,
-            (gain * z + vz).tanh() * R::lit(-1.0),
-        ]
+        [-(gain * x + vx), R::lit(0.7) - vy, (gain * z + vz).tanh() * R::lit(-1.0)]
     }
 }
 
@@ -124,15 +114,9 @@ fn race_deviation_stays_below_its_supremum_for_any_policy() {
         ];
         for (policy, largest) in largest.iter().enumerate() {
             for (t, (largest, exact)) in largest.iter().zip(&exact).enumerate() {
-                assert!(
-                    largest < exact,
-                    "policy {policy}, step {t}: {largest} of {exact}"
-                );
+                assert!(largest < exact, "policy {policy}, step {t}: {largest} of {exact}");
                 // Far below the averages of the next test: only a broken rollout comes here.
-                assert!(
-                    *largest > 0.5 * exact,
-                    "policy {policy}, step {t}: {largest} of {exact}"
-                );
+                assert!(*largest > 0.5 * exact, "policy {policy}, step {t}: {largest} of {exact}");
             }
         }
     }
@@ -146,9 +130,8 @@ fn race_deviation_averages_are_the_published_ones() {
     let system = DroneRace::default();
     let quantile = Normal::standard().inverse_cdf(1.0 - FALSE_ALARM / 2.0);
     for backend in &backends() {
-        let draws: Vec<Vec<f64>> = (0..DRAWS)
-            .map(|seed| estimate(backend, &system, &Steer, 1000 + seed as u64))
-            .collect();
+        let draws: Vec<Vec<f64>> =
+            (0..DRAWS).map(|seed| estimate(backend, &system, &Steer, 1000 + seed as u64)).collect();
         for (t, _, published) in RACE_DEVIATION {
             let values: Vec<f64> = draws.iter().map(|draw| draw[t]).collect();
             let mean = values.iter().sum::<f64>() / DRAWS as f64;
@@ -156,10 +139,7 @@ fn race_deviation_averages_are_the_published_ones() {
             let error = (square / (DRAWS - 1) as f64 / DRAWS as f64).sqrt();
             let limit = quantile * (2.0 * error * error).sqrt() + LAST_DIGIT;
             println!("step {t}: {mean:.5} +- {error:.5}, published {published}");
-            assert!(
-                (mean - published).abs() <= limit,
-                "step {t}: {mean} +- {error}"
-            );
+            assert!((mean - published).abs() <= limit, "step {t}: {mean} +- {error}");
         }
     }
 }
@@ -253,9 +233,7 @@ fn closed_form_is_the_dynamic_program() {
 /// Starts over the box of the double integrator, `side` along each axis, off its centre line.
 fn grid(side: usize) -> Vec<[f32; 2]> {
     let node = |i: usize, half: f32| half * ((2 * i + 1) as f32 / side as f32 - 1.0);
-    (0..side * side)
-        .map(|i| [node(i / side, 1.2), node(i % side, 1.5)])
-        .collect()
+    (0..side * side).map(|i| [node(i / side, 1.2), node(i % side, 1.5)]).collect()
 }
 
 /// Each certified start is inside the true set, with the whole ball around it; the certified share
@@ -294,10 +272,7 @@ fn certified_starts_are_inside_the_true_set() {
             shares.push(count as f64 / all as f64);
         }
         println!("certified share of the true set: {shares:?}");
-        assert!(
-            shares.windows(2).all(|pair| pair[0] < pair[1]),
-            "{shares:?}"
-        );
+        assert!(shares.windows(2).all(|pair| pair[0] < pair[1]), "{shares:?}");
         assert!(shares[3] >= 0.9, "{shares:?}");
     }
 }
@@ -309,38 +284,23 @@ fn certified_share_is_that_of_the_closed_form() {
     let system = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
     let form = ClosedForm::of(&system);
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let mut settings = settings(&system, 30);
     settings.deviation.radius = 0.03;
     settings.global.draws = 20_000;
     settings.global.beta = FALSE_ALARM;
     settings.growth.radius = 0.05;
     for backend in &backends() {
-        let record = certify(
-            backend,
-            plant,
-            &settings,
-            serde_json::Value::Null,
-            &Unwatched,
-        )
-        .expect("certificate");
+        let record = certify(backend, plant, &settings, serde_json::Value::Null, &Unwatched)
+            .expect("certificate");
         let bound = &record.deviation.bound;
         // No step leaps over the tightened target (see the closed form).
         assert!(bound.iter().all(|bound| 2.0 * (0.25 - bound) > 0.21));
         let share = form.share(literal(1.2), literal(1.5), bound);
         let [low, high] = record.global.share_interval;
         println!("share {share} within [{low}, {high}]");
-        assert!(
-            low <= share && share <= high,
-            "{share} not in [{low}, {high}]"
-        );
-        assert_eq!(
-            record.global.claim.failures, 0,
-            "constants and bound are valid"
-        );
+        assert!(low <= share && share <= high, "{share} not in [{low}, {high}]");
+        assert_eq!(record.global.claim.failures, 0, "constants and bound are valid");
         assert!(high - low < 0.05);
     }
 }
@@ -436,16 +396,10 @@ fn compare<S, P, const NX: usize, const NU: usize>(
     P: Policy<NX, NU>,
 {
     const COUNT: u64 = 500;
-    let name = format!(
-        "{} {} {control:?}",
-        plant.system.name(),
-        plant.policy.name()
-    );
+    let name = format!("{} {} {control:?}", plant.system.name(), plant.policy.name());
     let spec = settings.spec;
     let radius = literal(settings.deviation.radius);
-    let bound: Vec<f64> = (0..=spec.horizon)
-        .map(|t| radius * (1.0 + 0.1 * f64::from(t)))
-        .collect();
+    let bound: Vec<f64> = (0..=spec.horizon).map(|t| radius * (1.0 + 0.1 * f64::from(t))).collect();
     let tightening = deviation::tightening(&bound, 0.5, 0.25, &spec);
     let starts = || Starts::Drawn {
         region: Region::new_box(settings.low, settings.high).expect("box"),
@@ -485,14 +439,8 @@ fn compare<S, P, const NX: usize, const NU: usize>(
     assert_eq!(measures.len(), COUNT as usize);
     for (i, (found, oracle)) in measures.iter().zip(&oracle).enumerate() {
         let near = |found: f32, oracle: f64| (f64::from(found) - oracle).abs() <= band;
-        assert!(
-            near(found.nominal, oracle.nominal),
-            "{name}, pair {i}: {found:?}"
-        );
-        assert!(
-            near(found.perturbed, oracle.perturbed),
-            "{name}, pair {i}: {found:?}"
-        );
+        assert!(near(found.nominal, oracle.nominal), "{name}, pair {i}: {found:?}");
+        assert!(near(found.perturbed, oracle.perturbed), "{name}, pair {i}: {found:?}");
     }
     compare_farthest(&name, &farthest, &oracle, &single);
     compare_measures(backend, plant, &starts(), &spec, &tightening, &oracle, band);
@@ -506,28 +454,16 @@ fn compare_farthest(
     single: &[ScalarPair],
 ) {
     let distances = |pairs: &[ScalarPair]| -> Vec<f64> {
-        pairs
-            .iter()
-            .flat_map(|pair| pair.distances.clone())
-            .collect()
+        pairs.iter().flat_map(|pair| pair.distances.clone()).collect()
     };
     let [exact, rounded] = [distances(oracle), distances(single)];
-    let allowed = allowance(
-        &format!("{name}, distances"),
-        exact.into_iter().zip(rounded),
-    );
+    let allowed = allowance(&format!("{name}, distances"), exact.into_iter().zip(rounded));
     for (t, found) in farthest.iter().enumerate() {
-        let largest = oracle
-            .iter()
-            .map(|pair| pair.distances[t])
-            .fold(0.0, f64::max);
+        let largest = oracle.iter().map(|pair| pair.distances[t]).fold(0.0, f64::max);
         let off = (f64::from(found.distance) - largest).abs();
         assert!(off <= allowed, "{name}, step {t}: {found:?} of {largest}");
         let attained = oracle[found.pair as usize].distances[t];
-        assert!(
-            (attained - largest).abs() <= allowed,
-            "{name}, step {t}: {found:?}"
-        );
+        assert!((attained - largest).abs() <= allowed, "{name}, step {t}: {found:?}");
     }
 }
 
@@ -557,9 +493,7 @@ fn compare_measures<S, P, const NX: usize, const NU: usize>(
             values.extend_from_slice(found);
             Ok(())
         };
-        backend
-            .reach_avoid(plant, &task, &mut sink)
-            .expect("measures");
+        backend.reach_avoid(plant, &task, &mut sink).expect("measures");
         values
     };
     let (values, signs) = (run(Query::Measure), run(Query::Sign));
@@ -577,10 +511,7 @@ fn compare_measures<S, P, const NX: usize, const NU: usize>(
         }
         positive += usize::from(exact > 0.0);
     }
-    println!(
-        "{positive} of {} positive, {inside} within the band",
-        oracle.len()
-    );
+    println!("{positive} of {} positive, {inside} within the band", oracle.len());
     assert!(positive > 0 && positive < oracle.len(), "both signs occur");
 }
 
@@ -594,24 +525,14 @@ fn every_f32_path_is_near_its_f64_loop() {
         for control in [PairControl::Replay, PairControl::ClosedLoop] {
             let mut settings_of_race = race_settings(&race);
             // Near the gate, so that both signs are common.
-            settings_of_race.low = [
-                -0.5, -0.2, -1.5, 0.4, -0.3, -0.2, -1.0, -0.2, -3.2, 0.1, -1.0, -0.2,
-            ];
+            settings_of_race.low =
+                [-0.5, -0.2, -1.5, 0.4, -0.3, -0.2, -1.0, -0.2, -3.2, 0.1, -1.0, -0.2];
             settings_of_race.high = [0.5, 0.2, -0.5, 0.8, 0.3, 0.2, 1.0, 0.2, -1.0, 0.4, 1.0, 0.2];
-            let plant = Plant {
-                system: &race,
-                policy: &network,
-            };
+            let plant = Plant { system: &race, policy: &network };
             compare(backend, plant, &settings_of_race, control);
-            let plant = Plant {
-                system: &race,
-                policy: &Steer,
-            };
+            let plant = Plant { system: &race, policy: &Steer };
             compare(backend, plant, &settings_of_race, control);
-            let plant = Plant {
-                system: &integrator,
-                policy: &Damped,
-            };
+            let plant = Plant { system: &integrator, policy: &Damped };
             compare(backend, plant, &settings(&integrator, 30), control);
         }
     }

@@ -13,15 +13,8 @@ use serde_json::Value;
 fn change_strings(record: &Record, change: &mut impl FnMut(&str) -> String) -> Record {
     fn walk(value: &mut Value, change: &mut impl FnMut(&str) -> String) {
         // The words of enumerations must stay.
-        const MODES: [&str; 7] = [
-            "replay",
-            "fixed-shape",
-            "scenario",
-            "verified",
-            "exhausted",
-            "rays",
-            "no-boundary",
-        ];
+        const MODES: [&str; 7] =
+            ["replay", "fixed-shape", "scenario", "verified", "exhausted", "rays", "no-boundary"];
         match value {
             Value::String(text) if !MODES.contains(&text.as_str()) => *text = change(text),
             Value::Array(items) => items.iter_mut().for_each(|item| walk(item, change)),
@@ -74,17 +67,10 @@ fn every_number_stands_in_its_row() {
     let page = html(&records::race());
     let one = |name: &str, expected: &str| {
         let rows = cells(&page, name);
-        assert!(
-            rows.contains(&vec![expected.to_owned()]),
-            "{name}: {expected} not in {rows:?}"
-        );
+        assert!(rows.contains(&vec![expected.to_owned()]), "{name}: {expected} not in {rows:?}");
     };
     let claims = |name: &str, expected: [&str; 3]| {
-        assert_eq!(
-            cells(&page, name),
-            [expected.map(str::to_owned).to_vec()],
-            "{name}"
-        );
+        assert_eq!(cells(&page, name), [expected.map(str::to_owned).to_vec()], "{name}");
     };
     claims("certified risk", ["0.0426", "0.0119", "0.0571"]);
     claims("risk asked for, epsilon", ["0.1", "0.0119", "0.1"]);
@@ -121,15 +107,9 @@ fn every_number_stands_in_its_row() {
     one("volume of the verified ball", "0.007312");
     let row = |name: &str, expected: &[&str]| {
         let rows = cells(&page, name);
-        assert!(
-            rows.iter().any(|row| row == expected),
-            "{name}: {expected:?} not in {rows:?}"
-        );
+        assert!(rows.iter().any(|row| row == expected), "{name}: {expected:?} not in {rows:?}");
     };
-    row(
-        "L_r of the target margin",
-        &["14.14", "computed", "14.15", "14.11"],
-    );
+    row("L_r of the target margin", &["14.14", "computed", "14.15", "14.11"]);
     row("total", &["", "0.004"]);
     row("growth", &["5 rounds at 2e-4", "0.001"]);
     row("1", &["0.55", "159", "23", "0.4313", "0", "2"]);
@@ -143,10 +123,7 @@ fn nothing_is_loaded_from_anywhere() {
     let page = html(&records::race());
     for tag in tags(&page) {
         for (name, value) in attributes(tag) {
-            assert!(
-                !["src", "srcset", "action", "style"].contains(&name),
-                "<{tag}>"
-            );
+            assert!(!["src", "srcset", "action", "style"].contains(&name), "<{tag}>");
             assert!(!name.starts_with("on"), "<{tag}>");
             assert!(name != "href" || value == "data:,", "<{tag}>");
         }
@@ -156,11 +133,7 @@ fn nothing_is_loaded_from_anywhere() {
     assert_eq!(page.matches("url(").count(), local);
     for identity in page.split("url(#").skip(1) {
         let (identity, _) = identity.split_once(')').unwrap();
-        assert_eq!(
-            page.matches(&format!("id=\"{identity}\"")).count(),
-            1,
-            "{identity}"
-        );
+        assert_eq!(page.matches(&format!("id=\"{identity}\"")).count(), 1, "{identity}");
     }
     assert!(page.contains("default-src 'none'"));
 }
@@ -201,10 +174,7 @@ fn starts_are_marked_by_outcome() {
     let failed = samples.iter().filter(|sample| !sample.success).count();
     assert!(failed > 0);
     assert_eq!(drawn.matches("class=\"bad-line\"").count(), failed);
-    assert_eq!(
-        drawn.matches("class=\"good\"").count(),
-        samples.len() - failed
-    );
+    assert_eq!(drawn.matches("class=\"good\"").count(), samples.len() - failed);
 }
 
 #[test]
@@ -215,13 +185,7 @@ fn the_ball_is_drawn_as_the_plane_cuts_it() {
         let tag = rest.split_once('>').unwrap().0.to_owned();
         let value = |name: &str| -> f64 {
             let attributes = attributes(&tag);
-            attributes
-                .iter()
-                .find(|(other, _)| *other == name)
-                .unwrap()
-                .1
-                .parse()
-                .unwrap()
+            attributes.iter().find(|(other, _)| *other == name).unwrap().1.parse().unwrap()
         };
         [value("rx"), value("ry")]
     };
@@ -231,17 +195,11 @@ fn the_ball_is_drawn_as_the_plane_cuts_it() {
     record.growth.center.as_mut().unwrap()[3] = record.state.x[3];
     let page = html(&record);
     let within = half(&page);
-    assert!(
-        (within[0] - within[1]).abs() < 0.011,
-        "a circle: {within:?}"
-    );
+    assert!((within[0] - within[1]).abs() < 0.011, "a circle: {within:?}");
     let radius = record.growth.radius;
     let expected = (radius * radius - 0.04 * 0.04).sqrt() / radius;
     // Coordinates are rounded to a hundredth: two of them in a ratio of lengths near 40.
-    assert!(
-        (off[0] / within[0] - expected).abs() < 0.01 / within[0],
-        "{off:?} {within:?}"
-    );
+    assert!((off[0] / within[0] - expected).abs() < 0.01 / within[0], "{off:?} {within:?}");
     assert!(!drawing(&page, "figure-certified").contains("class=\"shadow\""));
     // A centre further off than the radius leaves only the shadow.
     record.growth.center.as_mut().unwrap()[5] = 0.5;
@@ -280,19 +238,13 @@ fn the_colour_of_a_cell_is_its_sign() {
 type Edge = (&'static str, fn(&mut Record));
 
 const EDGES: [Edge; 20] = [
-    ("all negative", |record| {
-        fill(&mut record.slice.check_margin, -2.0)
-    }),
-    ("all zero", |record| {
-        fill(&mut record.slice.check_margin, 0.0)
-    }),
+    ("all negative", |record| fill(&mut record.slice.check_margin, -2.0)),
+    ("all zero", |record| fill(&mut record.slice.check_margin, 0.0)),
     ("constant margins", |record| {
         fill(&mut record.slice.target_margin, 1.0);
         fill(&mut record.slice.constraint_margin, 1.0);
     }),
-    ("no slice value finite", |record| {
-        fill(&mut record.slice.check_margin, -1e30)
-    }),
+    ("no slice value finite", |record| fill(&mut record.slice.check_margin, -1e30)),
     ("some slice values not finite", |record| {
         record.slice.check_margin[7] = f32::NAN;
         record.slice.target_margin[9] = f32::INFINITY;
@@ -320,12 +272,8 @@ const EDGES: [Edge; 20] = [
         record.slice.constraint_margin.truncate(1);
     }),
     ("no cells", |record| record.slice.x.values.clear()),
-    ("cells that do not fit", |record| {
-        record.slice.check_margin.truncate(3)
-    }),
-    ("states that are not there", |record| {
-        record.slice.x.state = 99
-    }),
+    ("cells that do not fit", |record| record.slice.check_margin.truncate(3)),
+    ("states that are not there", |record| record.slice.x.state = 99),
     ("no rollouts", |record| record.picture.rollouts.clear()),
     ("a rollout that explodes", |record| {
         record.picture.rollouts[0].states[9].fill(1e12);
@@ -351,15 +299,9 @@ const EDGES: [Edge; 20] = [
     ("no words", |record| {
         record.statements.clear();
         record.system.name.clear();
-        record
-            .system
-            .states
-            .iter_mut()
-            .for_each(|axis| axis.name.clear());
+        record.system.states.iter_mut().for_each(|axis| axis.name.clear());
     }),
-    ("one varying axis", |record| {
-        record.growth.varies.fill(false)
-    }),
+    ("one varying axis", |record| record.growth.varies.fill(false)),
 ];
 
 fn fill(values: &mut [f32], value: f32) {

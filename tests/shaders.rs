@@ -66,21 +66,11 @@ fn network(states: usize, controls: usize, activation: Activation) -> Mlp {
 fn plants<S: System<NX, NU>, const NX: usize, const NU: usize>(
     system: &S,
 ) -> Vec<(String, Shape, String)> {
-    let formula = physics::<_, _, NX, NU>(Plant {
-        system,
-        policy: &Clamped,
-    });
-    let mut all = vec![(
-        format!("{} clamped", system.name()),
-        Shape::new(NX, NU, None),
-        formula,
-    )];
+    let formula = physics::<_, _, NX, NU>(Plant { system, policy: &Clamped });
+    let mut all = vec![(format!("{} clamped", system.name()), Shape::new(NX, NU, None), formula)];
     for activation in [Activation::Relu, Activation::Tanh, Activation::Silu] {
         let mlp = network(NX, NU, activation);
-        let text = physics::<_, _, NX, NU>(Plant {
-            system,
-            policy: &mlp,
-        });
+        let text = physics::<_, _, NX, NU>(Plant { system, policy: &mlp });
         let name = format!("{} {activation:?}", system.name());
         all.push((name, Shape::new(NX, NU, Some(&mlp)), text));
     }
@@ -93,18 +83,11 @@ fn all_plants() -> Vec<(String, Shape, String)> {
     all.extend(plants(&DoubleIntegrator::default()));
     let integrator = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
-    let text = physics(Plant {
-        system: &integrator,
-        policy: &policy,
-    });
+    let text = physics(Plant { system: &integrator, policy: &policy });
     all.push(("bang-bang".to_owned(), Shape::new(2, 1, None), text));
     for cone in [Cone::Distance, Cone::Squared, Cone::Root] {
         let speed_limit = cone == Cone::Distance;
-        all.extend(plants(&DroneRace {
-            cone,
-            speed_limit,
-            ..DroneRace::default()
-        }));
+        all.extend(plants(&DroneRace { cone, speed_limit, ..DroneRace::default() }));
     }
     all
 }
@@ -168,9 +151,7 @@ fn bindings_are_those_that_rust_lists() {
             declared += 1;
             let variable_name = variable.name.as_deref().unwrap_or_default();
             assert_eq!(binding.group, 0, "{name}: {variable_name}");
-            let found = listed
-                .iter()
-                .find(|(slot, _)| *slot as u32 == binding.binding);
+            let found = listed.iter().find(|(slot, _)| *slot as u32 == binding.binding);
             let (slot, access) =
                 found.unwrap_or_else(|| panic!("{name}: {variable_name} unlisted"));
             assert!(
@@ -272,11 +253,7 @@ fn uniform_block_has_the_layout_of_params() {
         assert_eq!(*span as usize, size_of::<Params>(), "{name}");
         for member in members {
             let float = member.name.as_deref() == Some("pair_radius");
-            let scalar = if float {
-                naga::Scalar::F32
-            } else {
-                naga::Scalar::U32
-            };
+            let scalar = if float { naga::Scalar::F32 } else { naga::Scalar::U32 };
             let inner = &module.types[member.ty].inner;
             assert_eq!(*inner, TypeInner::Scalar(scalar), "{name}");
         }
@@ -311,10 +288,7 @@ const LAYERS: [(&str, u32); 13] = [
 ];
 
 fn layer(module: &str) -> Option<u32> {
-    LAYERS
-        .iter()
-        .find(|(name, _)| *name == module)
-        .map(|(_, layer)| *layer)
+    LAYERS.iter().find(|(name, _)| *name == module).map(|(_, layer)| *layer)
 }
 
 fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
@@ -335,9 +309,7 @@ fn sources() -> Vec<(String, String)> {
     rust_files(&root, &mut files);
     let read = |path: PathBuf| {
         let text = fs::read_to_string(&path).expect("a source file");
-        let code = text
-            .lines()
-            .filter(|line| !line.trim_start().starts_with("//"));
+        let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
         let code = code.collect::<Vec<_>>().join("\n");
         let name = path.strip_prefix(&root).expect("a file of src");
         (name.to_string_lossy().replace('\\', "/"), code)
@@ -348,13 +320,10 @@ fn sources() -> Vec<(String, String)> {
 /// Top-level modules that `code` names after `crate::` or `reachcast::`, also in braces.
 fn imports(code: &str) -> Vec<String> {
     let word = |text: &str| -> String {
-        text.chars()
-            .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
-            .collect()
+        text.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect()
     };
-    let paths = ["crate::", "reachcast::"]
-        .into_iter()
-        .flat_map(|prefix| code.split(prefix).skip(1));
+    let paths =
+        ["crate::", "reachcast::"].into_iter().flat_map(|prefix| code.split(prefix).skip(1));
     let mut found = Vec::new();
     for rest in paths {
         match rest.strip_prefix('{') {
@@ -396,10 +365,7 @@ fn a_file_imports_only_from_its_layer_and_above() {
         for import in imports(&code) {
             // Names that are not modules are re-exports of `lib.rs` from the first layer.
             let theirs = layer(&import).unwrap_or(1);
-            assert!(
-                theirs <= own,
-                "{name} (layer {own}) imports {import} ({theirs})"
-            );
+            assert!(theirs <= own, "{name} (layer {own}) imports {import} ({theirs})");
         }
     }
 }
@@ -414,8 +380,5 @@ fn only_the_gpu_backend_names_wgpu() {
             assert!(!code.contains("wgpu"), "{name} names the GPU library");
         }
     }
-    assert!(
-        inside > 0,
-        "the search finds nothing, not even where it must"
-    );
+    assert!(inside > 0, "the search finds nothing, not even where it must");
 }

@@ -67,11 +67,7 @@ pub(super) struct Global {
 impl Global {
     /// What lies over a configuration file.
     pub(super) fn overrides(&self) -> Overrides {
-        Overrides {
-            profile: self.profile,
-            seed: self.seed,
-            set: self.set.clone(),
-        }
+        Overrides { profile: self.profile, seed: self.seed, set: self.set.clone() }
     }
 }
 

@@ -26,24 +26,13 @@ pub(super) const POLICY: &str = "policy.safetensors";
 pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let config = Config::load(path, &global.overrides())?;
     let policy = config.policy_source(folder_of(path))?;
-    let out = global
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let job = Certify {
-        global,
-        config: &config,
-        out: &out,
-    };
+    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let job = Certify { global, config: &config, out: &out };
     let (record, mut staged) = config.with_plant(&policy, job)?;
     stage(&mut staged, &record, &policy)?;
     let files = staged.publish()?;
     report(global, &record, || summary::text(&record, &files))?;
-    Ok(if record.holds {
-        Outcome::Done
-    } else {
-        Outcome::NotObtained
-    })
+    Ok(if record.holds { Outcome::Done } else { Outcome::NotObtained })
 }
 
 /// The command for one plant.

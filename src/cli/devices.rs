@@ -62,11 +62,7 @@ pub(super) fn list(global: &Global) -> Result<Outcome> {
     let cpu = cpu(global)?.device();
     let chosen = adapters.iter().find(|adapter| is_hardware(adapter));
     let auto = chosen.map_or("cpu".to_owned(), |adapter| adapter.name.clone());
-    let listing = Listing {
-        cpu,
-        adapters,
-        auto,
-    };
+    let listing = Listing { cpu, adapters, auto };
     report(global, &listing, || {
         let mut text = format!("cpu  {}\n", listing.cpu);
         for adapter in &listing.adapters {

@@ -55,11 +55,9 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
     let global = &arguments.global;
     match &arguments.command {
         Command::Certify { config } => certify::run(global, config),
-        Command::Rollout {
-            config,
-            starts,
-            measures,
-        } => rollout::run(global, config, starts, measures),
+        Command::Rollout { config, starts, measures } => {
+            rollout::run(global, config, starts, measures)
+        }
         Command::Query { folder, states } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
         Command::Scenarios(asked) => scenarios::run(global, *asked),
@@ -78,15 +76,11 @@ fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String
         (false, false) => text(),
     };
     let mut output = std::io::stdout().lock();
-    match output
-        .write_all(text.as_bytes())
-        .and_then(|()| output.flush())
-    {
+    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
         // Whoever closed the pipe has read enough.
-        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::Write {
-            path: "standard output".into(),
-            source,
-        }),
+        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::Write { path: "standard output".into(), source })
+        }
         _ => Ok(()),
     }
 }

@@ -52,10 +52,7 @@ impl Progress {
 
     fn with_bar<T>(&self, work: impl FnOnce(&mut ProgressBar) -> T) -> T {
         // A bar has no state that a panic elsewhere could break.
-        let mut bar = self
-            .bar
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut bar = self.bar.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         work(&mut bar)
     }
 }
@@ -70,9 +67,7 @@ impl Watch for Progress {
     fn begin(&self, stage: &str, total: u64) {
         let template = "{msg:28} [{bar:24}] {percent:>3} %  {per_sec}, {eta} left";
         let style = ProgressStyle::with_template(template);
-        let style = style
-            .unwrap_or_else(|_| ProgressStyle::default_bar())
-            .progress_chars("=> ");
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ");
         self.with_bar(|bar| {
             bar.finish_and_clear();
             *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden())

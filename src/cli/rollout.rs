@@ -50,12 +50,7 @@ pub(super) fn run(
     let config = Config::load(config, &global.overrides())?;
     let spec = config.spec()?;
     let policy = config.policy_source(folder)?;
-    let job = Rollout {
-        global,
-        spec,
-        starts,
-        measures,
-    };
+    let job = Rollout { global, spec, starts, measures };
     let summary = config.with_plant(&policy, job)?;
     report(global, &summary, || text(&summary))?;
     Ok(Outcome::Done)
@@ -154,13 +149,7 @@ impl Count {
 
 /// The summary in words.
 fn text(summary: &Summary) -> String {
-    let Summary {
-        starts,
-        successes,
-        non_finite,
-        success_interval: [low, high],
-        ..
-    } = summary;
+    let Summary { starts, successes, non_finite, success_interval: [low, high], .. } = summary;
     let share = 100.0 * *successes as f64 / *starts as f64;
     format!(
         "{successes} of {starts} starts reach the target safely: {share:.2} % \

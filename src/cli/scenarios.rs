@@ -25,13 +25,7 @@ struct Counts {
 
 /// Prints the counts of the simple, the exact and, with failures, the Clopper-Pearson bound.
 pub(super) fn run(global: &Global, asked: ScenarioArguments) -> Result<Outcome> {
-    let ScenarioArguments {
-        epsilon,
-        beta,
-        dim,
-        failures,
-        rounds,
-    } = asked;
+    let ScenarioArguments { epsilon, beta, dim, failures, rounds } = asked;
     if failures.is_some() && dim != 1 {
         let problem = "goes with one decision variable only; leave out --dim";
         return Err(Error::invalid("--failures", problem));
@@ -62,26 +56,13 @@ pub(super) fn run(global: &Global, asked: ScenarioArguments) -> Result<Outcome> 
 
 /// The counts in words.
 fn text(counts: &Counts) -> String {
-    let Counts {
-        epsilon,
-        beta,
-        decision_vars,
-        rounds,
-        beta_per_round,
-        ..
-    } = counts;
+    let Counts { epsilon, beta, decision_vars, rounds, beta_per_round, .. } = counts;
     let mut text = format!("risk {epsilon} with confidence 1 - {beta}");
     if *rounds > 1 {
         text += &format!(", {rounds} rounds of beta {beta_per_round:e}, counts per round");
     }
-    text += &format!(
-        "\nsimple bound, {decision_vars} decision variable(s): {}\n",
-        counts.simple
-    );
-    text += &format!(
-        "exact bound,  {decision_vars} decision variable(s): {}\n",
-        counts.exact
-    );
+    text += &format!("\nsimple bound, {decision_vars} decision variable(s): {}\n", counts.simple);
+    text += &format!("exact bound,  {decision_vars} decision variable(s): {}\n", counts.exact);
     if let (Some(failures), Some(count)) = (counts.failures, counts.with_failures) {
         text += &format!("at most {failures} failure(s) (Clopper-Pearson): {count}\n");
     }

@@ -52,22 +52,14 @@ impl Stored {
             Some(_) => PolicySource::read(folder.join(POLICY))?,
             None => config.policy_source(folder)?,
         };
-        Ok(Self {
-            record,
-            config,
-            policy,
-        })
+        Ok(Self { record, config, policy })
     }
 }
 
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
     let stored = Stored::read(global, folder)?;
-    let job = Ask {
-        global,
-        record: &stored.record,
-        states,
-    };
+    let job = Ask { global, record: &stored.record, states };
     let rows = stored.config.with_plant(&stored.policy, job)?;
     match &global.out {
         None => report(global, &rows, || csv(&rows))?,
@@ -114,11 +106,7 @@ fn write(out: &Path, rows: &[QueryRow]) -> Result<PathBuf> {
 /// A line per state.
 fn csv(rows: &[QueryRow]) -> String {
     let line = |row: &QueryRow| {
-        let QueryRow {
-            tier,
-            check_margin,
-            target_margin,
-        } = row;
+        let QueryRow { tier, check_margin, target_margin } = row;
         format!("{tier},{check_margin},{target_margin}\n")
     };
     let lines: String = rows.iter().map(line).collect();
@@ -127,17 +115,9 @@ fn csv(rows: &[QueryRow]) -> String {
 
 /// How many states are of each tier.
 fn counts(rows: &[QueryRow], path: &Path) -> String {
-    let names = [
-        "in the target",
-        "certified",
-        "in the verified ball",
-        "none of these",
-    ];
+    let names = ["in the target", "certified", "in the verified ball", "none of these"];
     let line = |(tier, name): (usize, &str)| {
-        let count = rows
-            .iter()
-            .filter(|row| usize::from(row.tier) == tier)
-            .count();
+        let count = rows.iter().filter(|row| usize::from(row.tier) == tier).count();
         format!("tier {tier} ({name}): {count}\n")
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();
@@ -147,17 +127,10 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
 /// Verifies the certificate in the folder again.
 pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
     let stored = Stored::read(global, folder)?;
-    let job = Verify {
-        global,
-        stored: &stored,
-    };
+    let job = Verify { global, stored: &stored };
     let found = stored.config.with_plant(&stored.policy, job)?;
     report(global, &found, || findings(&found))?;
-    Ok(if found.holds {
-        Outcome::Done
-    } else {
-        Outcome::NotObtained
-    })
+    Ok(if found.holds { Outcome::Done } else { Outcome::NotObtained })
 }
 
 /// `check` for one plant.
@@ -189,10 +162,7 @@ impl Job for Verify<'_> {
 fn findings(found: &CheckReport) -> String {
     let line = |finding: &scenario::Finding| {
         let mark = if finding.holds { "ok   " } else { "FAILS" };
-        format!(
-            "{mark} {}: stored {}, found {}\n",
-            finding.name, finding.stored, finding.found
-        )
+        format!("{mark} {}: stored {}, found {}\n", finding.name, finding.stored, finding.found)
     };
     let lines: String = found.findings.iter().map(line).collect();
     let verdict = match found.holds {

@@ -7,12 +7,7 @@ use crate::scenario::record::{Claim, GrowthOutcome, Record};
 /// What was claimed, with the numbers behind it, and where the files are.
 pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     let mut lines = vec![headline(record), String::new()];
-    lines.extend(
-        record
-            .statements
-            .iter()
-            .map(|statement| format!("* {statement}")),
-    );
+    lines.extend(record.statements.iter().map(|statement| format!("* {statement}")));
     lines.push(String::new());
     lines.extend(table(record));
     lines.push(String::new());
@@ -27,20 +22,14 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     ));
     lines.push(format!("growth          {}", growth(record)));
     let state = &record.state;
-    lines.push(format!(
-        "state           tier {}, V_check {:.4}",
-        state.tier, state.check_margin
-    ));
+    lines.push(format!("state           tier {}, V_check {:.4}", state.tier, state.check_margin));
     let timing = &record.timing;
     lines.push(format!(
         "work            {} rollouts in {:.2} s on {}",
         timing.rollouts, timing.wall_seconds, record.provenance.device
     ));
     let names = files.iter().map(|file| file.display().to_string());
-    lines.push(format!(
-        "files           {}",
-        names.collect::<Vec<_>>().join("\n                ")
-    ));
+    lines.push(format!("files           {}", names.collect::<Vec<_>>().join("\n                ")));
     lines.join("\n") + "\n"
 }
 
@@ -88,10 +77,7 @@ fn growth(record: &Record) -> String {
     let rounds = growth.rounds.len();
     match growth.outcome {
         GrowthOutcome::Verified => {
-            format!(
-                "verified a ball of radius {:.4} in round {rounds}",
-                growth.radius
-            )
+            format!("verified a ball of radius {:.4} in round {rounds}", growth.radius)
         }
         GrowthOutcome::Exhausted => format!("exhausted: each of {rounds} rounds had a failure"),
         GrowthOutcome::NoBoundary => "no boundary of the certified set to grow from".to_owned(),

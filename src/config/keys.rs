@@ -119,8 +119,5 @@ pub(super) fn nearest<'a>(path: &str, candidates: &'a [String]) -> &'a str {
         let whole = strsim::damerau_levenshtein(path, candidate);
         whole.min(1 + strsim::damerau_levenshtein(&last(path), &last(candidate)))
     };
-    candidates
-        .iter()
-        .min_by_key(edits)
-        .map_or("", String::as_str)
+    candidates.iter().min_by_key(edits).map_or("", String::as_str)
 }

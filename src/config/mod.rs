@@ -109,9 +109,7 @@ fn defaults(given: &Table, origin: &str) -> Result<Table> {
     };
     let expected = format!("expected \"{}\"", profile::SYSTEMS.join("\" or \""));
     let name = given.get("system").and_then(|system| system.get("name"));
-    let known = name
-        .and_then(Value::as_str)
-        .and_then(|name| profile::defaults(profile, name));
+    let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
     let config = known.ok_or_else(|| {
         let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
         refused("system.name", format!("{found}; {expected}"))

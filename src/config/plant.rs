@@ -51,11 +51,7 @@ impl PolicySource {
     pub fn read(path: PathBuf) -> Result<Self> {
         let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
         let network = Mlp::from_bytes(&bytes).map_err(|problem| Error::file(&path, problem))?;
-        Ok(Self::Network {
-            path,
-            bytes,
-            network,
-        })
+        Ok(Self::Network { path, bytes, network })
     }
 }
 
@@ -80,12 +76,7 @@ impl Config {
     pub fn with_plant<J: Job>(&self, policy: &PolicySource, job: J) -> Result<J::Output> {
         let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
         match self.system {
-            SystemSection::DroneRace {
-                cone,
-                ego_gain,
-                opponent_gain,
-                speed_limit,
-            } => {
+            SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } => {
                 let system = DroneRace {
                     ego_gain: number("ego_gain", ego_gain)?,
                     opponent_gain: number("opponent_gain", opponent_gain)?,
@@ -99,11 +90,7 @@ impl Config {
                     }
                 }
             }
-            SystemSection::DoubleIntegrator {
-                target,
-                corridor,
-                acceleration,
-            } => {
+            SystemSection::DoubleIntegrator { target, corridor, acceleration } => {
                 let system = DoubleIntegrator {
                     target: number("target", target)?,
                     corridor: number("corridor", corridor)?,
@@ -113,10 +100,7 @@ impl Config {
                     PolicySource::Formula(name) if name == "bang-bang" => {
                         let acceleration = system.acceleration;
                         let policy = &BangBang { acceleration };
-                        job.run(Plant {
-                            system: &system,
-                            policy,
-                        })
+                        job.run(Plant { system: &system, policy })
                     }
                     PolicySource::Formula(name) => Err(no_formula(&system, name, "bang-bang")),
                     PolicySource::Network { path, network, .. } => {
@@ -150,11 +134,6 @@ where
 {
     let states = system.states();
     let names = states.each_ref().map(|axis| axis.name.as_str());
-    network
-        .check_fits(&names, NU)
-        .map_err(|problem| Error::file(path, problem))?;
-    job.run(Plant {
-        system,
-        policy: network,
-    })
+    network.check_fits(&names, NU).map_err(|problem| Error::file(path, problem))?;
+    job.run(Plant { system, policy: network })
 }

@@ -72,10 +72,7 @@ impl Config {
             Ok(ends)
         };
         let intervals = in_order("box", &self.bounds, axes, interval)?;
-        let (low, high) = (
-            intervals.map(|[low, _]| low),
-            intervals.map(|[_, high]| high),
-        );
+        let (low, high) = (intervals.map(|[low, _]| low), intervals.map(|[_, high]| high));
         if low == high {
             let problem = "empty: no interval has any length, so there is nothing to draw from";
             return Err(Error::invalid("box", problem));
@@ -140,21 +137,14 @@ impl Config {
     /// The states that say what is ahead.
     fn heading(&self, axes: &[Axis]) -> Result<Option<[usize; 4]>> {
         let place = "growth.heading";
-        let indices = self
-            .growth
-            .heading
-            .iter()
-            .map(|name| state_index(place, name, axes));
+        let indices = self.growth.heading.iter().map(|name| state_index(place, name, axes));
         let indices = indices.collect::<Result<Vec<_>>>()?;
         if indices.is_empty() {
             return Ok(None);
         }
         let four = <[usize; 4]>::try_from(indices.as_slice());
         four.map(Some).map_err(|_| {
-            let problem = format!(
-                "{} states; expected 4, x, vx, y, vy, or none",
-                indices.len()
-            );
+            let problem = format!("{} states; expected 4, x, vx, y, vy, or none", indices.len());
             Error::invalid(place, problem)
         })
     }
@@ -179,10 +169,7 @@ fn slice_axis(place: &str, section: &SliceAxisSection, axes: &[Axis]) -> Result<
     let to = f64::from(finite(&format!("{place}.to"), section.to)?);
     positive_f32(&format!("{place}.step"), section.step)?;
     if from >= to {
-        let problem = format!(
-            "empty: from {} is not below to {}",
-            section.from, section.to
-        );
+        let problem = format!("empty: from {} is not below to {}", section.from, section.to);
         return Err(Error::invalid(place, problem));
     }
     // A millionth of a step is rounding, not one more value: -0.9, -0.8, ..., 0.8 below 0.9.
@@ -236,10 +223,7 @@ fn finite(key: &str, value: f64) -> Result<f32> {
     if single.is_finite() {
         return Ok(single);
     }
-    Err(Error::invalid(
-        key,
-        format!("{value} is not a finite number"),
-    ))
+    Err(Error::invalid(key, format!("{value} is not a finite number")))
 }
 
 /// `value`, finite and above 0.
@@ -247,10 +231,7 @@ fn positive(key: &str, value: f64) -> Result<f64> {
     if value.is_finite() && value > 0.0 {
         return Ok(value);
     }
-    Err(Error::invalid(
-        key,
-        format!("{value} is not a positive number"),
-    ))
+    Err(Error::invalid(key, format!("{value} is not a positive number")))
 }
 
 /// `value` as an f32, finite and above 0.
@@ -266,10 +247,7 @@ fn share(key: &str, value: f64) -> Result<f64> {
     if value > 0.0 && value < 1.0 {
         return Ok(value);
     }
-    Err(Error::invalid(
-        key,
-        format!("{value} is not strictly between 0 and 1"),
-    ))
+    Err(Error::invalid(key, format!("{value} is not strictly between 0 and 1")))
 }
 
 /// `count`, at least 1.

@@ -8,10 +8,8 @@ const RACE: &str = "system.name = 'drone-race'\npolicy.file = 'race.safetensors'
 const LINE: &str = "system.name = 'double-integrator'\npolicy.formula = 'bang-bang'\n";
 
 fn load(text: &str, set: &[&str]) -> Result<Config> {
-    let overrides = Overrides {
-        set: set.iter().map(ToString::to_string).collect(),
-        ..Overrides::default()
-    };
+    let overrides =
+        Overrides { set: set.iter().map(ToString::to_string).collect(), ..Overrides::default() };
     Config::from_table(toml::from_str(text).unwrap(), "race.toml", &overrides)
 }
 
@@ -33,12 +31,7 @@ fn refusal(set: &[&str]) -> String {
 #[test]
 fn rigorous_is_the_default_profile() {
     let config = load(RACE, &[]).unwrap();
-    let SystemSection::DroneRace {
-        cone,
-        ego_gain,
-        opponent_gain,
-        speed_limit,
-    } = config.system
+    let SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } = config.system
     else {
         panic!("{:?}", config.system)
     };
@@ -47,15 +40,9 @@ fn rigorous_is_the_default_profile() {
     let settings = race(&[]).unwrap();
     assert_eq!((settings.seed, settings.spec.horizon), (1, 30));
     assert_eq!((settings.low[9], settings.high[9]), (0.1, 0.5));
-    assert_eq!(
-        (settings.constants.target, settings.constants.constraint),
-        (None, None)
-    );
+    assert_eq!((settings.constants.target, settings.constants.constraint), (None, None));
     assert_eq!(settings.deviation.joint, Joint::FixedShape);
-    assert_eq!(
-        (settings.deviation.scenarios, settings.growth.scenarios),
-        (159, 159)
-    );
+    assert_eq!((settings.deviation.scenarios, settings.growth.scenarios), (159, 159));
     assert!(settings.growth.split_beta && settings.growth.varies == [true; 12]);
     assert_eq!(settings.growth.boundary, BoundarySearch::Rays);
 }
@@ -66,15 +53,9 @@ fn study_and_paper_are_the_published_experiments() {
     // 30 states.
     assert_eq!(study.spec.horizon, 29);
     assert_eq!((study.low[9], study.high[9]), (-1.0, 1.0));
-    assert_eq!(
-        (study.constants.target, study.constants.constraint),
-        (Some(10.0), Some(20.0))
-    );
+    assert_eq!((study.constants.target, study.constants.constraint), (Some(10.0), Some(20.0)));
     assert_eq!(study.deviation.joint, Joint::Separate);
-    assert_eq!(
-        (study.deviation.scenarios, study.growth.scenarios),
-        (158, 158)
-    );
+    assert_eq!((study.deviation.scenarios, study.growth.scenarios), (158, 158));
     let in_plane = std::array::from_fn(|i| i == 0 || i == 2);
     assert!(!study.growth.split_beta && study.growth.varies == in_plane);
     assert_eq!(study.growth.boundary, BoundarySearch::Slice);
@@ -98,10 +79,7 @@ fn study_and_paper_are_the_published_experiments() {
 #[test]
 fn slices_have_the_cells_of_the_study() {
     let [x, y] = race(&[]).unwrap().slice;
-    assert_eq!(
-        (x.state, x.values.len(), y.state, y.values.len()),
-        (0, 18, 2, 26)
-    );
+    assert_eq!((x.state, x.values.len(), y.state, y.values.len()), (0, 18, 2, 26));
     assert_eq!((x.values[0], y.values[0]), (-0.9, -2.6));
     assert!((x.values[17] - 0.8).abs() < 1e-6 && (y.values[25] + 0.1).abs() < 1e-6);
 }
@@ -160,10 +138,7 @@ fn unknown_keys_name_the_nearest() {
     let misplaced = near(&format!("scenarios = 3\n{RACE}"), &[]);
     assert!(misplaced.contains("`deviation.scenarios`"), "{misplaced}");
     let state = near(RACE, &["state.ego_q=1"]);
-    assert!(
-        state.contains("--set state.ego_q=1") && state.contains("`state.ego_"),
-        "{state}"
-    );
+    assert!(state.contains("--set state.ego_q=1") && state.contains("`state.ego_"), "{state}");
     // A key of the other system is unknown too.
     assert!(near(LINE, &["system.cone=root"]).contains("unknown key `system.cone`"));
     assert!(near(RACE, &["policy.fiel=x"]).contains("`policy.file`"));
@@ -189,20 +164,12 @@ fn values_of_the_wrong_kind_name_their_key() {
         assert!(message.contains(key), "{set}: {message}");
     }
     let cone = wrong("system.cone=round");
-    assert!(
-        cone.contains("`round`") && cone.contains("`squared`"),
-        "{cone}"
-    );
-    assert_eq!(
-        load(RACE, &["system.ego_gain=1"]).unwrap().rollout.horizon,
-        30
-    );
+    assert!(cone.contains("`round`") && cone.contains("`squared`"), "{cone}");
+    assert_eq!(load(RACE, &["system.ego_gain=1"]).unwrap().rollout.horizon, 30);
     assert!(wrong("system.name=drone").contains("\"drone-race\" or \"double-integrator\""));
     assert!(wrong("profile=strict").contains("rigorous"));
     assert!(wrong("policy.formula=bang-bang").contains("both `file` and `formula`"));
-    let none = load("system.name = 'drone-race'", &[])
-        .unwrap_err()
-        .to_string();
+    let none = load("system.name = 'drone-race'", &[]).unwrap_err().to_string();
     assert!(none.contains("no policy"), "{none}");
     let empty = load("", &[]).unwrap_err().to_string();
     assert!(empty.contains("system.name: missing"), "{empty}");
@@ -213,17 +180,11 @@ fn values_out_of_range_name_their_key() {
     for (set, words) in [
         ("rollout.horizon=0", "rollout.horizon: 0 is not within"),
         ("rollout.gamma=1.5", "rollout.gamma: 1.5"),
-        (
-            "deviation.epsilon=1",
-            "deviation.epsilon: 1 is not strictly between",
-        ),
+        ("deviation.epsilon=1", "deviation.epsilon: 1 is not strictly between"),
         ("deviation.beta=0", "deviation.beta: 0 is not"),
         ("global.beta=nan", "global.beta: NaN is not"),
         ("growth.epsilon=-0.1", "growth.epsilon: -0.1"),
-        (
-            "deviation.radius=0",
-            "deviation.radius: 0 is not a positive",
-        ),
+        ("deviation.radius=0", "deviation.radius: 0 is not a positive"),
         ("deviation.radius=1e-60", "deviation.radius"),
         ("growth.radius=inf", "growth.radius: inf"),
         ("growth.rounds=0", "growth.rounds: 0"),
@@ -233,20 +194,14 @@ fn values_out_of_range_name_their_key() {
         ("box.ego_x=[nan, 1]", "box.ego_x: NaN is not a finite"),
         ("state.opp_z=inf", "state.opp_z: inf is not a finite"),
         ("state.opp_z=1e39", "state.opp_z"),
-        (
-            "slice.x.state=ego_w",
-            "no state `ego_w`; the nearest is `ego_",
-        ),
+        ("slice.x.state=ego_w", "no state `ego_w`; the nearest is `ego_"),
         ("slice.x.state=ego_y", "`ego_y` is on both axes"),
         ("slice.x.step=0", "slice.x.step: 0 is not a positive"),
         ("slice.x.step=-0.1", "slice.x.step: -0.1"),
         ("slice.x.step=1e-9", "slice.x: "),
         ("slice.y.to=-3", "slice.y: empty"),
         ("growth.coordinates=[]", "growth.coordinates: empty"),
-        (
-            "growth.coordinates=['ego_w']",
-            "growth.coordinates: no state `ego_w`",
-        ),
+        ("growth.coordinates=['ego_w']", "growth.coordinates: no state `ego_w`"),
         ("growth.heading=['ego_x']", "growth.heading: 1 states"),
     ] {
         let message = refusal(&[set]);
@@ -255,9 +210,7 @@ fn values_out_of_range_name_their_key() {
     let point = |name: &str| format!("box.{name}=[0, 0]");
     let frozen = ["position", "velocity"].map(point);
     let line = load(LINE, &frozen.each_ref().map(String::as_str)).unwrap();
-    let empty = line
-        .settings(&DoubleIntegrator::default().states())
-        .unwrap_err();
+    let empty = line.settings(&DoubleIntegrator::default().states()).unwrap_err();
     assert!(empty.to_string().contains("box: empty"), "{empty}");
 }
 
@@ -287,13 +240,8 @@ fn shipped_configurations_are_complete() {
     }
     let path = folder.join("double_integrator.toml");
     let config = Config::load(&path, &Overrides::default()).unwrap();
-    let settings = config
-        .settings(&DoubleIntegrator::default().states())
-        .unwrap();
-    assert_eq!(
-        (settings.deviation.radius, settings.growth.radius),
-        (0.02, 0.1)
-    );
+    let settings = config.settings(&DoubleIntegrator::default().states()).unwrap();
+    assert_eq!((settings.deviation.radius, settings.growth.radius), (0.02, 0.1));
     // The race's file says what the defaults say.
     let shipped = Config::load(&folder.join("race.toml"), &Overrides::default()).unwrap();
     let plain = load(RACE, &["policy.file=policies/race_policy.safetensors"]).unwrap();

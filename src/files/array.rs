@@ -66,16 +66,11 @@ impl NpyHeader {
             None => descr.split_once(']')?.0,
         };
         let (shape, _) = value("shape")?.strip_prefix('(')?.split_once(')')?;
-        let lengths = shape
-            .split(',')
-            .map(str::trim)
-            .filter(|length| !length.is_empty());
+        let lengths = shape.split(',').map(str::trim).filter(|length| !length.is_empty());
         Some(Self {
             descr: descr.to_owned(),
             fortran_order: value("fortran_order")?.starts_with("True"),
-            shape: lengths
-                .map(|length| length.parse().ok())
-                .collect::<Option<_>>()?,
+            shape: lengths.map(|length| length.parse().ok()).collect::<Option<_>>()?,
         })
     }
 }
@@ -125,12 +120,7 @@ impl MeasureWriter {
         };
         let path = path.to_owned();
         match begun {
-            Ok(()) => Ok(Self {
-                path,
-                format,
-                file,
-                count: 0,
-            }),
+            Ok(()) => Ok(Self { path, format, file, count: 0 }),
             Err(source) => Err(Error::Write { path, source }),
         }
     }
@@ -147,10 +137,7 @@ impl MeasureWriter {
             // The shortest decimal that is read back as the same f32.
             Format::Csv => writeln!(file, "{measure}"),
         });
-        written.map_err(|source| Error::Write {
-            path: self.path.clone(),
-            source,
-        })
+        written.map_err(|source| Error::Write { path: self.path.clone(), source })
     }
 
     /// Completes the file and gives it its name.
@@ -158,12 +145,7 @@ impl MeasureWriter {
     /// # Errors
     /// [`Error::Write`] with the system's reason.
     pub fn publish(self) -> Result<()> {
-        let Self {
-            path,
-            format,
-            mut file,
-            count,
-        } = self;
+        let Self { path, format, mut file, count } = self;
         let mut complete = || {
             if format == Format::Npy {
                 file.seek(SeekFrom::Start(0))?;
@@ -176,9 +158,7 @@ impl MeasureWriter {
             let file = file.into_inner().map_err(|e| e.into_error())?;
             file.persist(&path).map_err(|e| e.error)
         });
-        renamed
-            .map(|_| ())
-            .map_err(|source| Error::Write { path, source })
+        renamed.map(|_| ()).map_err(|source| Error::Write { path, source })
     }
 }
 
@@ -191,10 +171,7 @@ mod tests {
         let values = [1.5_f32, -2.0, 3.25, f32::MIN_POSITIVE, 0.0, 7.0];
         let bytes = npy_bytes(&values, [2, 3]);
         let file = npyz::NpyFile::new(bytes.as_slice()).unwrap();
-        assert_eq!(
-            (file.shape(), file.order()),
-            (&[2_u64, 3][..], npyz::Order::C)
-        );
+        assert_eq!((file.shape(), file.order()), (&[2_u64, 3][..], npyz::Order::C));
         assert_eq!(file.into_vec::<f32>().unwrap(), values);
     }
 
@@ -220,17 +197,11 @@ mod tests {
         let parse = NpyHeader::parse;
         let plain = "{'descr': '<f8', 'fortran_order': False, 'shape': (500, 12), }   \n";
         let header = parse(plain).unwrap();
-        assert_eq!(
-            (header.descr.as_str(), header.fortran_order),
-            ("<f8", false)
-        );
+        assert_eq!((header.descr.as_str(), header.fortran_order), ("<f8", false));
         assert_eq!(header.shape, [500, 12]);
         let one = parse("{'descr':'|i1','fortran_order':True,'shape':(7,)}").unwrap();
         assert!(one.fortran_order && one.shape == [7]);
-        assert_eq!(
-            parse("{'descr': '<f8', 'fortran_order': False, 'shape': (-3,)}"),
-            None
-        );
+        assert_eq!(parse("{'descr': '<f8', 'fortran_order': False, 'shape': (-3,)}"), None);
         assert_eq!(parse("{'descr': '<f8'}"), None);
     }
 }

@@ -28,16 +28,10 @@ impl Staged {
     /// # Errors
     /// [`Error::Write`] if it cannot.
     pub fn new(folder: &Path) -> Result<Self> {
-        let refused = |source| Error::Write {
-            path: folder.to_owned(),
-            source,
-        };
+        let refused = |source| Error::Write { path: folder.to_owned(), source };
         std::fs::create_dir_all(folder).map_err(refused)?;
         temporary(folder)?;
-        Ok(Self {
-            folder: folder.to_owned(),
-            files: Vec::new(),
-        })
+        Ok(Self { folder: folder.to_owned(), files: Vec::new() })
     }
 
     /// Writes `bytes` for the file `name`.
@@ -47,13 +41,8 @@ impl Staged {
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.folder.join(name);
         let mut file = temporary(&self.folder)?;
-        let written = file
-            .write_all(bytes)
-            .and_then(|()| file.as_file().sync_all());
-        written.map_err(|source| Error::Write {
-            path: path.clone(),
-            source,
-        })?;
+        let written = file.write_all(bytes).and_then(|()| file.as_file().sync_all());
+        written.map_err(|source| Error::Write { path: path.clone(), source })?;
         self.files.push((file, path));
         Ok(())
     }
@@ -65,10 +54,7 @@ impl Staged {
     pub fn publish(self) -> Result<Vec<PathBuf>> {
         let rename = |(file, path): (NamedTempFile, PathBuf)| match file.persist(&path) {
             Ok(_) => Ok(path),
-            Err(error) => Err(Error::Write {
-                path,
-                source: error.error,
-            }),
+            Err(error) => Err(Error::Write { path, source: error.error }),
         };
         self.files.into_iter().map(rename).collect()
     }
@@ -83,10 +69,7 @@ fn temporary(folder: &Path) -> Result<NamedTempFile> {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666))
     };
-    let refused = |source| Error::Write {
-        path: folder.to_owned(),
-        source,
-    };
+    let refused = |source| Error::Write { path: folder.to_owned(), source };
     builder.tempfile_in(folder).map_err(refused)
 }
 
@@ -110,11 +93,7 @@ enum Format {
 impl Format {
     /// The format that the name asks for.
     fn of(path: &Path) -> Result<Self> {
-        let ending = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match ending.as_str() {
             "npy" => Ok(Self::Npy),
             "csv" => Ok(Self::Csv),

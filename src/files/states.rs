@@ -27,11 +27,7 @@ pub struct StateReader<const NX: usize> {
 #[derive(Debug)]
 enum Rows {
     /// Elements of `bytes` bytes; `left` rows of them.
-    Npy {
-        file: BufReader<File>,
-        bytes: usize,
-        left: u64,
-    },
+    Npy { file: BufReader<File>, bytes: usize, left: u64 },
     /// Lines; `number` have been read.
     Csv { file: BufReader<File>, number: u64 },
 }
@@ -55,12 +51,7 @@ impl<const NX: usize> StateReader<NX> {
                 Rows::Npy { file, bytes, left }
             }
         };
-        Ok(Self {
-            path: path.to_owned(),
-            rows,
-            names,
-            read: 0,
-        })
+        Ok(Self { path: path.to_owned(), rows, names, read: 0 })
     }
 
     /// Number of states left, where the file says so beforehand.
@@ -86,9 +77,7 @@ impl<const NX: usize> StateReader<NX> {
             let Some(state) = row.map_err(at)? else { break };
             if let Some(i) = state.iter().position(|value: &f32| !value.is_finite()) {
                 let (name, row) = (&self.names[i], self.read);
-                return Err(at(format!(
-                    "state {row} (from 0): {name} is not a finite f32"
-                )));
+                return Err(at(format!("state {row} (from 0): {name} is not a finite f32")));
             }
             states.push(state);
             self.read += 1;
@@ -123,18 +112,14 @@ fn check<const NX: usize>(
         return Err(format!("shape {shape:?}, expected [N, {NX}]"));
     };
     if columns != NX as u64 {
-        return Err(format!(
-            "shape {shape:?}, expected [N, {NX}]: a state has {NX} numbers"
-        ));
+        return Err(format!("shape {shape:?}, expected [N, {NX}]: a state has {NX} numbers"));
     }
     if header.fortran_order {
         return Err("stored column by column; save it in C order".to_owned());
     }
     let need = rows.checked_mul((NX * bytes) as u64);
     if need.is_none_or(|need| need > size) {
-        return Err(format!(
-            "truncated: {rows} states announced, the file has {size} bytes"
-        ));
+        return Err(format!("truncated: {rows} states announced, the file has {size} bytes"));
     }
     Ok((bytes, rows))
 }
@@ -153,8 +138,7 @@ fn npy_row<const NX: usize>(
     for value in &mut state {
         let mut buffer = [0; 8];
         let element = &mut buffer[..bytes];
-        file.read_exact(element)
-            .map_err(|e| format!("truncated ({e})"))?;
+        file.read_exact(element).map_err(|e| format!("truncated ({e})"))?;
         *value = match bytes {
             4 => f32::from_le_bytes([buffer[0], buffer[1], buffer[2], buffer[3]]),
             _ => f64::from_le_bytes(buffer) as f32,
@@ -204,9 +188,7 @@ fn check_names<const NX: usize>(
         return Ok(());
     }
     let (found, expected) = (fields.join(","), names.join(","));
-    Err(format!(
-        "header `{found}`, expected the states `{expected}`"
-    ))
+    Err(format!("header `{found}`, expected the states `{expected}`"))
 }
 
 /// The numbers of a line.
@@ -216,9 +198,7 @@ fn parse_row<const NX: usize>(
 ) -> std::result::Result<[f32; NX], String> {
     if fields.len() != NX {
         let found = fields.len();
-        return Err(format!(
-            "line {number} has {found} numbers, a state has {NX}"
-        ));
+        return Err(format!("line {number} has {found} numbers, a state has {NX}"));
     }
     let mut state = [0.0; NX];
     for (value, field) in state.iter_mut().zip(fields) {

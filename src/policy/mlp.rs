@@ -95,14 +95,8 @@ impl Mlp {
         activation: Activation,
         output: OutputActivation,
     ) -> Result<Self> {
-        let mlp = Self {
-            layers,
-            activation,
-            output,
-            state_order: None,
-        };
-        mlp.validate()
-            .map_err(|problem| Error::invalid("network", problem))?;
+        let mlp = Self { layers, activation, output, state_order: None };
+        mlp.validate().map_err(|problem| Error::invalid("network", problem))?;
         Ok(mlp)
     }
 
@@ -137,25 +131,14 @@ impl Mlp {
             "identity" => OutputActivation::Identity,
             other => return Err(format!("output `{other}` is neither tanh nor identity")),
         };
-        let state_order = metadata.get("state_order").map(|names| {
-            names
-                .split(',')
-                .map(|name| name.trim().to_owned())
-                .collect()
-        });
+        let state_order = metadata
+            .get("state_order")
+            .map(|names| names.split(',').map(|name| name.trim().to_owned()).collect());
         let mut layers = Vec::new();
-        while tensors
-            .tensor(&format!("layers.{}.weight", layers.len()))
-            .is_ok()
-        {
+        while tensors.tensor(&format!("layers.{}.weight", layers.len())).is_ok() {
             layers.push(read_layer(&tensors, layers.len())?);
         }
-        let mlp = Self {
-            layers,
-            activation,
-            output,
-            state_order,
-        };
+        let mlp = Self { layers, activation, output, state_order };
         mlp.validate()?;
         Ok(mlp)
     }
@@ -178,32 +161,18 @@ impl Mlp {
     /// Input width, then the output width of each layer.
     pub fn widths(&self) -> Vec<usize> {
         let first = self.layers.first().map(|layer| layer.inputs);
-        first
-            .into_iter()
-            .chain(self.layers.iter().map(|layer| layer.outputs))
-            .collect()
+        first.into_iter().chain(self.layers.iter().map(|layer| layer.outputs)).collect()
     }
 
     /// Number of weights and biases.
     pub fn parameter_count(&self) -> usize {
-        self.layers
-            .iter()
-            .map(|layer| layer.weight.len() + layer.bias.len())
-            .sum()
+        self.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum()
     }
 
     /// SHA-256 over widths, activations and parameters, in hexadecimal.
     pub fn digest(&self) -> String {
-        let shape = format!(
-            "{:?} {:?} {:?}",
-            self.widths(),
-            self.activation,
-            self.output
-        );
-        let parameters = self
-            .layers
-            .iter()
-            .flat_map(|layer| [&layer.weight, &layer.bias]);
+        let shape = format!("{:?} {:?} {:?}", self.widths(), self.activation, self.output);
+        let parameters = self.layers.iter().flat_map(|layer| [&layer.weight, &layer.bias]);
         let bytes = parameters.map(|values| bytemuck::cast_slice(values));
         digest::sha256(std::iter::once(shape.as_bytes()).chain(bytes))
     }
@@ -237,11 +206,7 @@ impl Mlp {
     /// # Panics
     /// If `input` has not the input width.
     pub fn forward<R: Real>(&self, input: &[R]) -> Vec<R> {
-        assert_eq!(
-            input.len(),
-            self.layers[0].inputs,
-            "input width of the network"
-        );
+        assert_eq!(input.len(), self.layers[0].inputs, "input width of the network");
         let mut x = input.to_vec();
         for (i, layer) in self.layers.iter().enumerate() {
             let last = i + 1 == self.layers.len();
@@ -251,11 +216,7 @@ impl Mlp {
                     .iter()
                     .zip(&x)
                     .fold(R::lit(layer.bias[row]), |sum, (&w, &x)| sum + R::lit(w) * x);
-                if last {
-                    self.output.apply(sum)
-                } else {
-                    self.activation.apply(sum)
-                }
+                if last { self.output.apply(sum) } else { self.activation.apply(sum) }
             };
             x = (0..layer.outputs).map(neuron).collect();
         }
@@ -290,10 +251,7 @@ impl Mlp {
             }
             for (kind, values) in [("weight", &layer.weight), ("bias", &layer.bias)] {
                 if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-                    return Err(format!(
-                        "layers.{i}.{kind}[{at}] is {}, not finite",
-                        values[at]
-                    ));
+                    return Err(format!("layers.{i}.{kind}[{at}] is {}, not finite", values[at]));
                 }
             }
         }
@@ -317,25 +275,16 @@ fn word<'a>(
 fn read_layer(tensors: &SafeTensors<'_>, i: usize) -> std::result::Result<Layer, String> {
     let named = |kind: &str| {
         let name = format!("layers.{i}.{kind}");
-        let tensor = tensors
-            .tensor(&name)
-            .map_err(|_| format!("no tensor `{name}`"))?;
+        let tensor = tensors.tensor(&name).map_err(|_| format!("no tensor `{name}`"))?;
         let values = floats(&name, &tensor)?;
         Ok::<_, String>((values, tensor.shape().to_vec()))
     };
     let (weight, shape) = named("weight")?;
     let &[outputs, inputs] = shape.as_slice() else {
-        return Err(format!(
-            "layers.{i}.weight has shape {shape:?}, expected [out, in]"
-        ));
+        return Err(format!("layers.{i}.weight has shape {shape:?}, expected [out, in]"));
     };
     let (bias, _) = named("bias")?;
-    Ok(Layer {
-        weight,
-        bias,
-        inputs,
-        outputs,
-    })
+    Ok(Layer { weight, bias, inputs, outputs })
 }
 
 /// The tensor's numbers.

@@ -73,20 +73,8 @@ pub(super) fn cos<R: Real>(angle: R) -> R {
 pub(super) fn tanh<R: Real>(x: R) -> R {
     let x = x.clamp(R::lit(-8.2), R::lit(8.2));
     let square = x * x;
-    let above = [
-        1.0,
-        0.134_345_38,
-        0.003_559_528_6,
-        2.168_320_3e-5,
-        1.490_322_2e-8,
-    ];
-    let below = [
-        1.0,
-        0.467_678_67,
-        0.026_119_178,
-        0.000_339_104_97,
-        8.396_420_4e-7,
-    ];
+    let above = [1.0, 0.134_345_38, 0.003_559_528_6, 2.168_320_3e-5, 1.490_322_2e-8];
+    let below = [1.0, 0.467_678_67, 0.026_119_178, 0.000_339_104_97, 8.396_420_4e-7];
     x * (polynomial(square, above) / polynomial(square, below))
 }
 

@@ -78,9 +78,7 @@ impl Expr {
 /// ```
 pub fn record(inputs: usize, formula: impl FnOnce(&[Expr]) -> Vec<Expr>) -> Graph {
     let outer = ARENA.take();
-    let arguments: Vec<Expr> = (0..inputs)
-        .map(|i| Expr::new(Node::Input(i as u32)))
-        .collect();
+    let arguments: Vec<Expr> = (0..inputs).map(|i| Expr::new(Node::Input(i as u32))).collect();
     let outputs = formula(&arguments);
     let (nodes, _) = ARENA.replace(outer);
     prune(inputs, &nodes, &outputs)
@@ -103,15 +101,8 @@ fn prune(inputs: usize, nodes: &[Node], outputs: &[Expr]) -> Graph {
         place[i] = kept.len() as u32;
         kept.push(node.renumbered(|operand| place[operand as usize]));
     }
-    let outputs = outputs
-        .iter()
-        .map(|output| place[output.0 as usize])
-        .collect();
-    Graph {
-        inputs,
-        nodes: kept,
-        outputs,
-    }
+    let outputs = outputs.iter().map(|output| place[output.0 as usize]).collect();
+    Graph { inputs, nodes: kept, outputs }
 }
 
 impl Node {

@@ -46,33 +46,17 @@ pub fn function_with(
     let inputs: Vec<String> = arguments
         .iter()
         .flat_map(|&(name, length)| {
-            (0..length).map(move |i| {
-                if length == 1 {
-                    name.into()
-                } else {
-                    format!("{name}[{i}]")
-                }
-            })
+            (0..length).map(move |i| if length == 1 { name.into() } else { format!("{name}[{i}]") })
         })
         .collect();
-    assert_eq!(
-        inputs.len(),
-        graph.inputs,
-        "arguments of the WGSL function `{name}`"
-    );
-    let parameters: Vec<String> = arguments
-        .iter()
-        .map(|(name, length)| format!("{name}: {}", float_type(*length)))
-        .collect();
+    assert_eq!(inputs.len(), graph.inputs, "arguments of the WGSL function `{name}`");
+    let parameters: Vec<String> =
+        arguments.iter().map(|(name, length)| format!("{name}: {}", float_type(*length))).collect();
     let result = float_type(graph.outputs.len());
     let mut text = format!("fn {name}({}) -> {result} {{\n", parameters.join(", "));
     for (i, node) in graph.nodes.iter().enumerate() {
-        writeln!(
-            text,
-            "    let v{i} = {};",
-            operation(node, &inputs, product)
-        )
-        .expect("a String grows");
+        writeln!(text, "    let v{i} = {};", operation(node, &inputs, product))
+            .expect("a String grows");
     }
     let outputs: Vec<String> = graph.outputs.iter().map(|i| format!("v{i}")).collect();
     if outputs.len() == 1 {
@@ -86,11 +70,7 @@ pub fn function_with(
 
 /// `f32` or an array of them.
 fn float_type(length: usize) -> String {
-    if length == 1 {
-        "f32".to_owned()
-    } else {
-        format!("array<f32, {length}>")
-    }
+    if length == 1 { "f32".to_owned() } else { format!("array<f32, {length}>") }
 }
 
 /// The right-hand side of a node.

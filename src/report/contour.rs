@@ -32,12 +32,7 @@ impl Field {
     fn edges(&self, column: usize, row: usize) -> [usize; 4] {
         let below = |column: usize, row: usize| 2 * (row * self.x.len() + column);
         let left = |column: usize, row: usize| below(column, row) + 1;
-        [
-            below(column, row),
-            left(column + 1, row),
-            below(column, row + 1),
-            left(column, row),
-        ]
+        [below(column, row), left(column + 1, row), below(column, row + 1), left(column, row)]
     }
 
     /// Where values above zero meet the others, as lines; a closed line repeats its first point.
@@ -140,11 +135,8 @@ fn crossing((from, low): (Point, f64), (to, high): (Point, f64)) -> Point {
 
 /// Lines through linked edges, each edge having one or two neighbours: open lines first.
 fn joined(mut links: BTreeMap<usize, Vec<usize>>) -> Vec<Vec<usize>> {
-    let ends: Vec<usize> = links
-        .iter()
-        .filter(|(_, next)| next.len() == 1)
-        .map(|(&edge, _)| edge)
-        .collect();
+    let ends: Vec<usize> =
+        links.iter().filter(|(_, next)| next.len() == 1).map(|(&edge, _)| edge).collect();
     let all: Vec<usize> = links.keys().copied().collect();
     let mut lines = Vec::new();
     for start in ends.into_iter().chain(all) {
@@ -171,19 +163,14 @@ mod tests {
     use super::{Field, Point};
 
     fn sampled(cells: usize, value: impl Fn(f64, f64) -> f64) -> Field {
-        let axis: Vec<f64> = (0..=cells)
-            .map(|index| 2.0 * index as f64 / cells as f64 - 1.0)
-            .collect();
+        let axis: Vec<f64> =
+            (0..=cells).map(|index| 2.0 * index as f64 / cells as f64 - 1.0).collect();
         let values = axis
             .iter()
             .flat_map(|&y| axis.iter().map(move |&x| (x, y)))
             .map(|(x, y)| value(x, y))
             .collect();
-        Field {
-            x: axis.clone(),
-            y: axis,
-            values,
-        }
+        Field { x: axis.clone(), y: axis, values }
     }
 
     fn area(polygons: &[Vec<Point>]) -> f64 {
@@ -226,13 +213,7 @@ mod tests {
 
     #[test]
     fn saddles_keep_every_segment() {
-        let field = sampled(2, |x, y| {
-            if (x * y).abs() > 0.5 || x == y {
-                1.0
-            } else {
-                -1.0
-            }
-        });
+        let field = sampled(2, |x, y| if (x * y).abs() > 0.5 || x == y { 1.0 } else { -1.0 });
         let count: usize = field.zero_lines().iter().map(|line| line.len() - 1).sum();
         // Each of the four cells has its two zero edges at one negative corner, or a saddle.
         assert!(count >= 4, "{count} segments");

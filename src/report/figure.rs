@@ -54,11 +54,8 @@ impl Figure {
             .iter()
             .map(|(swatch, name)| format!("<li>{}<span>{}</span></li>", swatch.svg(), escape(name)))
             .collect();
-        let legend = if legend.is_empty() {
-            legend
-        } else {
-            format!("<ul class=\"legend\">{legend}</ul>")
-        };
+        let legend =
+            if legend.is_empty() { legend } else { format!("<ul class=\"legend\">{legend}</ul>") };
         format!(
             "<figure class=\"card\" id=\"{}\"><h3>{}</h3>{drawing}{legend}\
              <figcaption>{}</figcaption></figure>\n",

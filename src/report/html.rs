@@ -53,11 +53,7 @@ fn head(record: &Record) -> String {
 fn header(record: &Record) -> String {
     let verdicts = words::verdicts(record);
     let (class, mark, verdict) = if record.holds {
-        (
-            "good",
-            "✓",
-            "Every claim that was asked for was obtained.".to_owned(),
-        )
+        ("good", "✓", "Every claim that was asked for was obtained.".to_owned())
     } else {
         ("bad", "✗", missing(&verdicts))
     };
@@ -75,9 +71,7 @@ fn header(record: &Record) -> String {
 /// Which claims were not obtained.
 fn missing(verdicts: &[Verdict]) -> String {
     let missing = verdicts.iter().filter(|verdict| !verdict.obtained);
-    let names: Vec<_> = missing
-        .map(|verdict| verdict.title.to_lowercase())
-        .collect();
+    let names: Vec<_> = missing.map(|verdict| verdict.title.to_lowercase()).collect();
     if names.is_empty() {
         "Not every claim that was asked for was obtained.".to_owned()
     } else {
@@ -86,11 +80,8 @@ fn missing(verdicts: &[Verdict]) -> String {
 }
 
 fn card(verdict: &Verdict) -> String {
-    let (class, mark, status) = if verdict.obtained {
-        ("good", "✓", "obtained")
-    } else {
-        ("bad", "✗", "not obtained")
-    };
+    let (class, mark, status) =
+        if verdict.obtained { ("good", "✓", "obtained") } else { ("bad", "✗", "not obtained") };
     let beta = verdict.claim.map_or_else(String::new, |claim| {
         format!("Confidence 1 − {} over the draw.", number(claim.beta))
     });
@@ -107,10 +98,7 @@ fn card(verdict: &Verdict) -> String {
 
 fn statements(record: &Record) -> String {
     let items = |texts: &[String]| -> String {
-        texts
-            .iter()
-            .map(|text| format!("<li>{}</li>\n", escape(text)))
-            .collect()
+        texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()
     };
     format!(
         "<div class=\"words\"><section aria-labelledby=\"claimed\">\

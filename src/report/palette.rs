@@ -6,18 +6,8 @@ pub(super) const LEVELS: usize = 16;
 /// Colours from next to zero to the end of the scale.
 type Stops = [[u8; 3]; 4];
 
-const LIGHT_BELOW: Stops = [
-    [252, 240, 228],
-    [240, 190, 140],
-    [211, 118, 44],
-    [125, 56, 0],
-];
-const LIGHT_ABOVE: Stops = [
-    [226, 238, 248],
-    [150, 197, 230],
-    [45, 127, 190],
-    [4, 58, 110],
-];
+const LIGHT_BELOW: Stops = [[252, 240, 228], [240, 190, 140], [211, 118, 44], [125, 56, 0]];
+const LIGHT_ABOVE: Stops = [[226, 238, 248], [150, 197, 230], [45, 127, 190], [4, 58, 110]];
 const DARK_BELOW: Stops = [[58, 45, 36], [120, 72, 34], [208, 126, 58], [255, 208, 160]];
 const DARK_ABOVE: Stops = [[32, 48, 64], [32, 88, 136], [72, 156, 220], [190, 226, 255]];
 
@@ -47,9 +37,7 @@ fn theme(below: Stops, above: Stops) -> String {
         let [red, green, blue] = mix(stops, (level - 1) as f64 / (LEVELS - 1) as f64);
         format!(".{side}{level}{{fill:#{red:02x}{green:02x}{blue:02x}}}")
     };
-    (1..=LEVELS)
-        .map(|level| rule('n', below, level) + &rule('p', above, level))
-        .collect()
+    (1..=LEVELS).map(|level| rule('n', below, level) + &rule('p', above, level)).collect()
 }
 
 /// The colour at `share` of the way through `stops`.

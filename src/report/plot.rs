@@ -56,9 +56,7 @@ impl Plot {
         let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
         let room = |y: Span, height: f64| {
             let (ticks, decimals) = y.ticks(height / 46.0);
-            let longest = ticks
-                .iter()
-                .map(|&tick| label(tick, decimals).chars().count());
+            let longest = ticks.iter().map(|&tick| label(tick, decimals).chars().count());
             32.0 + CHARACTER * longest.max().unwrap_or(1) as f64
         };
         let (mut width, mut height) = (WIDTH - MARGIN - room(y, 400.0), 0.0);
@@ -100,10 +98,7 @@ impl Plot {
 
     /// Length of a data distance across and down.
     pub(super) fn lengths(&self, distance: f64) -> [f64; 2] {
-        [
-            distance * self.width / self.x.width(),
-            distance * self.height / self.y.width(),
-        ]
+        [distance * self.width / self.x.width(), distance * self.height / self.y.width()]
     }
 
     /// Path data through `points`; breaks where a point cannot be drawn.
@@ -112,11 +107,8 @@ impl Plot {
         let mut pen = 'M';
         for [x, y] in points {
             if ordinary(x) && ordinary(y) {
-                path += &format!(
-                    "{pen}{} {}",
-                    coordinate(self.across(x)),
-                    coordinate(self.down(y))
-                );
+                path +=
+                    &format!("{pen}{} {}", coordinate(self.across(x)), coordinate(self.down(y)));
                 pen = 'L';
             } else {
                 pen = 'M';
@@ -181,10 +173,7 @@ impl Plot {
 
     /// A strip below the axes, `height` tall, drawn from its upper left corner, `width` wide.
     pub(super) fn strip(&mut self, height: f64, draw: impl FnOnce(f64) -> String) {
-        let (left, top) = (
-            coordinate(self.left),
-            coordinate(MARGIN + self.height + FOOT),
-        );
+        let (left, top) = (coordinate(self.left), coordinate(MARGIN + self.height + FOOT));
         let drawing = draw(self.width);
         self.foot = format!("<g transform=\"translate({left} {top})\">{drawing}</g>");
         self.foot_height = height;
@@ -215,11 +204,7 @@ impl Plot {
     fn axes(&self, labels: &Labels) -> String {
         let bottom = MARGIN + self.height;
         let parts = (self.width / 52.0).max(1.0);
-        let parts = if labels.whole {
-            parts.min(self.x.width())
-        } else {
-            parts
-        };
+        let parts = if labels.whole { parts.min(self.x.width()) } else { parts };
         let (ticks, decimals) = self.x.ticks(parts.max(1.0));
         let mut axes = String::new();
         for tick in ticks {
@@ -235,10 +220,7 @@ impl Plot {
         let (ticks, decimals) = self.y.ticks((self.height / 46.0).max(1.0));
         for tick in ticks {
             let at = self.down(tick);
-            let (from, to) = (
-                coordinate(self.left - 4.0),
-                coordinate(self.left + self.width),
-            );
+            let (from, to) = (coordinate(self.left - 4.0), coordinate(self.left + self.width));
             axes += &format!(
                 "<path class=\"grid\" d=\"M{from} {}H{to}\"/>\
                  <text class=\"tick\" x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
@@ -258,10 +240,7 @@ impl Plot {
         // A long name of a low plot is squeezed into its height.
         let long = 6.6 * labels.y.chars().count().min(NAME) as f64 > self.height;
         let squeeze = if long {
-            format!(
-                " textLength=\"{}\" lengthAdjust=\"spacingAndGlyphs\"",
-                coordinate(self.height)
-            )
+            format!(" textLength=\"{}\" lengthAdjust=\"spacingAndGlyphs\"", coordinate(self.height))
         } else {
             String::new()
         };
@@ -280,9 +259,7 @@ impl Plot {
     /// Room that the labels left of the plot take.
     fn tick_room(&self) -> f64 {
         let (ticks, decimals) = self.y.ticks((self.height / 46.0).max(1.0));
-        let longest = ticks
-            .iter()
-            .map(|&tick| label(tick, decimals).chars().count());
+        let longest = ticks.iter().map(|&tick| label(tick, decimals).chars().count());
         CHARACTER * longest.max().unwrap_or(1) as f64 + 6.0
     }
 }
@@ -301,18 +278,10 @@ fn label(tick: f64, decimals: usize) -> String {
 
 /// A coordinate of the drawing, to a hundredth; far points are brought near, outside the axes.
 pub(super) fn coordinate(value: f64) -> String {
-    let value = if value.is_nan() {
-        0.0
-    } else {
-        value.clamp(-1e4, 1e4)
-    };
+    let value = if value.is_nan() { 0.0 } else { value.clamp(-1e4, 1e4) };
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 #[cfg(test)]
@@ -322,16 +291,7 @@ mod tests {
 
     #[test]
     fn an_equal_plot_has_one_scale() {
-        let (x, y) = (
-            Span {
-                low: -1.0,
-                high: 1.0,
-            },
-            Span {
-                low: 0.0,
-                high: 3.0,
-            },
-        );
+        let (x, y) = (Span { low: -1.0, high: 1.0 }, Span { low: 0.0, high: 3.0 });
         let plot = Plot::new("p", x, y, Shape::Equal);
         let [across, down] = plot.lengths(1.0);
         assert!((across - down).abs() < 1e-9);
@@ -340,13 +300,7 @@ mod tests {
     #[test]
     fn nothing_that_is_not_finite_reaches_the_drawing() {
         let point = Span::of([f64::NAN, 2.0, 1e30]).expect("2 is a number");
-        assert_eq!(
-            point,
-            Span {
-                low: 2.0,
-                high: 2.0
-            }
-        );
+        assert_eq!(point, Span { low: 2.0, high: 2.0 });
         assert_eq!(Span::of([f64::NAN]), None);
         let mut plot = Plot::new("p", point, point, Shape::Free(100.0));
         let line = plot.line([[2.0, 2.0], [f64::NAN, 2.0], [2.0, 1e30], [2.0, 2.0]]);
@@ -354,11 +308,7 @@ mod tests {
         plot.path("line", &line);
         plot.mark([f64::NAN, 2.0], "never");
         plot.ellipse("line", [2.0, f64::INFINITY], [1.0, 1.0]);
-        let labels = Labels {
-            x: "x",
-            y: "y",
-            whole: false,
-        };
+        let labels = Labels { x: "x", y: "y", whole: false };
         let drawing = plot.finish(&labels, "a point");
         assert!(!drawing.contains("NaN") && !drawing.contains("inf") && !drawing.contains("never"));
         assert_eq!(coordinate(f64::NAN), "0");

@@ -21,22 +21,14 @@ impl<'a> Grid<'a> {
     pub(super) fn new(record: &'a Record) -> Option<Self> {
         let slice = &record.slice;
         let cells = slice.x.values.len() * slice.y.values.len();
-        let fields = [
-            &slice.check_margin,
-            &slice.target_margin,
-            &slice.constraint_margin,
-        ];
+        let fields = [&slice.check_margin, &slice.target_margin, &slice.constraint_margin];
         if cells == 0 || fields.iter().any(|field| field.len() != cells) {
             return None;
         }
         let centers = [centers(&slice.x)?, centers(&slice.y)?];
         let states = [slice.x.state, slice.y.state];
         let edges = [0, 1].map(|axis| edges(&centers[axis], lone_width(record, states[axis])));
-        Some(Self {
-            record,
-            centers,
-            edges,
-        })
+        Some(Self { record, centers, edges })
     }
 
     /// What the slice covers across and upwards.
@@ -74,11 +66,7 @@ impl<'a> Grid<'a> {
             let value = f64::from(values[row * columns + column]);
             let huge = f64::from(HUGE);
             // A margin that is not a number is a violation.
-            sign * if value.is_nan() {
-                -huge
-            } else {
-                value.clamp(-huge, huge)
-            }
+            sign * if value.is_nan() { -huge } else { value.clamp(-huge, huge) }
         };
         let [x, y] = [0, 1].map(|axis| padded(&self.centers[axis], &self.edges[axis]));
         let mut padded_values = Vec::with_capacity(x.len() * y.len());
@@ -87,19 +75,11 @@ impl<'a> Grid<'a> {
                 let (near, mirror) = neighbours([column, row], [columns, rows]);
                 let value = at(near[0], near[1]);
                 let slope = value - at(mirror[0], mirror[1]);
-                let reach = if ordinary(value) && ordinary(slope) {
-                    0.5
-                } else {
-                    0.0
-                };
+                let reach = if ordinary(value) && ordinary(slope) { 0.5 } else { 0.0 };
                 padded_values.push(value + reach * slope);
             }
         }
-        Field {
-            x,
-            y,
-            values: padded_values,
-        }
+        Field { x, y, values: padded_values }
     }
 }
 
@@ -134,28 +114,18 @@ fn edges(centers: &[f64], lone: f64) -> Vec<f64> {
         [] => [0.0; 2],
     };
     let inner = centers.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0);
-    std::iter::once(first - low)
-        .chain(inner)
-        .chain([last + high])
-        .collect()
+    std::iter::once(first - low).chain(inner).chain([last + high]).collect()
 }
 
 /// A tenth of the state's box, or one.
 fn lone_width(record: &Record, state: usize) -> f64 {
     let axis = record.system.states.get(state);
     let width = axis.map_or(0.0, |axis| f64::from(axis.high - axis.low) / 10.0);
-    if width > 0.0 && ordinary(width) {
-        width
-    } else {
-        1.0
-    }
+    if width > 0.0 && ordinary(width) { width } else { 1.0 }
 }
 
 /// The centres between the outermost edges.
 fn padded(centers: &[f64], edges: &[f64]) -> Vec<f64> {
     let inner = centers.iter().copied();
-    std::iter::once(edges[0])
-        .chain(inner)
-        .chain([edges[edges.len() - 1]])
-        .collect()
+    std::iter::once(edges[0]).chain(inner).chain([edges[edges.len() - 1]]).collect()
 }

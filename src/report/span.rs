@@ -17,34 +17,21 @@ impl Span {
         values
             .into_iter()
             .filter(|&value| ordinary(value))
-            .map(|value| Self {
-                low: value,
-                high: value,
-            })
+            .map(|value| Self { low: value, high: value })
             .reduce(Self::join)
     }
 
     /// The smallest span that holds both.
     pub(super) fn join(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// Wider by `share` of its width on each side, and never empty.
     pub(super) fn widened(self, share: f64) -> Self {
         let reach = share * (self.high - self.low);
         let least = 1e-6 * self.low.abs().max(self.high.abs()).max(1e-3);
-        let reach = reach.max(if self.high - self.low > least {
-            0.0
-        } else {
-            least
-        });
-        Self {
-            low: self.low - reach,
-            high: self.high + reach,
-        }
+        let reach = reach.max(if self.high - self.low > least { 0.0 } else { least });
+        Self { low: self.low - reach, high: self.high + reach }
     }
 
     /// High end minus low end.
@@ -82,10 +69,7 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let span = Span {
-            low: -2.65,
-            high: -0.05,
-        };
+        let span = Span { low: -2.65, high: -0.05 };
         let (ticks, decimals) = span.ticks(6.0);
         assert_eq!(decimals, 1);
         assert_eq!(ticks.len(), 5);

@@ -33,22 +33,15 @@ fn table(title: &str, rows: &[Vec<String>]) -> String {
 /// A table of names and values.
 fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
     let head = vec!["quantity".to_owned(), "value".to_owned()];
-    let rows = pairs
-        .iter()
-        .map(|(name, value)| vec![(*name).to_owned(), value.clone()]);
-    table(
-        title,
-        &std::iter::once(head).chain(rows).collect::<Vec<_>>(),
-    )
+    let rows = pairs.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]);
+    table(title, &std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }
 
 /// The claims side by side.
 pub(super) fn claims(record: &Record) -> String {
     let growth = record.growth.claim.as_ref();
-    let claims: Vec<&Claim> = [&record.deviation.claim, &record.global.claim]
-        .into_iter()
-        .chain(growth)
-        .collect();
+    let claims: Vec<&Claim> =
+        [&record.deviation.claim, &record.global.claim].into_iter().chain(growth).collect();
     let row = |name: &str, value: &dyn Fn(&Claim) -> String| {
         let values = claims.iter().map(|claim| value(claim));
         std::iter::once(name.to_owned()).chain(values).collect()
@@ -63,25 +56,13 @@ pub(super) fn claims(record: &Record) -> String {
             row("beta of this draw", &|claim| number(claim.beta_used)),
             row("scenarios N", &|claim| count(claim.scenarios)),
             row("failures k", &|claim| count(claim.failures)),
-            row("decision variables d", &|claim| {
-                claim.decision_vars.to_string()
-            }),
-            row("N asked by the simple bound", &|claim| {
-                or_dash(claim.required_simple.map(count))
-            }),
-            row("N asked by the exact bound", &|claim| {
-                or_dash(claim.required_exact.map(count))
-            }),
+            row("decision variables d", &|claim| claim.decision_vars.to_string()),
+            row("N asked by the simple bound", &|claim| or_dash(claim.required_simple.map(count))),
+            row("N asked by the exact bound", &|claim| or_dash(claim.required_exact.map(count))),
             row("sampling measure", &|claim| claim.measure.clone()),
-            row("coordinates that vary", &|claim| {
-                claim.dimension.to_string()
-            }),
+            row("coordinates that vary", &|claim| claim.dimension.to_string()),
             row("frozen coordinates", &|claim| {
-                if claim.frozen.is_empty() {
-                    "none".to_owned()
-                } else {
-                    claim.frozen.join(", ")
-                }
+                if claim.frozen.is_empty() { "none".to_owned() } else { claim.frozen.join(", ") }
             }),
         ],
     )
@@ -116,10 +97,7 @@ fn setting(record: &Record) -> String {
             ("generator", record.provenance.generator.clone()),
             ("backend", record.provenance.backend.clone()),
             ("device", record.provenance.device.clone()),
-            (
-                "wall time",
-                format!("{} s", number(record.timing.wall_seconds)),
-            ),
+            ("wall time", format!("{} s", number(record.timing.wall_seconds))),
             ("threads", record.timing.threads.to_string()),
             ("rollouts", count(record.timing.rollouts)),
         ],
@@ -127,13 +105,7 @@ fn setting(record: &Record) -> String {
 }
 
 fn constants(record: &Record) -> String {
-    let head = [
-        "constant",
-        "used",
-        "from",
-        "computed bound",
-        "largest sampled gradient",
-    ];
+    let head = ["constant", "used", "from", "computed bound", "largest sampled gradient"];
     let rows = [
         ("L_r of the target margin", &record.constants.target),
         ("L_c of the constraint margin", &record.constants.constraint),
@@ -158,28 +130,13 @@ fn deviation(record: &Record) -> String {
         "Deviation bound",
         &[
             ("radius around a nominal start", number(deviation.radius)),
-            (
-                "perturbed rollouts",
-                words::control(deviation.control).to_owned(),
-            ),
-            (
-                "joint over the steps",
-                words::joint(deviation.joint).to_owned(),
-            ),
-            (
-                "bound that tightens the margins",
-                words::source(deviation.source).to_owned(),
-            ),
+            ("perturbed rollouts", words::control(deviation.control).to_owned()),
+            ("joint over the steps", words::joint(deviation.joint).to_owned()),
+            ("bound that tightens the margins", words::source(deviation.source).to_owned()),
             ("pilot pairs", count(deviation.pilot)),
-            (
-                "scale of the fixed shape",
-                or_dash(deviation.scale.map(upper)),
-            ),
+            ("scale of the fixed shape", or_dash(deviation.scale.map(upper))),
             ("support scenarios", count(deviation.support)),
-            (
-                "a posteriori risk (wait and judge)",
-                upper(deviation.posterior_risk),
-            ),
+            ("a posteriori risk (wait and judge)", upper(deviation.posterior_risk)),
             ("pairs not finite", count(deviation.non_finite)),
         ],
     )
@@ -195,10 +152,7 @@ fn certified_set(record: &Record) -> String {
             ("P(V_global)", interval(global.share_interval)),
             ("volume of the box", number(global.box_volume)),
             ("volume of V_global", interval(global.volume_interval)),
-            (
-                "perturbed starts that reach the target",
-                count(global.reached),
-            ),
+            ("perturbed starts that reach the target", count(global.reached)),
             ("failures that are not finite", count(global.non_finite)),
             ("measured f32 error of the measure", upper(global.f32_error)),
             ("band of f64 re-runs", number(global.band)),
@@ -226,67 +180,40 @@ fn growth(record: &Record) -> String {
         "Local growth",
         &[
             ("centre from", words::boundary(growth.boundary).to_owned()),
-            (
-                "distance of the centre from the state",
-                or_dash(growth.distance.map(number)),
-            ),
+            ("distance of the centre from the state", or_dash(growth.distance.map(number))),
             ("radius of the verified ball", lower(growth.radius)),
             ("volume of the verified ball", number(growth.volume)),
             ("coordinates that vary", {
-                growth
-                    .varies
-                    .iter()
-                    .filter(|&&varies| varies)
-                    .count()
-                    .to_string()
+                growth.varies.iter().filter(|&&varies| varies).count().to_string()
             }),
         ],
     )
 }
 
 fn rounds(record: &Record) -> String {
-    let head = [
-        "round",
-        "radius",
-        "starts",
-        "failures",
-        "nearest",
-        "not finite",
-        "f64 re-runs",
-    ];
-    let rows = record
-        .growth
-        .rounds
-        .iter()
-        .enumerate()
-        .map(|(index, round)| {
-            vec![
-                (index + 1).to_string(),
-                number(round.radius),
-                count(round.scenarios),
-                count(round.failures),
-                or_dash(round.nearest_failure.map(number)),
-                count(round.non_finite),
-                count(round.f64_reruns),
-            ]
-        });
+    let head = ["round", "radius", "starts", "failures", "nearest", "not finite", "f64 re-runs"];
+    let rows = record.growth.rounds.iter().enumerate().map(|(index, round)| {
+        vec![
+            (index + 1).to_string(),
+            number(round.radius),
+            count(round.scenarios),
+            count(round.failures),
+            or_dash(round.nearest_failure.map(number)),
+            count(round.non_finite),
+            count(round.f64_reruns),
+        ]
+    });
     let head = head.map(str::to_owned).to_vec();
     if record.growth.rounds.is_empty() {
         return String::new();
     }
-    table(
-        "Rounds of growth",
-        &std::iter::once(head).chain(rows).collect::<Vec<_>>(),
-    )
+    table("Rounds of growth", &std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }
 
 fn ledger(record: &Record) -> String {
     let head = ["claim", "item", "beta spent"].map(str::to_owned).to_vec();
     let row = |claim: &str, item: &str, beta| vec![claim.to_owned(), item.to_owned(), beta];
-    let lines = record
-        .ledger
-        .iter()
-        .map(|line| row(&line.claim, &line.item, number(line.beta)));
+    let lines = record.ledger.iter().map(|line| row(&line.claim, &line.item, number(line.beta)));
     let total = row("total", "", upper(record.beta_total));
     let rows: Vec<_> = std::iter::once(head).chain(lines).chain([total]).collect();
     table("Ledger of beta", &rows)
@@ -307,34 +234,22 @@ fn provenance(record: &Record) -> String {
 }
 
 fn system(record: &Record) -> String {
-    let head = [
-        "state",
-        "unit",
-        "box low",
-        "box high",
-        "at the state",
-        "ball centre",
-        "in the ball",
-    ];
+    let head =
+        ["state", "unit", "box low", "box high", "at the state", "ball centre", "in the ball"];
     let at = |x: &[f32], index: usize| or_dash(x.get(index).map(|&value| number(value.into())));
-    let rows = record
-        .system
-        .states
-        .iter()
-        .enumerate()
-        .map(|(index, axis)| {
-            let center = record.growth.center.as_deref().unwrap_or_default();
-            let varies = record.growth.varies.get(index).copied().unwrap_or(true);
-            vec![
-                axis.name.clone(),
-                axis.unit.clone(),
-                number(axis.low.into()),
-                number(axis.high.into()),
-                at(&record.state.x, index),
-                at(center, index),
-                if varies { "varies" } else { "frozen" }.to_owned(),
-            ]
-        });
+    let rows = record.system.states.iter().enumerate().map(|(index, axis)| {
+        let center = record.growth.center.as_deref().unwrap_or_default();
+        let varies = record.growth.varies.get(index).copied().unwrap_or(true);
+        vec![
+            axis.name.clone(),
+            axis.unit.clone(),
+            number(axis.low.into()),
+            number(axis.high.into()),
+            at(&record.state.x, index),
+            at(center, index),
+            if varies { "varies" } else { "frozen" }.to_owned(),
+        ]
+    });
     let controls = record.system.controls.iter().map(|axis| {
         vec![
             format!("control {}", axis.name),
@@ -349,10 +264,7 @@ fn system(record: &Record) -> String {
     let head = head.map(str::to_owned).to_vec();
     table(
         "States and controls",
-        &std::iter::once(head)
-            .chain(rows)
-            .chain(controls)
-            .collect::<Vec<_>>(),
+        &std::iter::once(head).chain(rows).chain(controls).collect::<Vec<_>>(),
     )
 }
 
@@ -360,11 +272,7 @@ fn system(record: &Record) -> String {
 pub(super) fn steps(record: &Record) -> String {
     let deviation = &record.deviation;
     let exact = deviation.exact.as_deref();
-    let mut head = vec![
-        "step".to_owned(),
-        "bound used".to_owned(),
-        "largest seen".to_owned(),
-    ];
+    let mut head = vec!["step".to_owned(), "bound used".to_owned(), "largest seen".to_owned()];
     head.extend(exact.map(|_| "exact supremum".to_owned()));
     let rows = deviation.bound.iter().enumerate().map(|(step, &bound)| {
         let at = |series: &[f64]| or_dash(series.get(step).map(|&value| number(value)));
@@ -372,8 +280,5 @@ pub(super) fn steps(record: &Record) -> String {
         row.extend(exact.map(at));
         row
     });
-    table(
-        "Deviation at each step",
-        &std::iter::once(head).chain(rows).collect::<Vec<_>>(),
-    )
+    table("Deviation at each step", &std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }

@@ -117,9 +117,7 @@ fn scientific(value: f64) -> (i64, i32) {
 }
 
 fn decimal(mantissa: i64, exponent: i32) -> f64 {
-    format!("{mantissa}e{}", exponent - DIGITS as i32)
-        .parse()
-        .unwrap_or(0.0)
+    format!("{mantissa}e{}", exponent - DIGITS as i32).parse().unwrap_or(0.0)
 }
 
 fn written(mantissa: i64, exponent: i32) -> String {
@@ -179,10 +177,7 @@ mod tests {
 
     #[test]
     fn markup_becomes_text() {
-        assert_eq!(
-            escape("<a b='c'>&\"\u{1}"),
-            "&lt;a b=&#39;c&#39;&gt;&amp;&quot;\u{fffd}"
-        );
+        assert_eq!(escape("<a b='c'>&\"\u{1}"), "&lt;a b=&#39;c&#39;&gt;&amp;&quot;\u{fffd}");
         assert_eq!(shorten("position", 5), "posi…");
         assert_eq!(shorten("ego_x", 5), "ego_x");
     }

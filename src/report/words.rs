@@ -7,10 +7,11 @@ use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 
 /// Name and unit of a state, as `ego_x (m)`.
 pub(super) fn axis(record: &Record, state: usize) -> String {
-    record.system.states.get(state).map_or_else(
-        || format!("state {state}"),
-        |axis| format!("{} ({})", axis.name, axis.unit),
-    )
+    record
+        .system
+        .states
+        .get(state)
+        .map_or_else(|| format!("state {state}"), |axis| format!("{} ({})", axis.name, axis.unit))
 }
 
 /// Name of a state.

@@ -21,11 +21,7 @@ impl<R: Real> Fold<R> {
     /// The fold before the first state.
     #[inline(always)]
     pub fn new() -> Self {
-        Self {
-            discount: R::lit(1.0),
-            safe: R::lit(HUGE),
-            best: R::lit(-HUGE),
-        }
+        Self { discount: R::lit(1.0), safe: R::lit(HUGE), best: R::lit(-HUGE) }
     }
 
     /// Adds the margins of the next state.

@@ -64,10 +64,7 @@ where
         replayed.push(x);
     }
     let plain = Tightening::none(spec);
-    (
-        fold(plant.system, &nominal, spec, tightening),
-        fold(plant.system, &replayed, spec, &plain),
-    )
+    (fold(plant.system, &nominal, spec, tightening), fold(plant.system, &replayed, spec, &plain))
 }
 
 /// Folds the margins of `states`; a state that is not finite fails the rollout from there on.
@@ -88,11 +85,7 @@ where
             x.iter().all(|x| x.is_finite()) && target.is_finite() && constraint.is_finite();
         if !finite {
             let so_far: f64 = fold.measure();
-            return if so_far > 0.0 {
-                so_far
-            } else {
-                f64::from(NON_FINITE)
-            };
+            return if so_far > 0.0 { so_far } else { f64::from(NON_FINITE) };
         }
         fold.add(target, constraint, f64::from(spec.gamma));
     }

@@ -52,14 +52,8 @@ impl Stream {
     /// # Panics
     /// If `number` is 2^24 or more.
     pub fn new(seed: u64, purpose: Purpose, number: u32) -> Self {
-        assert!(
-            number < 1 << 24,
-            "stream number {number} does not fit 24 bits"
-        );
-        Self {
-            seed,
-            id: (purpose as u32) << 24 | number,
-        }
+        assert!(number < 1 << 24, "stream number {number} does not fit 24 bits");
+        Self { seed, id: (purpose as u32) << 24 | number }
     }
 
     /// The generator's key: the seed's low and high word.
@@ -150,11 +144,7 @@ impl<const NX: usize> Ball<NX> {
     /// Distance of `x` from the centre in the coordinates that vary.
     pub fn distance(&self, x: &[f32; NX]) -> f64 {
         let square = |i: usize| (f64::from(x[i]) - f64::from(self.center[i])).powi(2);
-        (0..NX)
-            .filter(|&i| self.varies[i])
-            .map(square)
-            .sum::<f64>()
-            .sqrt()
+        (0..NX).filter(|&i| self.varies[i]).map(square).sum::<f64>().sqrt()
     }
 
     /// Whether `x` lies in the ball, its frozen coordinates equal to the centre's.
@@ -173,18 +163,13 @@ impl<const NX: usize> Region<NX> {
         let place = "box";
         for i in 0..NX {
             if !(low[i].is_finite() && high[i].is_finite() && low[i] <= high[i]) {
-                let problem = format!(
-                    "coordinate {i} has the empty interval [{}, {}]",
-                    low[i], high[i]
-                );
+                let problem =
+                    format!("coordinate {i} has the empty interval [{}, {}]", low[i], high[i]);
                 return Err(Error::invalid(place, problem));
             }
         }
         if low == high {
-            return Err(Error::invalid(
-                place,
-                "empty: low equals high in every coordinate",
-            ));
+            return Err(Error::invalid(place, "empty: low equals high in every coordinate"));
         }
         Ok(Self::Box { low, high })
     }

@@ -47,10 +47,7 @@ impl RolloutSpec {
             return Err(Error::invalid("horizon", problem));
         }
         if !(gamma > 0.0 && gamma <= 1.0) {
-            return Err(Error::invalid(
-                "gamma",
-                format!("{gamma} is outside (0, 1]"),
-            ));
+            return Err(Error::invalid("gamma", format!("{gamma} is outside (0, 1]")));
         }
         Ok(Self { horizon, gamma })
     }
@@ -69,10 +66,7 @@ impl Tightening {
     /// Nothing taken off.
     pub fn none(spec: &RolloutSpec) -> Self {
         let zero = vec![0.0; spec.horizon as usize + 1];
-        Self {
-            target: zero.clone(),
-            constraint: zero,
-        }
+        Self { target: zero.clone(), constraint: zero }
     }
 }
 
@@ -147,19 +141,12 @@ pub struct Farthest {
 
 impl Farthest {
     /// No pair seen yet.
-    pub const NONE: Self = Self {
-        distance: 0.0,
-        pair: u64::MAX,
-    };
+    pub const NONE: Self = Self { distance: 0.0, pair: u64::MAX };
 
     /// The farther of two; of equal ones the first pair.
     #[must_use]
     pub fn merge(self, other: Self) -> Self {
         let before = other.distance == self.distance && other.pair < self.pair;
-        if other.distance > self.distance || before {
-            other
-        } else {
-            self
-        }
+        if other.distance > self.distance || before { other } else { self }
     }
 }

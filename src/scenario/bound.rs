@@ -27,10 +27,7 @@ pub fn simple_scenarios(epsilon: f64, beta: f64, decision_vars: u32) -> Result<u
     check_share("epsilon", epsilon)?;
     check_share("beta", beta)?;
     if decision_vars == 0 {
-        return Err(Error::invalid(
-            "decision variables",
-            "0; expected 1 or more",
-        ));
+        return Err(Error::invalid("decision variables", "0; expected 1 or more"));
     }
     simple(epsilon, beta, f64::from(decision_vars))
 }
@@ -122,10 +119,7 @@ pub fn lower_bound(successes: u64, trials: u64, beta: f64) -> f64 {
 /// either side.
 pub fn interval(successes: u64, trials: u64, beta: f64) -> (f64, f64) {
     let side = 0.5 * beta;
-    (
-        lower_bound(successes, trials, side),
-        certified_risk(trials, successes, side),
-    )
+    (lower_bound(successes, trials, side), certified_risk(trials, successes, side))
 }
 
 /// Risk of a convex scenario program after the fact, from the number of support scenarios among
@@ -249,12 +243,7 @@ mod tests {
             }
             beta / f64::from(n + 1) * sum > 1.0
         };
-        for (n, s, beta) in [
-            (158, 0, 1e-3),
-            (158, 6, 1e-3),
-            (3, 2, 0.5),
-            (2000, 40, 1e-9),
-        ] {
+        for (n, s, beta) in [(158, 0, 1e-3), (158, 6, 1e-3), (3, 2, 0.5), (2000, 40, 1e-9)] {
             let t = 1.0 - wait_and_judge(n as u64, s as u64, beta);
             assert!(positive(n, s, beta, t - 1e-9) && !positive(n, s, beta, t + 1e-9));
         }
@@ -284,10 +273,7 @@ mod tests {
                     let ours = required_scenarios(epsilon, beta, dim).unwrap() as u32;
                     // They differ only where a tail equals beta, which rounding may decide.
                     let [strict, exact] = [smallest(0), smallest(1)].map(Option::unwrap);
-                    assert!(
-                        ours == exact || ours == strict,
-                        "{risk:?} {share:?} {dim}: {ours}"
-                    );
+                    assert!(ours == exact || ours == strict, "{risk:?} {share:?} {dim}: {ours}");
                 }
             }
         }

@@ -18,16 +18,8 @@ const BISECTIONS: usize = 20;
 /// Spread of the directions around the best one so far, sweep by sweep; the first is uniform.
 const SPREADS: [f32; 4] = [0.0, 0.6, 0.3, 0.1];
 /// The eight neighbours of a cell.
-const NEIGHBOURS: [(isize, isize); 8] = [
-    (-1, -1),
-    (-1, 0),
-    (-1, 1),
-    (0, -1),
-    (0, 1),
-    (1, -1),
-    (1, 0),
-    (1, 1),
-];
+const NEIGHBOURS: [(isize, isize); 8] =
+    [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)];
 /// Cosine above which a cell counts as straight ahead, from the study.
 const STRAIGHT: f64 = 0.9;
 
@@ -69,10 +61,7 @@ fn on_slice<const NX: usize>(settings: &Settings<NX>, slice: &SliceRecord) -> Op
     for row in 0..rows {
         for column in 0..columns {
             let surrounded = NEIGHBOURS.iter().all(|(dr, dc)| {
-                certified(
-                    row.wrapping_add_signed(*dr),
-                    column.wrapping_add_signed(*dc),
-                )
+                certified(row.wrapping_add_signed(*dr), column.wrapping_add_signed(*dc))
             });
             if certified(row, column) && !surrounded {
                 cells.push(states[row * columns + column]);
@@ -101,10 +90,8 @@ fn nearest<const NX: usize>(
             }
         }
     }
-    let measured = cells.into_iter().map(|point| Boundary {
-        point,
-        distance: distance(&point, &state),
-    });
+    let measured =
+        cells.into_iter().map(|point| Boundary { point, distance: distance(&point, &state) });
     measured.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
@@ -128,18 +115,12 @@ where
     P: Policy<NX, NU>,
 {
     let rays = DIRECTIONS * (POINTS + BISECTIONS) as u64;
-    context
-        .watch
-        .begin("boundary search", rays * SPREADS.len() as u64);
+    context.watch.begin("boundary search", rays * SPREADS.len() as u64);
     let certified = |states: &[[f32; NX]]| -> Result<Vec<bool>> {
         let margins = check_margins(context, &settings.spec, tightening, states, Query::Sign)?;
         let inside =
             |x: &[f32; NX]| (0..NX).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
-        Ok(states
-            .iter()
-            .zip(margins)
-            .map(|(x, margin)| margin > 0.0 && inside(x))
-            .collect())
+        Ok(states.iter().zip(margins).map(|(x, margin)| margin > 0.0 && inside(x)).collect())
     };
     let start_certified = certified(&[settings.state])?[0];
     let mut best: Option<(Boundary<NX>, [f32; NX])> = None;
@@ -148,8 +129,7 @@ where
         let directions = directions(settings, sweep as u32, around);
         let found = sweep_rays(settings, &directions, start_certified, certified)?;
         let nearer = |boundary: &Boundary<NX>| {
-            best.as_ref()
-                .is_none_or(|(best, _)| boundary.distance < best.distance)
+            best.as_ref().is_none_or(|(best, _)| boundary.distance < best.distance)
         };
         if let Some(found) = found.filter(|(boundary, _)| nearer(boundary)) {
             best = Some(found);
@@ -192,19 +172,12 @@ fn sweep_rays<const NX: usize>(
     let at = |direction: &[f32; NX], length: f32| -> [f32; NX] {
         std::array::from_fn(|i| settings.state[i] + length * direction[i])
     };
-    let reach = settings
-        .low
-        .iter()
-        .zip(settings.high)
-        .map(|(low, high)| high - low);
+    let reach = settings.low.iter().zip(settings.high).map(|(low, high)| high - low);
     let reach = reach.fold(0.0, f32::max);
-    let lengths: Vec<f32> = (1..=POINTS)
-        .map(|k| reach * (k as f32 / POINTS as f32).powi(2))
-        .collect();
-    let points: Vec<_> = directions
-        .iter()
-        .flat_map(|d| lengths.iter().map(|length| at(d, *length)))
-        .collect();
+    let lengths: Vec<f32> =
+        (1..=POINTS).map(|k| reach * (k as f32 / POINTS as f32).powi(2)).collect();
+    let points: Vec<_> =
+        directions.iter().flat_map(|d| lengths.iter().map(|length| at(d, *length))).collect();
     let inside = certified(&points)?;
     // Brackets [near, far] of the first change along each ray; near has the state's side.
     let mut brackets = Vec::new();
@@ -230,12 +203,6 @@ fn sweep_rays<const NX: usize>(
     Ok(closest.map(|(ray, near, far)| {
         // The certified end of the bracket.
         let point = at(&directions[ray], if start_certified { near } else { far });
-        (
-            Boundary {
-                point,
-                distance: distance(&point, &settings.state),
-            },
-            directions[ray],
-        )
+        (Boundary { point, distance: distance(&point, &settings.state) }, directions[ray])
     }))
 }

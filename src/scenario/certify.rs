@@ -34,11 +34,7 @@ pub(super) fn coordinates<S, const NX: usize, const NU: usize>(
 where
     S: System<NX, NU>,
 {
-    let frozen = system
-        .states()
-        .into_iter()
-        .zip(varies)
-        .filter(|(_, varies)| !**varies);
+    let frozen = system.states().into_iter().zip(varies).filter(|(_, varies)| !**varies);
     let frozen: Vec<String> = frozen.map(|(axis, _)| axis.name).collect();
     (NX - frozen.len(), frozen)
 }
@@ -62,55 +58,34 @@ where
     P: Policy<NX, NU>,
 {
     let begun = Instant::now();
-    let context = Context {
-        backend,
-        plant,
-        watch,
-    };
+    let context = Context { backend, plant, watch };
     let region = Region::new_box(settings.low, settings.high)?;
     growth::check_scenarios(&settings.growth)?;
     let ledger = ledger(settings)?;
     let constants = constants(plant.system, settings)?;
     let deviation = deviation::bound(context, settings)?;
     let tightening = tightening(&deviation.bound, &constants, &settings.spec);
-    let purposes = [
-        Purpose::ConditionalNominal,
-        Purpose::ConditionalPerturbation,
-    ];
+    let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
     let global = global::conditional(context, settings, &tightening, purposes)?;
     let slice = global::slice(context, settings, &tightening)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth)?;
     let picture = picture(plant, settings, &growth);
-    let claims = [
-        Some(&deviation.claim),
-        Some(&global.claim),
-        growth.claim.as_ref(),
-    ];
-    let mut statements: Vec<String> = claims
-        .iter()
-        .flatten()
-        .map(|claim| claim.statement.clone())
-        .collect();
+    let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
+    let mut statements: Vec<String> =
+        claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
     statements.insert(2, share_statement(&global, settings));
     statements.extend(growth_statement(&growth));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
-        + growth
-            .rounds
-            .iter()
-            .map(|round| round.scenarios)
-            .sum::<u64>();
+        + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
     let holds = deviation.non_finite == 0
         && global.accepted > 0
         && global.claim.certified_risk <= settings.deviation.epsilon
         && growth.outcome == GrowthOutcome::Verified;
     let mut states = plant.system.states();
-    for (axis, (low, high)) in states
-        .iter_mut()
-        .zip(settings.low.into_iter().zip(settings.high))
-    {
+    for (axis, (low, high)) in states.iter_mut().zip(settings.low.into_iter().zip(settings.high)) {
         (axis.low, axis.high) = (low, high);
     }
     debug_assert!(region.volume() > 0.0);
@@ -136,11 +111,7 @@ where
         beta_total: ledger.total(),
         ledger: spendings(&ledger),
         picture,
-        timing: Timing {
-            wall_seconds: begun.elapsed().as_secs_f64(),
-            threads: 0,
-            rollouts,
-        },
+        timing: Timing { wall_seconds: begun.elapsed().as_secs_f64(), threads: 0, rollouts },
     })
 }
 
@@ -150,12 +121,7 @@ pub(super) fn tightening(
     constants: &ConstantsRecord,
     spec: &RolloutSpec,
 ) -> Tightening {
-    deviation::tightening(
-        bound,
-        constants.target.used,
-        constants.constraint.used,
-        spec,
-    )
+    deviation::tightening(bound, constants.target.used, constants.constraint.used, spec)
 }
 
 /// The Lipschitz constants, computed, sampled, and used as `settings` ask.
@@ -191,12 +157,7 @@ where
             }
             None => "computed: gradient bound over the box, not valid beyond it",
         };
-        Ok(ConstantRecord {
-            used,
-            source: source.to_owned(),
-            computed,
-            sampled,
-        })
+        Ok(ConstantRecord { used, source: source.to_owned(), computed, sampled })
     };
     let given = settings.constants;
     Ok(ConstantsRecord {
@@ -230,17 +191,10 @@ fn ledger<const NX: usize>(settings: &Settings<NX>) -> Result<Ledger> {
         ("global", "interval of the certified share", global),
     ];
     let rounds = (0..growth.rounds).map(|round| ("growth", "round", round, growth.round_beta()));
-    let once = claims
-        .into_iter()
-        .map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
+    let once = claims.into_iter().map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
     for (claim, purpose, round, beta) in once.chain(rounds) {
-        let entry = Entry {
-            claim: claim.to_owned(),
-            purpose: purpose.to_owned(),
-            call: 0,
-            round,
-            beta,
-        };
+        let entry =
+            Entry { claim: claim.to_owned(), purpose: purpose.to_owned(), call: 0, round, beta };
         if let Spend::Refused { left } = ledger.spend(entry) {
             let problem = format!("the claims together spend more than 1 ({left} left)");
             return Err(Error::invalid("beta", problem));
@@ -296,10 +250,7 @@ where
     let text = physics(plant);
     let physics = digest::sha256([text.as_bytes()]);
     // A formula is part of the recorded text.
-    let policy = plant
-        .policy
-        .network()
-        .map_or_else(|| physics.clone(), |mlp| mlp.digest());
+    let policy = plant.policy.network().map_or_else(|| physics.clone(), |mlp| mlp.digest());
     (physics, policy)
 }
 
@@ -321,13 +272,7 @@ where
     let target_margin = f64::from(context.plant.system.target(x));
     let tier = super::verify::tier(target_margin, check_margin, growth, &x);
     let constraint_margin = f64::from(context.plant.system.constraint(x));
-    Ok(StateRecord {
-        x: x.to_vec(),
-        tier,
-        check_margin,
-        target_margin,
-        constraint_margin,
-    })
+    Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }
 
 /// A few rollouts: the state's, then starts of the growth's last round.
@@ -340,27 +285,14 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let region = Region::Box {
-        low: settings.low,
-        high: settings.high,
-    };
+    let region = Region::Box { low: settings.low, high: settings.high };
     let stream = Stream::new(settings.seed, Purpose::Picture, 0);
-    let sampled = growth
-        .samples
-        .iter()
-        .take(PICTURED)
-        .map(|sample| sample.x.clone());
-    let mut starts: Vec<Vec<f32>> = std::iter::once(settings.state.to_vec())
-        .chain(sampled)
-        .collect();
+    let sampled = growth.samples.iter().take(PICTURED).map(|sample| sample.x.clone());
+    let mut starts: Vec<Vec<f32>> =
+        std::iter::once(settings.state.to_vec()).chain(sampled).collect();
     let missing = (PICTURED + 1).saturating_sub(starts.len()) as u64;
     for index in 0..missing {
-        starts.push(
-            region
-                .sample::<1>(stream, index)
-                .map(|lane| lane.0[0])
-                .to_vec(),
-        );
+        starts.push(region.sample::<1>(stream, index).map(|lane| lane.0[0]).to_vec());
     }
     let none = Tightening::none(&settings.spec);
     let rollouts = starts.into_iter().map(|start| {
@@ -371,9 +303,7 @@ where
             success: measure(plant, start, &settings.spec, &none) > 0.0,
         }
     });
-    PictureRecord {
-        rollouts: rollouts.collect(),
-    }
+    PictureRecord { rollouts: rollouts.collect() }
 }
 
 /// The certified share of the box in words.

@@ -28,29 +28,14 @@ impl Program {
     /// The program that `joint` makes of the deviation bound over `horizon` steps; the bound of
     /// step 0 is the radius itself and costs nothing.
     pub(super) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
-        let DeviationSettings {
-            epsilon,
-            beta,
-            joint,
-            ..
-        } = *settings;
+        let DeviationSettings { epsilon, beta, joint, .. } = *settings;
         let steps = f64::from(horizon);
         match joint {
-            Joint::FixedShape | Joint::Separate => Self {
-                decision_vars: 1,
-                epsilon,
-                beta,
-            },
-            Joint::Variables => Self {
-                decision_vars: horizon,
-                epsilon,
-                beta,
-            },
-            Joint::Bonferroni => Self {
-                decision_vars: 1,
-                epsilon: epsilon / steps,
-                beta: beta / steps,
-            },
+            Joint::FixedShape | Joint::Separate => Self { decision_vars: 1, epsilon, beta },
+            Joint::Variables => Self { decision_vars: horizon, epsilon, beta },
+            Joint::Bonferroni => {
+                Self { decision_vars: 1, epsilon: epsilon / steps, beta: beta / steps }
+            }
         }
     }
 }
@@ -90,21 +75,14 @@ where
         Some(count) => {
             context.watch.begin("pilot pairs", count);
             let purposes = [Purpose::PilotNominal, Purpose::PilotPerturbation];
-            Some(shape(
-                &draw(context, settings, purposes, count)?.farthest,
-                asked.radius,
-            ))
+            Some(shape(&draw(context, settings, purposes, count)?.farthest, asked.radius))
         }
         None => None,
     };
     context.watch.begin("deviation pairs", asked.scenarios);
     let purposes = [Purpose::DeviationNominal, Purpose::DeviationPerturbation];
     let sample = draw(context, settings, purposes, asked.scenarios)?;
-    let largest: Vec<f64> = sample
-        .farthest
-        .iter()
-        .map(|f| f64::from(f.distance))
-        .collect();
+    let largest: Vec<f64> = sample.farthest.iter().map(|f| f64::from(f.distance)).collect();
     let (scenario_bound, scale, support) =
         conclude(&sample.farthest, shape.as_deref(), asked.radius);
     let bound = match (asked.source, &exact) {
@@ -168,10 +146,7 @@ where
     let region = Region::new_box(settings.low, settings.high)?;
     let task = DeviationTask {
         pairs: Pairs {
-            nominal: Starts::Drawn {
-                region,
-                stream: stream(nominal),
-            },
+            nominal: Starts::Drawn { region, stream: stream(nominal) },
             radius: settings.deviation.radius,
             stream: stream(perturbation),
         },
@@ -181,19 +156,12 @@ where
         control: settings.deviation.control,
     };
     let mut non_finite = 0;
-    let farthest = context
-        .backend
-        .deviation(context.plant, &task, &mut |_, pairs| {
-            let broken = pairs
-                .iter()
-                .filter(|p| p.nominal == NON_FINITE || p.perturbed == NON_FINITE);
-            non_finite += broken.count() as u64;
-            context.watch.advance(pairs.len() as u64)
-        })?;
-    Ok(Sample {
-        farthest,
-        non_finite,
-    })
+    let farthest = context.backend.deviation(context.plant, &task, &mut |_, pairs| {
+        let broken = pairs.iter().filter(|p| p.nominal == NON_FINITE || p.perturbed == NON_FINITE);
+        non_finite += broken.count() as u64;
+        context.watch.advance(pairs.len() as u64)
+    })?;
+    Ok(Sample { farthest, non_finite })
 }
 
 /// The shape that a pilot sample fixes: its largest distances, the radius at step 0.
@@ -202,10 +170,7 @@ where
 /// times over; a thousandth of the radius is the floor.
 fn shape(pilot: &[Farthest], radius: f32) -> Vec<f64> {
     let floor = f64::from(radius) * 1e-3;
-    let rest = pilot
-        .iter()
-        .skip(1)
-        .map(|farthest| f64::from(farthest.distance).max(floor));
+    let rest = pilot.iter().skip(1).map(|farthest| f64::from(farthest.distance).max(floor));
     std::iter::once(f64::from(radius)).chain(rest).collect()
 }
 
@@ -225,18 +190,11 @@ fn conclude(
         let support: BTreeSet<u64> = farthest.iter().skip(1).map(|f| f.pair).collect();
         return (bound, None, support.len() as u64);
     };
-    let ratios = seen()
-        .zip(shape)
-        .skip(1)
-        .map(|(distance, shape)| distance / shape);
+    let ratios = seen().zip(shape).skip(1).map(|(distance, shape)| distance / shape);
     let scale = ratios.fold(0.0, f64::max);
     let bound = shape.iter().enumerate().map(|(t, shape)| {
         let scaled = (scale * shape).min(f64::from(HUGE));
-        if t == 0 {
-            scaled.max(f64::from(radius))
-        } else {
-            scaled
-        }
+        if t == 0 { scaled.max(f64::from(radius)) } else { scaled }
     });
     (bound.collect(), Some(scale), 1)
 }
@@ -278,11 +236,7 @@ where
     let (dimension, frozen) = super::certify::coordinates(system, &region.varies());
     // Risk of one program, times the programs whose risks add up.
     let programs = asked.epsilon / program.epsilon;
-    let risk = certified_risk(
-        asked.scenarios,
-        u64::from(program.decision_vars) - 1,
-        program.beta,
-    );
+    let risk = certified_risk(asked.scenarios, u64::from(program.decision_vars) - 1, program.beta);
     Ok(Claim {
         name: "deviation".to_owned(),
         statement,
@@ -322,13 +276,8 @@ pub fn tightening(
 ) -> Tightening {
     debug_assert_eq!(bound.len(), spec.horizon as usize + 1);
     let scaled = |constant: f64| {
-        let loss = bound
-            .iter()
-            .map(|bound| (constant * bound).min(f64::from(HUGE)) as f32);
+        let loss = bound.iter().map(|bound| (constant * bound).min(f64::from(HUGE)) as f32);
         loss.map(f32::next_up).collect()
     };
-    Tightening {
-        target: scaled(target_constant),
-        constraint: scaled(constraint_constant),
-    }
+    Tightening { target: scaled(target_constant), constraint: scaled(constraint_constant) }
 }

@@ -45,12 +45,10 @@ where
         tightening,
         query,
     };
-    context
-        .backend
-        .reach_avoid(context.plant, &task, &mut |_, values| {
-            margins.extend_from_slice(values);
-            context.watch.advance(values.len() as u64)
-        })?;
+    context.backend.reach_avoid(context.plant, &task, &mut |_, values| {
+        margins.extend_from_slice(values);
+        context.watch.advance(values.len() as u64)
+    })?;
     Ok(margins)
 }
 
@@ -89,11 +87,7 @@ pub(super) fn slice_states<const NX: usize>(settings: &Settings<NX>) -> Vec<[f32
         state[along.state] = y;
         state
     };
-    along
-        .values
-        .iter()
-        .flat_map(|&y| across.values.iter().map(move |&x| cell(y, x)))
-        .collect()
+    along.values.iter().flat_map(|&y| across.values.iter().map(move |&x| cell(y, x))).collect()
 }
 
 /// Draws pairs from the box: how much of it is certified, and how often a perturbed rollout
@@ -115,10 +109,7 @@ where
     let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
-            nominal: Starts::Drawn {
-                region,
-                stream: nominal,
-            },
+            nominal: Starts::Drawn { region, stream: nominal },
             radius: settings.deviation.radius,
             stream: perturbation,
         },
@@ -130,12 +121,10 @@ where
     context.watch.begin("certified set", draws);
     let f32_error = f32_error(context, &task)?;
     let mut count = Count::new(BAND_FACTOR * f32_error);
-    context
-        .backend
-        .deviation(context.plant, &task, &mut |first, pairs| {
-            count.add(context.plant, &task, first, pairs);
-            context.watch.advance(pairs.len() as u64)
-        })?;
+    context.backend.deviation(context.plant, &task, &mut |first, pairs| {
+        count.add(context.plant, &task, first, pairs);
+        context.watch.advance(pairs.len() as u64)
+    })?;
     let beta = settings.global.beta;
     let (low, high) = interval(count.accepted, draws, beta);
     let risk = certified_risk(count.accepted, count.failures, beta);
@@ -193,14 +182,7 @@ struct Count {
 impl Count {
     fn new(band: f64) -> Self {
         let band = band.max(LEAST_BAND);
-        Self {
-            band,
-            accepted: 0,
-            failures: 0,
-            reached: 0,
-            non_finite: 0,
-            f64_reruns: 0,
-        }
+        Self { band, accepted: 0, failures: 0, reached: 0, non_finite: 0, f64_reruns: 0 }
     }
 
     /// Adds the pairs `first..`; a measure within the band is run again in f64.
@@ -240,10 +222,7 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let pair = task
-        .pairs
-        .load::<1>(index)
-        .map(|start| start.map(|lane| lane.0[0]));
+    let pair = task.pairs.load::<1>(index).map(|start| start.map(|lane| lane.0[0]));
     pair_measures(plant, pair, &task.spec, task.tightening, task.control)
 }
 
@@ -256,29 +235,24 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let sample = DeviationTask {
-        range: 0..ERROR_SAMPLE.min(task.range.end),
-        ..task.clone()
-    };
+    let sample = DeviationTask { range: 0..ERROR_SAMPLE.min(task.range.end), ..task.clone() };
     let mut worst = 0.0_f64;
-    context
-        .backend
-        .deviation(context.plant, &sample, &mut |first, pairs| {
-            let error = |(i, pair): (usize, &PairMeasure)| {
-                let (nominal, perturbed) = pair_f64(context.plant, task, first + i as u64);
-                let finite = |a: f64, b: f32| {
-                    if b == NON_FINITE || a == f64::from(NON_FINITE) {
-                        0.0
-                    } else {
-                        (a - f64::from(b)).abs()
-                    }
-                };
-                finite(nominal, pair.nominal).max(finite(perturbed, pair.perturbed))
+    context.backend.deviation(context.plant, &sample, &mut |first, pairs| {
+        let error = |(i, pair): (usize, &PairMeasure)| {
+            let (nominal, perturbed) = pair_f64(context.plant, task, first + i as u64);
+            let finite = |a: f64, b: f32| {
+                if b == NON_FINITE || a == f64::from(NON_FINITE) {
+                    0.0
+                } else {
+                    (a - f64::from(b)).abs()
+                }
             };
-            let errors = pairs.par_iter().enumerate().map(error);
-            worst = worst.max(errors.reduce(|| 0.0, f64::max));
-            Ok(())
-        })?;
+            finite(nominal, pair.nominal).max(finite(perturbed, pair.perturbed))
+        };
+        let errors = pairs.par_iter().enumerate().map(error);
+        worst = worst.max(errors.reduce(|| 0.0, f64::max));
+        Ok(())
+    })?;
     Ok(worst)
 }
 

@@ -34,11 +34,7 @@ impl<const NX: usize> GrowthSettings<NX> {
     /// Beta of one round: the procedure stops at the first clean round, so all M rounds must hold
     /// at once (section 8.2).
     pub(super) fn round_beta(&self) -> f64 {
-        if self.split_beta {
-            self.beta / f64::from(self.rounds)
-        } else {
-            self.beta
-        }
+        if self.split_beta { self.beta / f64::from(self.rounds) } else { self.beta }
     }
 }
 
@@ -63,16 +59,10 @@ where
 {
     let asked = &settings.growth;
     check_scenarios(asked)?;
-    let mut ball = Ball {
-        center: boundary.point,
-        radius: asked.radius,
-        varies: asked.varies,
-    };
+    let mut ball = Ball { center: boundary.point, radius: asked.radius, varies: asked.varies };
     let mut rounds = Vec::new();
     let mut samples = Vec::new();
-    context
-        .watch
-        .begin("local growth", asked.scenarios * u64::from(asked.rounds));
+    context.watch.begin("local growth", asked.scenarios * u64::from(asked.rounds));
     for number in 0..asked.rounds {
         let stream = Stream::new(settings.seed, Purpose::Growth, call * asked.rounds + number);
         let round = round(context, settings, &ball, stream, band)?;
@@ -88,13 +78,7 @@ where
             Some(_) => break,
         }
     }
-    Ok((
-        Growth::Exhausted {
-            last_radius: ball.radius,
-        },
-        rounds,
-        samples,
-    ))
+    Ok((Growth::Exhausted { last_radius: ball.radius }, rounds, samples))
 }
 
 /// Refuses fewer starts than one clean round needs.
@@ -124,10 +108,7 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let starts = Starts::Drawn {
-        region: Region::Ball(ball.clone()),
-        stream,
-    };
+    let starts = Starts::Drawn { region: Region::Ball(ball.clone()), stream };
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
         starts,
@@ -145,33 +126,28 @@ where
         f64_reruns: 0,
     };
     let mut samples = Vec::new();
-    context
-        .backend
-        .reach_avoid(context.plant, &task, &mut |first, values| {
-            for (index, value) in (first..).zip(values) {
-                let start = task.starts.start(index);
-                let mut value = f64::from(*value);
-                if value.abs() <= band {
-                    value = measure(context.plant, start, &settings.spec, &tightening);
-                    record.f64_reruns += 1;
-                }
-                let success = value > 0.0;
-                if !success {
-                    record.failures += 1;
-                    record.non_finite += u64::from(value == f64::from(NON_FINITE));
-                    let distance = ball.distance(&start);
-                    let nearest = record.nearest_failure.map_or(distance, |n| n.min(distance));
-                    record.nearest_failure = Some(nearest);
-                }
-                if index < KEPT_SAMPLES {
-                    samples.push(SampleRecord {
-                        x: start.to_vec(),
-                        success,
-                    });
-                }
+    context.backend.reach_avoid(context.plant, &task, &mut |first, values| {
+        for (index, value) in (first..).zip(values) {
+            let start = task.starts.start(index);
+            let mut value = f64::from(*value);
+            if value.abs() <= band {
+                value = measure(context.plant, start, &settings.spec, &tightening);
+                record.f64_reruns += 1;
             }
-            context.watch.advance(values.len() as u64)
-        })?;
+            let success = value > 0.0;
+            if !success {
+                record.failures += 1;
+                record.non_finite += u64::from(value == f64::from(NON_FINITE));
+                let distance = ball.distance(&start);
+                let nearest = record.nearest_failure.map_or(distance, |n| n.min(distance));
+                record.nearest_failure = Some(nearest);
+            }
+            if index < KEPT_SAMPLES {
+                samples.push(SampleRecord { x: start.to_vec(), success });
+            }
+        }
+        context.watch.advance(values.len() as u64)
+    })?;
     Ok(Round { record, samples })
 }
 

@@ -74,10 +74,7 @@ impl Ledger {
             let problem = format!("{budget} is not strictly between 0 and 1");
             return Err(Error::invalid("beta budget", problem));
         }
-        Ok(Self {
-            budget,
-            entries: Vec::new(),
-        })
+        Ok(Self { budget, entries: Vec::new() })
     }
 
     /// Enters an expense if the budget allows it; an expense that is not positive never is.
@@ -87,9 +84,7 @@ impl Ledger {
             return Spend::Refused { left };
         }
         self.entries.push(entry);
-        Spend::Granted {
-            left: (self.budget - self.total()).max(0.0),
-        }
+        Spend::Granted { left: (self.budget - self.total()).max(0.0) }
     }
 
     /// What may be spent in all.
@@ -118,11 +113,7 @@ struct Record {
 
 impl From<Ledger> for Record {
     fn from(ledger: Ledger) -> Self {
-        Self {
-            budget: ledger.budget,
-            total: ledger.total(),
-            entries: ledger.entries,
-        }
+        Self { budget: ledger.budget, total: ledger.total(), entries: ledger.entries }
     }
 }
 
@@ -142,10 +133,8 @@ impl TryFrom<Record> for Ledger {
         if (total - record.total).abs() <= ROUNDING * record.budget {
             return Ok(ledger);
         }
-        let problem = format!(
-            "the entries of the beta ledger sum to {total}, not {}",
-            record.total
-        );
+        let problem =
+            format!("the entries of the beta ledger sum to {total}, not {}", record.total);
         Err(Error::Refused(problem))
     }
 }
@@ -171,10 +160,7 @@ mod tests {
             let mut ledger = Ledger::new(1e-3).unwrap();
             for round in 0..rounds {
                 let spend = ledger.spend(entry(round, 1e-3 / f64::from(rounds)));
-                assert!(
-                    matches!(spend, Spend::Granted { .. }),
-                    "{round} of {rounds}"
-                );
+                assert!(matches!(spend, Spend::Granted { .. }), "{round} of {rounds}");
             }
             let over = ledger.spend(entry(rounds, 1e-9));
             assert!(matches!(over, Spend::Refused { .. }));
@@ -185,10 +171,7 @@ mod tests {
     #[test]
     fn what_is_left_is_the_difference() {
         let mut ledger = Ledger::new(0.5).unwrap();
-        assert_eq!(
-            ledger.spend(entry(0, 0.125)),
-            Spend::Granted { left: 0.375 }
-        );
+        assert_eq!(ledger.spend(entry(0, 0.125)), Spend::Granted { left: 0.375 });
         assert_eq!(ledger.spend(entry(1, 0.5)), Spend::Refused { left: 0.375 });
         assert_eq!(ledger.total(), 0.125);
         for bad in [0.0, -0.1, f64::NAN] {
@@ -200,10 +183,7 @@ mod tests {
     #[test]
     fn reads_back_what_it_wrote_and_refuses_what_does_not_add_up() {
         let mut ledger = Ledger::new(1e-3).unwrap();
-        assert!(matches!(
-            ledger.spend(entry(0, 2e-4)),
-            Spend::Granted { .. }
-        ));
+        assert!(matches!(ledger.spend(entry(0, 2e-4)), Spend::Granted { .. }));
         let text = serde_json::to_string(&ledger).unwrap();
         assert!(text.contains("\"total\":0.0002"), "{text}");
         assert_eq!(serde_json::from_str::<Ledger>(&text).unwrap(), ledger);

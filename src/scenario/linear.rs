@@ -28,11 +28,7 @@ pub fn state_matrix<S: System<NX, NU>, const NX: usize, const NU: usize>(
     let low = ends(f64::NEG_INFINITY, std::array::from_fn(|i| controls[i].low));
     let high = ends(f64::INFINITY, std::array::from_fn(|i| controls[i].high));
     let varies: Vec<bool> = (0..NX + NU).map(|i| i < NX).collect();
-    let domain = Domain {
-        low: &low,
-        high: &high,
-        varies: &varies,
-    };
+    let domain = Domain { low: &low, high: &high, varies: &varies };
     let outputs = enclose(domain, |inputs| {
         let x = std::array::from_fn(|i| inputs[i]);
         let u = std::array::from_fn(|i| inputs[NX + i]);
@@ -131,11 +127,7 @@ mod tests {
         let found = exact_deviation(&matrix, 0.1, 30);
         assert_eq!(found.len(), 31);
         for (t, deviation) in expected {
-            assert!(
-                (found[t] - deviation).abs() <= 5e-5,
-                "t = {t}: {}",
-                found[t]
-            );
+            assert!((found[t] - deviation).abs() <= 5e-5, "t = {t}: {}", found[t]);
         }
     }
 
@@ -148,10 +140,7 @@ mod tests {
         for (t, found) in exact_deviation(&matrix, 2.0, 200).into_iter().enumerate() {
             let s = dt * t as f64;
             let exact = s + s.hypot(2.0);
-            assert!(
-                found >= exact && found <= exact * (1.0 + 1e-9),
-                "t = {t}: {found} {exact}"
-            );
+            assert!(found >= exact && found <= exact * (1.0 + 1e-9), "t = {t}: {found} {exact}");
         }
     }
 
@@ -163,10 +152,7 @@ mod tests {
         let s = f64::from(0.1_f32) * 200.0;
         let exact = 0.5 * (s + s.hypot(2.0));
         let found = exact_deviation(&rounded, 1.0, 200)[200];
-        assert!(
-            found >= exact && found <= exact * (1.0 + 1e-9),
-            "{found} {exact}"
-        );
+        assert!(found >= exact && found <= exact * (1.0 + 1e-9), "{found} {exact}");
     }
 
     /// Along a vector of slope sigma the trajectories do come apart that far, never farther.
@@ -190,10 +176,7 @@ mod tests {
             let ends = [apart(-0.5), apart(0.5)];
             let squares = (0..12).map(|i| (ends[0][i] - ends[1][i]).powi(2));
             let reached = squares.sum::<f64>().sqrt();
-            assert!(
-                reached <= bound && reached >= bound * (1.0 - 1e-9),
-                "t = {t}"
-            );
+            assert!(reached <= bound && reached >= bound * (1.0 - 1e-9), "t = {t}");
             power = &matrix * power;
         }
     }
@@ -253,9 +236,6 @@ mod tests {
         }
         let dt = f64::from(0.1_f32);
         let expected = [1.0, 1.0, 0.0, 0.0, dt, 0.0, 0.0, 0.0, 1.0];
-        assert_eq!(
-            state_matrix(&Switched),
-            Some(DMatrix::from_row_slice(3, 3, &expected))
-        );
+        assert_eq!(state_matrix(&Switched), Some(DMatrix::from_row_slice(3, 3, &expected)));
     }
 }

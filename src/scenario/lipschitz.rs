@@ -35,11 +35,7 @@ pub fn margins<S: System<NX, NU>, const NX: usize, const NU: usize>(
     high: [f32; NX],
     varies: [bool; NX],
 ) -> MarginConstants {
-    let domain = Domain {
-        low: &low.map(f64::from),
-        high: &high.map(f64::from),
-        varies: &varies,
-    };
+    let domain = Domain { low: &low.map(f64::from), high: &high.map(f64::from), varies: &varies };
     MarginConstants {
         target: lipschitz(domain, |x| system.target(std::array::from_fn(|i| x[i]))),
         constraint: lipschitz(domain, |x| system.constraint(std::array::from_fn(|i| x[i]))),
@@ -59,10 +55,7 @@ pub fn sampled<S: System<NX, NU>, const NX: usize, const NU: usize>(
     seed: u64,
 ) -> SampledSlopes {
     let (low, high) = (low.map(f64::from), high.map(f64::from));
-    let mut largest = SampledSlopes {
-        target: 0.0,
-        constraint: 0.0,
-    };
+    let mut largest = SampledSlopes { target: 0.0, constraint: 0.0 };
     for index in 0..count {
         let start = state(low, high, index, seed);
         let climb = |margin: &dyn Fn([f64; NX]) -> f64| slope(margin, start, low, high, varies);
@@ -78,11 +71,7 @@ fn state<const NX: usize>(low: [f64; NX], high: [f64; NX], index: u32, seed: u64
     std::array::from_fn(|i| {
         let [[place], [end], ..] = philox([[index], [i as u32], [0], [0]], key);
         let share = f64::from(place) / f64::from(u32::MAX);
-        let share = if end.is_multiple_of(2) {
-            share
-        } else {
-            share.round()
-        };
+        let share = if end.is_multiple_of(2) { share } else { share.round() };
         low[i] + share * (high[i] - low[i])
     })
 }
@@ -144,19 +133,10 @@ mod tests {
         let slopes = sampled(system, low, high, varies, 2000, 1);
         // A slope over 2e-5 between margins below 1e3 is rounded at 1e-13 / 2e-5.
         let rounding = 1e-8;
-        assert!(
-            slopes.target <= found.target.constant + rounding,
-            "{slopes:?}"
-        );
-        assert!(
-            slopes.constraint <= found.constraint.constant + rounding,
-            "{slopes:?}"
-        );
+        assert!(slopes.target <= found.target.constant + rounding, "{slopes:?}");
+        assert!(slopes.constraint <= found.constraint.constant + rounding, "{slopes:?}");
         assert!(slopes.target >= share * found.target.constant, "{slopes:?}");
-        assert!(
-            slopes.constraint >= share * found.constraint.constant,
-            "{slopes:?}"
-        );
+        assert!(slopes.constraint >= share * found.constraint.constant, "{slopes:?}");
         assert!(!found.target.hulled && !found.constraint.hulled);
         assert!(!found.target.assumed_continuous && !found.constraint.assumed_continuous);
         found
@@ -164,10 +144,7 @@ mod tests {
 
     /// Never below the truth, and at most 1 % above; the truth is rounded to 1 in 1e15.
     fn assert_bounds(constant: f64, truth: f64) {
-        assert!(
-            constant >= truth * (1.0 - 1e-15),
-            "{constant} is below {truth}"
-        );
+        assert!(constant >= truth * (1.0 - 1e-15), "{constant} is below {truth}");
         assert!(constant <= truth * 1.01, "{constant} is far above {truth}");
     }
 
@@ -184,18 +161,12 @@ mod tests {
             (Cone::Squared, 8.0 * depth + 2.0 * q * q, 0.0),
         ];
         for (cone, square, share) in truths {
-            let race = DroneRace {
-                cone,
-                ..DroneRace::default()
-            };
+            let race = DroneRace { cone, ..DroneRace::default() };
             let found = over_default_box(&race, [true; 12], share);
             assert_bounds(found.target.constant, 10.0 * 2.0_f64.sqrt());
             assert_bounds(found.constraint.constant, 10.0 * square.sqrt());
             assert_eq!(found.target.pieces, 6);
-            let limited = DroneRace {
-                speed_limit: true,
-                ..race
-            };
+            let limited = DroneRace { speed_limit: true, ..race };
             let limited = over_default_box(&limited, [true; 12], share);
             assert_eq!(limited.constraint.constant, found.constraint.constant);
             assert_eq!(limited.constraint.pieces, found.constraint.pieces + 1);
@@ -210,10 +181,7 @@ mod tests {
         let q = f64::from(0.2_f32);
         assert_bounds(found.target.constant, 10.0);
         // The fences have slope 10 sqrt(2), the cone only 10 sqrt(1 + q^2).
-        assert_bounds(
-            found.constraint.constant,
-            10.0 * 2.0_f64.sqrt().max((1.0 + q * q).sqrt()),
-        );
+        assert_bounds(found.constraint.constant, 10.0 * 2.0_f64.sqrt().max((1.0 + q * q).sqrt()));
         let opponent = std::array::from_fn(|i| i >= 6);
         let found = over_default_box(&DroneRace::default(), opponent, 0.99);
         assert_bounds(found.constraint.constant, 10.0 * (1.0 + q * q).sqrt());

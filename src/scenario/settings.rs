@@ -158,10 +158,7 @@ impl<const NX: usize> Settings<NX> {
         let slice = [0, 1].map(|state| {
             let step = (axes[state].high - axes[state].low) / f32::from(SLICE_CELLS - 1);
             let value = |i| axes[state].low + f32::from(i) * step;
-            SliceAxis {
-                state,
-                values: (0..SLICE_CELLS).map(value).collect(),
-            }
+            SliceAxis { state, values: (0..SLICE_CELLS).map(value).collect() }
         });
         Self {
             seed: 1,
@@ -179,10 +176,7 @@ impl<const NX: usize> Settings<NX> {
                 control: PairControl::Replay,
                 source: DeviationSource::Scenario,
             },
-            global: GlobalSettings {
-                draws: 20_000,
-                beta,
-            },
+            global: GlobalSettings { draws: 20_000, beta },
             slice,
             state,
             growth: GrowthSettings {

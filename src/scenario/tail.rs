@@ -149,12 +149,7 @@ mod tests {
 
     #[test]
     fn tails_match_the_incomplete_beta_function() {
-        for (n, p) in [
-            (158.0, 0.1),
-            (1375.0, 0.01),
-            (5000.0, 0.02),
-            (43_447.0, 1e-3),
-        ] {
+        for (n, p) in [(158.0, 0.1), (1375.0, 0.01), (5000.0, 0.02), (43_447.0, 1e-3)] {
             for k in [1.0, 10.0, 40.0, 60.0] {
                 let [below, above] =
                     [ln_at_most(k, n, p), ln_at_least(k + 1.0, n, p)].map(f64::exp);

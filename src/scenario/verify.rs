@@ -75,10 +75,7 @@ pub(super) fn tier<const NX: usize>(
 
 /// The verified ball, where there is one.
 fn verified_ball<const NX: usize>(growth: &GrowthRecord) -> Option<Ball<NX>> {
-    let center = growth
-        .center
-        .as_ref()
-        .filter(|_| growth.outcome == GrowthOutcome::Verified)?;
+    let center = growth.center.as_ref().filter(|_| growth.outcome == GrowthOutcome::Verified)?;
     Some(Ball {
         center: center.as_slice().try_into().ok()?,
         radius: growth.radius as f32,
@@ -96,9 +93,7 @@ where
     P: Policy<NX, NU>,
 {
     let refuse = |field: &str, stored: &str, found: &str| {
-        Err(Error::Refused(format!(
-            "{field} is {stored} in the record, {found} here"
-        )))
+        Err(Error::Refused(format!("{field} is {stored} in the record, {found} here")))
     };
     let (physics, policy) = hashes(plant);
     let stored = &record.provenance;
@@ -109,22 +104,14 @@ where
         return refuse("system.name", &record.system.name, plant.system.name());
     }
     if stored.physics_sha256 != physics {
-        return refuse(
-            "provenance.physics_sha256",
-            &stored.physics_sha256,
-            &physics,
-        );
+        return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
     }
     if stored.policy_sha256 != policy {
         return refuse("provenance.policy_sha256", &stored.policy_sha256, &policy);
     }
     if record.deviation.bound.len() != record.horizon as usize + 1 {
         let found = record.deviation.bound.len().to_string();
-        return refuse(
-            "deviation.bound length",
-            &found,
-            &(record.horizon + 1).to_string(),
-        );
+        return refuse("deviation.bound length", &found, &(record.horizon + 1).to_string());
     }
     Ok(())
 }
@@ -146,21 +133,13 @@ where
     check_identity(plant, record)?;
     let spec = RolloutSpec::new(record.horizon, record.gamma as f32)?;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
-    let context = Context {
-        backend,
-        plant,
-        watch: &Unwatched,
-    };
+    let context = Context { backend, plant, watch: &Unwatched };
     let margins = global::check_margins(context, &spec, &tightening, states, Query::Measure)?;
     let row = |(x, check_margin): (&[f32; NX], f32)| {
         let target_margin: f32 = plant.system.target(*x);
         let check = f64::from(check_margin);
         let tier = tier(f64::from(target_margin), check, &record.growth, x);
-        QueryRow {
-            tier,
-            check_margin,
-            target_margin,
-        }
+        QueryRow { tier, check_margin, target_margin }
     };
     Ok(states.iter().zip(margins).map(row).collect())
 }
@@ -184,18 +163,8 @@ where
     P: Policy<NX, NU>,
 {
     check_identity(plant, record)?;
-    let again = certify(
-        backend,
-        plant,
-        settings,
-        record.provenance.config.clone(),
-        watch,
-    )?;
-    let context = Context {
-        backend,
-        plant,
-        watch,
-    };
+    let again = certify(backend, plant, settings, record.provenance.config.clone(), watch)?;
+    let context = Context { backend, plant, watch };
     let mut findings = recomputed(record, &again);
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
     let purposes = [Purpose::Check, Purpose::CheckPerturbation];
@@ -210,22 +179,10 @@ where
     findings.push(share);
     if let Some(ball) = verified_ball::<NX>(&record.growth) {
         let failures = fresh_failures(context, settings, ball)?;
-        let risk = record
-            .growth
-            .claim
-            .as_ref()
-            .map_or(0.0, |claim| claim.certified_risk);
-        findings.push(refuted(
-            "failures in the verified ball",
-            risk,
-            failures,
-            FRESH_STARTS,
-        ));
+        let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
+        findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
     }
-    Ok(CheckReport {
-        holds: findings.iter().all(|finding| finding.holds),
-        findings,
-    })
+    Ok(CheckReport { holds: findings.iter().all(|finding| finding.holds), findings })
 }
 
 /// Compares the stored record with the one computed again from its seed.
@@ -245,20 +202,11 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
     let worst = stored.deviation.bound.iter().zip(&again.deviation.bound);
     let (was, is) = worst.fold((0.0, 0.0), |worst: (f64, f64), (was, is)| {
         let farther = (was - is).abs() > (worst.0 - worst.1).abs();
-        if farther || worst.0 == 0.0 {
-            (*was, *is)
-        } else {
-            worst
-        }
+        if farther || worst.0 == 0.0 { (*was, *is) } else { worst }
     });
     let text = |name: &str, stored: String, found: String| {
         let holds = stored == found;
-        Finding {
-            name: name.to_owned(),
-            stored,
-            found,
-            holds,
-        }
+        Finding { name: name.to_owned(), stored, found, holds }
     };
     let outcome = |record: &Record| format!("{:?}", record.growth.outcome).to_lowercase();
     vec![
@@ -291,16 +239,8 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
             again.global.claim.certified_risk,
         ),
         text("outcome of local growth", outcome(stored), outcome(again)),
-        number(
-            "radius of the verified ball",
-            stored.growth.radius,
-            again.growth.radius,
-        ),
-        text(
-            "all claims obtained",
-            stored.holds.to_string(),
-            again.holds.to_string(),
-        ),
+        number("radius of the verified ball", stored.growth.radius, again.growth.radius),
+        text("all claims obtained", stored.holds.to_string(), again.holds.to_string()),
     ]
 }
 
@@ -325,27 +265,20 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    context
-        .watch
-        .begin("fresh starts in the ball", FRESH_STARTS);
+    context.watch.begin("fresh starts in the ball", FRESH_STARTS);
     let stream = Stream::new(settings.seed, Purpose::Check, 1);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
-        starts: Starts::Drawn {
-            region: Region::Ball(ball),
-            stream,
-        },
+        starts: Starts::Drawn { region: Region::Ball(ball), stream },
         range: 0..FRESH_STARTS,
         spec: settings.spec,
         tightening: &tightening,
         query: Query::Sign,
     };
     let mut failures = 0;
-    context
-        .backend
-        .reach_avoid(context.plant, &task, &mut |_, values| {
-            failures += values.iter().filter(|value| **value <= 0.0).count() as u64;
-            context.watch.advance(values.len() as u64)
-        })?;
+    context.backend.reach_avoid(context.plant, &task, &mut |_, values| {
+        failures += values.iter().filter(|value| **value <= 0.0).count() as u64;
+        context.watch.advance(values.len() as u64)
+    })?;
     Ok(failures)
 }

@@ -23,11 +23,7 @@ pub struct DoubleIntegrator {
 
 impl Default for DoubleIntegrator {
     fn default() -> Self {
-        Self {
-            target: 0.25,
-            corridor: 1.0,
-            acceleration: 1.0,
-        }
+        Self { target: 0.25, corridor: 1.0, acceleration: 1.0 }
     }
 }
 
@@ -37,29 +33,18 @@ impl System<2, 1> for DoubleIntegrator {
     }
 
     fn states(&self) -> [Axis; 2] {
-        [
-            Axis::new("position", "m", -1.2, 1.2),
-            Axis::new("velocity", "m/s", -1.5, 1.5),
-        ]
+        [Axis::new("position", "m", -1.2, 1.2), Axis::new("velocity", "m/s", -1.5, 1.5)]
     }
 
     fn controls(&self) -> [Axis; 1] {
-        [Axis::new(
-            "acceleration",
-            "m/s^2",
-            -self.acceleration,
-            self.acceleration,
-        )]
+        [Axis::new("acceleration", "m/s^2", -self.acceleration, self.acceleration)]
     }
 
     #[inline(always)]
     fn step<R: Real>(&self, [position, velocity]: [R; 2], [u]: [R; 1]) -> [R; 2] {
         let bound = R::lit(self.acceleration);
         let dt = R::lit(DT);
-        [
-            position + dt * velocity,
-            velocity + dt * u.clamp(-bound, bound),
-        ]
+        [position + dt * velocity, velocity + dt * u.clamp(-bound, bound)]
     }
 
     #[inline(always)]

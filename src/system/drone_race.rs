@@ -48,12 +48,7 @@ pub struct DroneRace {
 
 impl Default for DroneRace {
     fn default() -> Self {
-        Self {
-            ego_gain: 0.5,
-            opponent_gain: 1.0,
-            cone: Cone::Distance,
-            speed_limit: false,
-        }
+        Self { ego_gain: 0.5, opponent_gain: 1.0, cone: Cone::Distance, speed_limit: false }
     }
 }
 
@@ -147,24 +142,14 @@ impl System<12, 3> for DroneRace {
     fn constraint<R: Real>(&self, x: [R; 12]) -> R {
         let [ego_x, _, ego_y, ego_vy, ego_z, ..] = x;
         let room = R::lit(FENCE) - ego_y;
-        let fences = (room + ego_x)
-            .min(room - ego_x)
-            .min((room + ego_z).min(room - ego_z));
+        let fences = (room + ego_x).min(room - ego_x).min((room + ego_z).min(room - ego_z));
         let margin = self.cone_margin(x).min(fences);
-        let margin = if self.speed_limit {
-            margin.min(R::lit(1.0) - ego_vy)
-        } else {
-            margin
-        };
+        let margin = if self.speed_limit { margin.min(R::lit(1.0) - ego_vy) } else { margin };
         R::lit(MARGIN_SCALE) * margin
     }
 
     fn bodies(&self) -> Vec<Body> {
-        let body = |name: &str, x| Body {
-            name: name.to_owned(),
-            x,
-            y: x + 2,
-        };
+        let body = |name: &str, x| Body { name: name.to_owned(), x, y: x + 2 };
         vec![body("ego", 0), body("opponent", 6)]
     }
 }

@@ -92,11 +92,6 @@ pub struct Axis {
 impl Axis {
     /// An axis over `[low, high]`.
     pub fn new(name: &str, unit: &str, low: f32, high: f32) -> Self {
-        Self {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            low,
-            high,
-        }
+        Self { name: name.to_owned(), unit: unit.to_owned(), low, high }
     }
 }

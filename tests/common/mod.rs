@@ -52,19 +52,14 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
     let axes = system.states();
     let values = |axis: usize| {
         let (low, high) = (axes[axis].low, axes[axis].high);
-        (1..20)
-            .map(|i| low + (high - low) * i as f32 / 20.0)
-            .collect()
+        (1..20).map(|i| low + (high - low) * i as f32 / 20.0).collect()
     };
     Settings {
         seed: 1,
         spec: RolloutSpec::new(horizon, 0.95).expect("spec"),
         low: axes.each_ref().map(|axis| axis.low),
         high: axes.each_ref().map(|axis| axis.high),
-        constants: ConstantSettings {
-            target: Some(1.0),
-            constraint: Some(1.0),
-        },
+        constants: ConstantSettings { target: Some(1.0), constraint: Some(1.0) },
         deviation: DeviationSettings {
             radius: 0.1,
             epsilon: 0.1,
@@ -75,14 +70,8 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             control: PairControl::Replay,
             source: DeviationSource::Scenario,
         },
-        global: GlobalSettings {
-            draws: 600,
-            beta: 1e-3,
-        },
-        slice: [0, 1].map(|state| SliceAxis {
-            state,
-            values: values(state),
-        }),
+        global: GlobalSettings { draws: 600, beta: 1e-3 },
+        slice: [0, 1].map(|state| SliceAxis { state, values: values(state) }),
         state: axes.each_ref().map(|axis| 0.5 * (axis.low + axis.high)),
         growth: GrowthSettings {
             radius: 0.1,
@@ -102,16 +91,11 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
 /// x-y plane, growth in the ego's x and y.
 pub(crate) fn race_settings(system: &DroneRace) -> Settings<12> {
     let mut settings = settings(system, 30);
-    settings.constants = ConstantSettings {
-        target: Some(14.15),
-        constraint: Some(14.43),
-    };
+    settings.constants = ConstantSettings { target: Some(14.15), constraint: Some(14.43) };
     settings.deviation.radius = 0.02;
     for (axis, state, low, step, count) in [(0, 0, -0.9, 0.1, 18_u16), (1, 2, -2.6, 0.2, 13)] {
-        settings.slice[axis] = SliceAxis {
-            state,
-            values: (0..count).map(|i| low + step * f32::from(i)).collect(),
-        };
+        settings.slice[axis] =
+            SliceAxis { state, values: (0..count).map(|i| low + step * f32::from(i)).collect() };
     }
     settings.state = [0.4, 0.0, -2.2, 0.7, 0.0, 0.0, 0.4, 0.0, -2.2, 0.3, 0.0, 0.0];
     settings.growth.varies = std::array::from_fn(|i| i == 0 || i == 2);

@@ -15,10 +15,7 @@ fn chunks_join_without_a_seam() {
     let Some(gpu) = gpu() else { return };
     let system = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(5, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let mut task = ReachAvoidTask {
@@ -34,10 +31,7 @@ fn chunks_join_without_a_seam() {
     assert_eq!(part, whole[(1 << 18) - 500..]);
 
     let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(2, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let pairs = |range| DeviationTask {
@@ -66,10 +60,7 @@ fn every_step_of_a_long_horizon_is_taken() {
     let horizon = 10_000;
     let spec = RolloutSpec::new(horizon, 1.0).expect("a horizon");
     let tightening = Tightening::none(&spec);
-    let plant = Plant {
-        system: &Count,
-        policy: &Idle,
-    };
+    let plant = Plant { system: &Count, policy: &Idle };
     let task = ReachAvoidTask {
         starts: Starts::Listed(&list),
         range: 0..10,
@@ -102,17 +93,11 @@ fn every_step_of_a_long_horizon_is_taken() {
 
     // Under a network, steps are dispatches of their own: cross a submission there too.
     let policy = random_network(&[2, 4, 1], Activation::Relu);
-    let plant = Plant {
-        system: &Count,
-        policy: &policy,
-    };
+    let plant = Plant { system: &Count, policy: &policy };
     let spec = RolloutSpec::new(150, 1.0).expect("a horizon");
     let mut target = vec![1000.0; 151];
     target[150] = 0.0;
-    let tightening = Tightening {
-        constraint: vec![0.0; 151],
-        target,
-    };
+    let tightening = Tightening { constraint: vec![0.0; 151], target };
     // Only the last state counts: its margin is 150 above the start's, less 149.5.
     let starts = [[-149.5, 0.5], [-150.5, 0.5]];
     for (query, expected) in [(Query::Measure, [0.5, -0.5]), (Query::Sign, [1.0, -1.0])] {
@@ -135,13 +120,7 @@ fn non_finite_states_fail_unless_the_target_was_reached() {
     // The second state is infinite after 7 squarings of 2.1 and finite again at t = 8. From -3 the
     // first reaches 0 before that (a margin of 3 at t = 6), from -10 after it, from -20 never.
     let nan = f32::NAN;
-    let starts = [
-        [-3.0, 2.1],
-        [-10.0, 2.1],
-        [-20.0, 0.5],
-        [nan, 0.5],
-        [1.0, f32::INFINITY],
-    ];
+    let starts = [[-3.0, 2.1], [-10.0, 2.1], [-20.0, 0.5], [nan, 0.5], [1.0, f32::INFINITY]];
     let spec = RolloutSpec::new(19, 1.0).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let network = random_network(&[2, 4, 1], Activation::Tanh);
@@ -155,16 +134,10 @@ fn non_finite_states_fail_unless_the_target_was_reached() {
             tightening: &tightening,
             query,
         };
-        let formula = Plant {
-            system: &Count,
-            policy: &Idle,
-        };
+        let formula = Plant { system: &Count, policy: &Idle };
         let (back, found) = measures::<_, _, 2, 1>(gpu, formula, &task);
         assert_eq!(found, expected, "{query:?} under a formula");
-        let driven = Plant {
-            system: &Count,
-            policy: &network,
-        };
+        let driven = Plant { system: &Count, policy: &network };
         let (back, found) = measures(back, driven, &task);
         gpu = back;
         assert_eq!(found, expected, "{query:?} under a network");
@@ -180,18 +153,12 @@ fn non_finite_states_fail_unless_the_target_was_reached() {
         tightening: &tightening,
         control: PairControl::Replay,
     };
-    let plant = Plant {
-        system: &Count,
-        policy: &Idle,
-    };
+    let plant = Plant { system: &Count, policy: &Idle };
     let (_, farthest, pairs) = deviation::<_, _, 2, 1>(gpu, plant, &task);
     assert!(pairs[0].nominal == 3.0 && pairs[1].nominal == NON_FINITE);
     assert!(pairs[0].perturbed > 2.9 && pairs[1].perturbed == NON_FINITE);
     assert!(farthest[0].distance <= 0.0101, "{farthest:?}");
-    let overflowed = Farthest {
-        distance: HUGE,
-        pair: 0,
-    };
+    let overflowed = Farthest { distance: HUGE, pair: 0 };
     assert_eq!(farthest[7], overflowed);
     assert!(farthest[8].distance <= 0.0101, "{farthest:?}");
 }

@@ -14,10 +14,7 @@ fn an_error_of_the_sink_stops_the_batch() {
     let Some(gpu) = gpu() else { return };
     let system = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(1, 0.95).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = ReachAvoidTask {
@@ -39,10 +36,7 @@ fn an_error_of_the_sink_stops_the_batch() {
 /// Measures of a small race batch with every kernel's text changed from `old` to `new`.
 fn mutated(gpu: Gpu, old: &'static str, new: &'static str) -> Result<Vec<f32>> {
     let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(10, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let task = ReachAvoidTask {
@@ -75,14 +69,8 @@ fn a_kernel_that_does_not_compile_is_a_device_failure() {
 #[test]
 fn a_network_of_the_wrong_shape_is_refused() {
     let Some(gpu) = gpu() else { return };
-    let (system, policy) = (
-        DroneRace::default(),
-        random_network(&[11, 8, 3], Activation::Relu),
-    );
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let (system, policy) = (DroneRace::default(), random_network(&[11, 8, 3], Activation::Relu));
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(1, 0.95).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = ReachAvoidTask {
@@ -94,24 +82,16 @@ fn a_network_of_the_wrong_shape_is_refused() {
     };
     let (_, result) = reach_avoid(gpu, plant, &task);
     let text = result.expect_err("11 inputs for 12 states").to_string();
-    assert!(
-        text.contains("11 inputs") && text.contains("12 states"),
-        "{text}"
-    );
+    assert!(text.contains("11 inputs") && text.contains("12 states"), "{text}");
 }
 
 #[test]
 fn adapters_that_are_not_there_are_refused_with_what_is() {
     let name = "no such adapter";
     let error = Gpu::open(&Choice::Named(name.to_owned())).expect_err("a made-up name");
-    let Error::Device(text) = error else {
-        panic!("{error:?}")
-    };
+    let Error::Device(text) = error else { panic!("{error:?}") };
     for adapter in adapters() {
-        assert!(
-            text.contains(name) && text.contains(&adapter.name),
-            "{text}"
-        );
+        assert!(text.contains(name) && text.contains(&adapter.name), "{text}");
     }
     assert!(text.contains("CPU backend"), "{text}");
 }

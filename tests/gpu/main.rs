@@ -43,17 +43,11 @@ fn reach_avoid<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: 
     let backend = Backend::Gpu(gpu);
     let mut all = Vec::new();
     let result = backend.reach_avoid(plant, task, &mut |first, values| {
-        assert_eq!(
-            first,
-            task.range.start + all.len() as u64,
-            "order of the sink"
-        );
+        assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
     });
-    let Backend::Gpu(gpu) = backend else {
-        unreachable!("it was made a GPU above")
-    };
+    let Backend::Gpu(gpu) = backend else { unreachable!("it was made a GPU above") };
     (gpu, result.map(|()| all))
 }
 
@@ -76,18 +70,12 @@ fn deviation<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: us
     let backend = Backend::Gpu(gpu);
     let mut all = Vec::new();
     let farthest = backend.deviation(plant, task, &mut |first, values| {
-        assert_eq!(
-            first,
-            task.range.start + all.len() as u64,
-            "order of the sink"
-        );
+        assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
     });
     assert_eq!(all.len() as u64, task.range.end - task.range.start);
-    let Backend::Gpu(gpu) = backend else {
-        unreachable!("it was made a GPU above")
-    };
+    let Backend::Gpu(gpu) = backend else { unreachable!("it was made a GPU above") };
     (gpu, farthest.expect("a batch that runs"), all)
 }
 
@@ -103,18 +91,12 @@ fn ramp(spec: &RolloutSpec) -> Tightening {
 /// The box of a system's axes.
 fn whole_box<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Region<NX> {
     let axes = system.states();
-    let (low, high) = (
-        axes.each_ref().map(|a| a.low),
-        axes.each_ref().map(|a| a.high),
-    );
+    let (low, high) = (axes.each_ref().map(|a| a.low), axes.each_ref().map(|a| a.high));
     Region::new_box(low, high).expect("the box of a system")
 }
 
 fn drawn<const NX: usize>(region: Region<NX>, seed: u64) -> Starts<'static, NX> {
-    Starts::Drawn {
-        region,
-        stream: Stream::new(seed, Purpose::User, 3),
-    }
+    Starts::Drawn { region, stream: Stream::new(seed, Purpose::User, 3) }
 }
 
 fn race_policy() -> Mlp {
@@ -126,9 +108,7 @@ fn race_policy() -> Mlp {
 fn random_network(widths: &[usize], activation: Activation) -> Mlp {
     let mut state = 1_u64;
     let mut uniform = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (state >> 40) as f32 / (1 << 23) as f32 - 1.0
     };
     let layers = widths.windows(2).map(|pair| {
@@ -148,8 +128,6 @@ fn random_network(widths: &[usize], activation: Activation) -> Mlp {
 /// A GPU may contract products and sum a layer in another order, each of which changes rounding
 /// by a small factor; hence 8. The floor covers batches in which f32 happens to be exact.
 fn band(host: impl IntoIterator<Item = (f32, f64)>) -> f64 {
-    let distances = host
-        .into_iter()
-        .map(|(host, oracle)| (f64::from(host) - oracle).abs());
+    let distances = host.into_iter().map(|(host, oracle)| (f64::from(host) - oracle).abs());
     8.0 * distances.fold(0.0, f64::max) + 1e-6
 }

@@ -50,10 +50,7 @@ fn assert_close_to_f64<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, co
     let band = band(both.iter().map(|(oracle, host)| (*host, *oracle)));
     for (i, ((oracle, _), &gpu)) in both.iter().zip(gpu).enumerate() {
         let distance = (f64::from(gpu) - oracle).abs();
-        assert!(
-            distance <= band,
-            "start {i}: gpu {gpu}, f64 {oracle}, band {band}"
-        );
+        assert!(distance <= band, "start {i}: gpu {gpu}, f64 {oracle}, band {band}");
     }
 }
 
@@ -63,10 +60,7 @@ fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
     let exact = rounds_like_the_host(&gpu);
     let system = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(40, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let task = ReachAvoidTask {
@@ -88,10 +82,7 @@ fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
 fn race_measures_lie_within_a_band_around_f64() {
     let Some(gpu) = gpu() else { return };
     let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let task = ReachAvoidTask {
@@ -119,10 +110,7 @@ fn wide_networks_of_every_activation() {
     ];
     for (widths, activation, count) in cases {
         let policy = random_network(&widths, activation);
-        let plant = Plant {
-            system: &system,
-            policy: &policy,
-        };
+        let plant = Plant { system: &system, policy: &policy };
         let task = ReachAvoidTask {
             starts: drawn(whole_box(&system), 23),
             range: 0..count,
@@ -166,15 +154,9 @@ fn assert_signs<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU:
     let (gpu, dense) = measures(gpu, plant, &task);
     task.query = Query::Sign;
     let (gpu, signs) = measures(gpu, plant, &task);
-    let expected: Vec<f32> = dense
-        .iter()
-        .map(|g| if *g > 0.0 { 1.0 } else { -1.0 })
-        .collect();
+    let expected: Vec<f32> = dense.iter().map(|g| if *g > 0.0 { 1.0 } else { -1.0 }).collect();
     assert_eq!(signs, expected);
     let passed = expected.iter().filter(|sign| **sign > 0.0).count();
-    assert!(
-        passed > 0 && passed < expected.len(),
-        "{passed} of {count}: one sign only"
-    );
+    assert!(passed > 0 && passed < expected.len(), "{passed} of {count}: one sign only");
     gpu
 }

@@ -15,10 +15,7 @@ use crate::{band, deviation, drawn, gpu, race_policy, ramp, whole_box};
 fn deviation_of_the_race_against_f64() {
     let Some(mut gpu) = gpu() else { return };
     let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
@@ -48,11 +45,7 @@ fn pair_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usi
 ) -> [f32; 2] {
     let (system, policy) = (plant.system, plant.policy);
     let mut folds = [Fold::new(), Fold::new()];
-    let losses = task
-        .tightening
-        .target
-        .iter()
-        .zip(&task.tightening.constraint);
+    let losses = task.tightening.target.iter().zip(&task.tightening.constraint);
     for (target, constraint) in losses {
         let margins = (system.target(a) - target, system.constraint(a) - constraint);
         folds[0].add(margins.0, margins.1, task.spec.gamma);
@@ -83,17 +76,10 @@ fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
     });
     let pairs: Vec<([f32; 2], [f64; 2])> = pairs.collect();
     for side in 0..2 {
-        let band = band(
-            pairs
-                .iter()
-                .map(|(host, oracle)| (host[side], oracle[side])),
-        );
+        let band = band(pairs.iter().map(|(host, oracle)| (host[side], oracle[side])));
         for (i, ((_, oracle), found)) in pairs.iter().zip(found).enumerate() {
             let gap = (f64::from([found.nominal, found.perturbed][side]) - oracle[side]).abs();
-            assert!(
-                gap <= band,
-                "pair {i}: {found:?}, f64 {oracle:?}, band {band}"
-            );
+            assert!(gap <= band, "pair {i}: {found:?}, f64 {oracle:?}, band {band}");
         }
     }
 }
@@ -104,10 +90,7 @@ fn distances<R: Real, S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, con
     task: &DeviationTask<'_, NX>,
     pair: u64,
 ) -> Vec<R> {
-    let [mut a, mut b] = task
-        .pairs
-        .load::<1>(pair)
-        .map(|x| x.map(|x| R::lit(x.0[0])));
+    let [mut a, mut b] = task.pairs.load::<1>(pair).map(|x| x.map(|x| R::lit(x.0[0])));
     let mut all = Vec::new();
     for _ in 0..=task.spec.horizon {
         let gaps = a.iter().zip(&b).map(|(&a, &b)| b - a);
@@ -139,17 +122,10 @@ fn assert_farthest_close_to_f64<S, P, const NX: usize, const NU: usize>(
         let largest = all.iter().map(|distances| distances[t]).fold(0.0, f64::max);
         let band = band(host.iter().zip(&all).map(|(host, all)| (host[t], all[t])));
         let gap = (f64::from(found.distance) - largest).abs();
-        assert!(
-            gap <= band,
-            "step {t}: {found:?}, f64 {largest}, band {band}"
-        );
+        assert!(gap <= band, "step {t}: {found:?}, f64 {largest}, band {band}");
         let claimed = all[(found.pair - first) as usize][t];
         let gap = (claimed - largest).abs();
-        assert!(
-            gap <= 2.0 * band,
-            "step {t}: pair {} is at {claimed}, {largest}",
-            found.pair
-        );
+        assert!(gap <= 2.0 * band, "step {t}: pair {} is at {claimed}, {largest}", found.pair);
     }
 }
 
@@ -157,10 +133,7 @@ fn assert_farthest_close_to_f64<S, P, const NX: usize, const NU: usize>(
 fn equal_distances_go_to_the_first_pair() {
     let Some(gpu) = gpu() else { return };
     let system = Reveal::<3>(0);
-    let plant = Plant {
-        system: &system,
-        policy: &Idle,
-    };
+    let plant = Plant { system: &system, policy: &Idle };
     let spec = RolloutSpec::new(40, 0.5).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = DeviationTask {
@@ -176,12 +149,6 @@ fn equal_distances_go_to_the_first_pair() {
     };
     let (_, farthest, _) = deviation::<_, _, 3, 1>(gpu, plant, &task);
     assert!(farthest[0].distance > 0.09 && farthest[0].distance < 0.1001);
-    let together = Farthest {
-        distance: 0.0,
-        pair: 77,
-    };
-    assert!(
-        farthest[1..].iter().all(|found| *found == together),
-        "{farthest:?}"
-    );
+    let together = Farthest { distance: 0.0, pair: 77 };
+    assert!(farthest[1..].iter().all(|found| *found == together), "{farthest:?}");
 }

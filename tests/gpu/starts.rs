@@ -25,18 +25,11 @@ fn revealed_starts<const NX: usize>(mut gpu: Gpu, starts: &Starts<'_, NX>, first
     };
     for coordinate in 0..NX {
         let system = Reveal::<NX>(coordinate);
-        let plant = Plant {
-            system: &system,
-            policy: &Idle,
-        };
+        let plant = Plant { system: &system, policy: &Idle };
         let (back, found) = measures::<_, _, NX, 1>(gpu, plant, &task);
         gpu = back;
         let expected = task.range.clone().map(|i| starts.start(i)[coordinate]);
-        assert_eq!(
-            bits(found),
-            bits(expected),
-            "coordinate {coordinate} of {NX}"
-        );
+        assert_eq!(bits(found), bits(expected), "coordinate {coordinate} of {NX}");
     }
     gpu
 }
@@ -50,16 +43,10 @@ fn starts_have_the_host_bits() {
     let high = [1.5, 0.75, 9.0, 0.1, 2.5];
     let region = Region::new_box(low, high).expect("a box");
     gpu = revealed_starts(gpu, &drawn(region, 0x1234_5678_9abc_def0), first);
-    let list: Vec<[f32; 5]> = (0..700)
-        .map(|i| [0.1 * i as f32, 1.0, -2.0, 3.0, 0.7])
-        .collect();
+    let list: Vec<[f32; 5]> = (0..700).map(|i| [0.1 * i as f32, 1.0, -2.0, 3.0, 0.7]).collect();
     gpu = revealed_starts(gpu, &Starts::Listed(&list), 123);
     for varies in [[true; 6], [true, false, true, true, false, true]] {
-        let ball = Ball {
-            center: [0.3, -0.2, 1.0, 0.0, 5.0, -0.7],
-            radius: 0.55,
-            varies,
-        };
+        let ball = Ball { center: [0.3, -0.2, 1.0, 0.0, 5.0, -0.7], radius: 0.55, varies };
         gpu = revealed_starts(gpu, &drawn(Region::Ball(ball), 7), first);
     }
     let interval = Region::new_box([-1.0], [2.0]).expect("an interval");
@@ -72,10 +59,7 @@ fn pairs_have_the_host_bits() {
     let spec = RolloutSpec::new(1, 0.5).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let pairs = Pairs {
-        nominal: drawn(
-            Region::new_box([-1.0; 3], [1.0, 2.0, 3.0]).expect("a box"),
-            11,
-        ),
+        nominal: drawn(Region::new_box([-1.0; 3], [1.0, 2.0, 3.0]).expect("a box"), 11),
         radius: 0.1,
         stream: Stream::new(12, Purpose::DeviationPerturbation, 0),
     };
@@ -88,16 +72,12 @@ fn pairs_have_the_host_bits() {
     };
     for coordinate in 0..3 {
         let system = Reveal::<3>(coordinate);
-        let plant = Plant {
-            system: &system,
-            policy: &Idle,
-        };
+        let plant = Plant { system: &system, policy: &Idle };
         let (back, _, found) = deviation::<_, _, 3, 1>(gpu, plant, &task);
         gpu = back;
         let expected = (5..305).map(|i| pairs.load::<1>(i).map(|x| x[coordinate].0[0]));
-        let (nominal, perturbed): (Vec<f32>, Vec<f32>) = expected
-            .map(|[nominal, perturbed]| (nominal, perturbed))
-            .unzip();
+        let (nominal, perturbed): (Vec<f32>, Vec<f32>) =
+            expected.map(|[nominal, perturbed]| (nominal, perturbed)).unzip();
         assert_eq!(bits(found.iter().map(|m| m.nominal)), bits(nominal));
         assert_eq!(bits(found.iter().map(|m| m.perturbed)), bits(perturbed));
     }

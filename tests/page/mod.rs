@@ -51,20 +51,12 @@ pub(crate) fn attributes(tag: &str) -> Vec<(&str, &str)> {
 pub(crate) fn assert_sound(page: &str, case: &str) {
     let mut open = Vec::new();
     for tag in tags(page) {
-        let name = tag
-            .trim_start_matches('/')
-            .split([' ', '/'])
-            .next()
-            .unwrap_or_default();
+        let name = tag.trim_start_matches('/').split([' ', '/']).next().unwrap_or_default();
         let known = TAGS.split_whitespace().any(|known| known == name);
         // The title is a tooltip inside a drawing and the page's name in its head.
         assert!(known, "{case}: unknown tag <{tag}>");
         if tag.starts_with('/') {
-            assert_eq!(
-                open.pop(),
-                Some(name),
-                "{case}: </{name}> closes another tag"
-            );
+            assert_eq!(open.pop(), Some(name), "{case}: </{name}> closes another tag");
         } else if !tag.ends_with('/') && !VOID.contains(&name) {
             open.push(name);
         }
@@ -88,9 +80,7 @@ fn assert_drawable(value: &str, place: &str) {
     let separated = value.replace('-', " -");
     for number in separated.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')) {
         if !number.is_empty() {
-            let number: f64 = number
-                .parse()
-                .unwrap_or_else(|_| panic!("{number:?} in {place}"));
+            let number: f64 = number.parse().unwrap_or_else(|_| panic!("{number:?} in {place}"));
             assert!(number.abs() <= 1e4, "{number} in {place}");
         }
     }
@@ -112,18 +102,14 @@ pub(crate) fn cells(page: &str, name: &str) -> Vec<Vec<String>> {
     rows.map(|rest| {
         let (row, _) = rest.split_once("</tr>").unwrap();
         let cells = row.split("<td>").skip(1);
-        cells
-            .map(|cell| cell.trim_end_matches("</td>").to_owned())
-            .collect()
+        cells.map(|cell| cell.trim_end_matches("</td>").to_owned()).collect()
     })
     .collect()
 }
 
 /// The part of a page that is one figure.
 pub(crate) fn figure<'a>(page: &'a str, id: &str) -> &'a str {
-    let (_, rest) = page
-        .split_once(&format!("<figure class=\"card\" id=\"{id}\">"))
-        .unwrap();
+    let (_, rest) = page.split_once(&format!("<figure class=\"card\" id=\"{id}\">")).unwrap();
     rest.split_once("</figure>").unwrap().0
 }
 

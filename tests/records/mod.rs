@@ -70,11 +70,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             let normal = (0..6).map(|_| random.random::<f64>() - 0.5).sum::<f64>();
             if varies { normal } else { 0.0 }
         });
-        let norm = direction
-            .iter()
-            .map(|value| value * value)
-            .sum::<f64>()
-            .sqrt();
+        let norm = direction.iter().map(|value| value * value).sum::<f64>().sqrt();
         let length = reach * random.random::<f64>().powf(1.0 / NX as f64) / norm;
         std::array::from_fn(|state| center[state] + length * direction[state])
     }
@@ -122,9 +118,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             success: true,
         });
         let dimension = self.varies.iter().filter(|&&varies| varies).count();
-        let distance = (0..NX)
-            .map(|i| (self.center[i] - self.state[i]).powi(2))
-            .sum::<f64>();
+        let distance = (0..NX).map(|i| (self.center[i] - self.state[i]).powi(2)).sum::<f64>();
         let round = |radius, failures, nearest_failure| RoundRecord {
             radius,
             scenarios: 159,
@@ -151,11 +145,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             global: global(NX),
             state: StateRecord {
                 x: short(&self.state),
-                tier: if self.measure(self.state, &bound) > 0.0 {
-                    1
-                } else {
-                    2
-                },
+                tier: if self.measure(self.state, &bound) > 0.0 { 1 } else { 2 },
                 check_margin: self.measure(self.state, &bound),
                 target_margin: self.system.target(self.state),
                 constraint_margin: self.system.constraint(self.state),
@@ -185,14 +175,8 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             },
             ledger: ledger(),
             beta_total: 4e-3,
-            picture: PictureRecord {
-                rollouts: rollouts.collect(),
-            },
-            timing: Timing {
-                wall_seconds: 1.2346,
-                threads: 2,
-                rollouts: 123_456,
-            },
+            picture: PictureRecord { rollouts: rollouts.collect() },
+            timing: Timing { wall_seconds: 1.2346, threads: 2, rollouts: 123_456 },
         }
     }
 }
@@ -257,10 +241,7 @@ fn constants([target, constraint]: [f64; 2]) -> ConstantsRecord {
         computed: used,
         sampled: 0.998 * used,
     };
-    ConstantsRecord {
-        target: constant(target),
-        constraint: constant(constraint),
-    }
+    ConstantsRecord { target: constant(target), constraint: constant(constraint) }
 }
 
 fn deviation(bound: &[f64], radius: f64, dimension: usize) -> DeviationRecord {
@@ -324,11 +305,7 @@ fn ledger() -> Vec<Spending> {
         ("global", "share of the box", 1e-3),
         ("growth", "5 rounds at 2e-4", 1e-3),
     ]
-    .map(|(claim, item, beta)| Spending {
-        claim: claim.to_owned(),
-        item: item.to_owned(),
-        beta,
-    })
+    .map(|(claim, item, beta)| Spending { claim: claim.to_owned(), item: item.to_owned(), beta })
     .to_vec()
 }
 
@@ -345,9 +322,7 @@ pub(crate) fn race() -> Record {
             (-1.6 * x[4] - 2.4 * x[5]).clamp(-1.0, 1.0),
         ]
     };
-    let state = [
-        0.45, 0.0, -2.2, 0.7, 0.05, 0.0, -0.35, 0.0, -1.9, 0.35, 0.0, 0.0,
-    ];
+    let state = [0.45, 0.0, -2.2, 0.7, 0.05, 0.0, -0.35, 0.0, -1.9, 0.35, 0.0, 0.0];
     let mut center = state;
     (center[0], center[2], center[3]) = (0.31, -1.93, 0.74);
     Study {
@@ -388,10 +363,6 @@ pub(crate) fn double_integrator() -> Record {
     for (index, sample) in record.growth.samples.iter_mut().enumerate() {
         sample.success = index % 9 != 0;
     }
-    record
-        .growth
-        .rounds
-        .iter_mut()
-        .for_each(|round| round.failures += 2);
+    record.growth.rounds.iter_mut().for_each(|round| round.failures += 2);
     record
 }

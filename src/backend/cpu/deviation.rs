@@ -36,9 +36,7 @@ where
     type Output = Vec<Farthest>;
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Vec<Farthest> {
-        let Self {
-            plant, task, width, ..
-        } = self;
+        let Self { plant, task, width, .. } = self;
         let mut driver = Driver::<S, P, K, N, NU>::new(plant, self.network, kernel, width);
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut pairs = Pairs::<N, NX>::new(width);
@@ -145,13 +143,7 @@ impl<const N: usize, const NX: usize> Pairs<N, NX> {
             driver.judge(y, perturbed, &Loss::NONE, gamma);
             let live = N.min(self.count - group * N);
             let first = self.first + (group * N) as u64;
-            driver.kernel().call(Gap {
-                x,
-                y,
-                live,
-                first,
-                farthest,
-            });
+            driver.kernel().call(Gap { x, y, live, first, farthest });
         }
     }
 }
@@ -192,10 +184,8 @@ impl<const N: usize, const NX: usize> Body for Gap<'_, N, NX> {
         let distance = f32::from_bits(bits.iter().fold(0, |largest, bits| *bits.max(&largest)));
         if distance > self.farthest.distance || self.farthest.pair > self.first {
             let lane = distances.iter().take_while(|d| **d != distance).count();
-            *self.farthest = self.farthest.merge(Farthest {
-                distance,
-                pair: self.first + lane as u64,
-            });
+            *self.farthest =
+                self.farthest.merge(Farthest { distance, pair: self.first + lane as u64 });
         }
     }
 }

@@ -62,12 +62,7 @@ struct Group<const N: usize> {
 
 impl<const N: usize> Group<N> {
     fn new() -> Self {
-        Self {
-            score: Score::new(),
-            step: [0; N],
-            place: [0; N],
-            done: [0; N],
-        }
+        Self { score: Score::new(), step: [0; N], place: [0; N], done: [0; N] }
     }
 
     /// Counts a step.
@@ -207,10 +202,8 @@ impl<'a, const N: usize, const NX: usize> Queue<'a, N, NX> {
             self.group.place = per_lane!(N, i => (self.loaded + i) as u32);
             self.group.judge(driver, &self.x, self.task);
             self.loaded += live;
-            let (x, group) = (
-                std::slice::from_mut(&mut self.x),
-                std::slice::from_mut(&mut self.group),
-            );
+            let (x, group) =
+                (std::slice::from_mut(&mut self.x), std::slice::from_mut(&mut self.group));
             self.waiting = retire(x, group, live, out);
         }
         true

@@ -80,11 +80,7 @@ fn portable<const R: usize>(panel: Panel<'_>, inputs: &[f32], outputs: &mut [f32
     for (weights, x) in columns.iter().zip(inputs.as_chunks::<GRANULE>().0) {
         for (sums, &weight) in sums.iter_mut().zip(weights) {
             for (sum, &x) in sums.iter_mut().zip(x) {
-                *sum = if FUSED {
-                    weight.mul_add(x, *sum)
-                } else {
-                    *sum + weight * x
-                };
+                *sum = if FUSED { weight.mul_add(x, *sum) } else { *sum + weight * x };
             }
         }
     }

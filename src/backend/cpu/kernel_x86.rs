@@ -97,10 +97,7 @@ macro_rules! x86_kernel {
     };
 }
 
-#[allow(
-    unsafe_code,
-    reason = "vector instructions behind a proof of their presence"
-)]
+#[allow(unsafe_code, reason = "vector instructions behind a proof of their presence")]
 mod kernels {
     use super::*;
 

@@ -67,9 +67,7 @@ impl Packed {
         };
         let layers = network.layers().iter().enumerate();
         Self {
-            layers: layers
-                .map(|(i, layer)| PackedLayer::new(layer, rows, squash(i)))
-                .collect(),
+            layers: layers.map(|(i, layer)| PackedLayer::new(layer, rows, squash(i))).collect(),
             widest: network.widths().into_iter().max().unwrap_or(0),
         }
     }
@@ -88,12 +86,7 @@ impl PackedLayer {
                 weights.extend(panel[column..].iter().step_by(layer.inputs));
             }
         }
-        Self {
-            weights,
-            bias: layer.bias.clone(),
-            inputs: layer.inputs,
-            squash,
-        }
+        Self { weights, bias: layer.bias.clone(), inputs: layer.inputs, squash }
     }
 
     /// The layer for `lanes` trajectories; `inputs` and `outputs` are `[blocks, features, BLOCK]`.
@@ -111,11 +104,7 @@ impl PackedLayer {
         let (block_in, block_out) = (self.inputs * K::BLOCK, self.bias.len() * K::BLOCK);
         let panels = self.weights.chunks(K::ROWS * self.inputs);
         for (p, (weights, bias)) in panels.zip(self.bias.chunks(K::ROWS)).enumerate() {
-            let panel = Panel {
-                weights,
-                bias,
-                floor,
-            };
+            let panel = Panel { weights, bias, floor };
             for block in 0..lanes.div_ceil(K::BLOCK) {
                 let x = &inputs[block * block_in..][..block_in];
                 let first = block * block_out + p * K::ROWS * K::BLOCK;
@@ -133,10 +122,7 @@ impl PackedLayer {
 impl Squash {
     /// Whether nothing is left to do once the kernel has bounded the sums.
     fn done_by_kernel(self) -> bool {
-        matches!(
-            self,
-            Self::Hidden(Activation::Relu) | Self::Output(OutputActivation::Identity)
-        )
+        matches!(self, Self::Hidden(Activation::Relu) | Self::Output(OutputActivation::Identity))
     }
 
     #[inline(always)]
@@ -182,12 +168,7 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
     /// Room for tiles of up to `lanes` trajectories.
     pub(super) fn new(network: &'a Packed, kernel: K, lanes: usize) -> Self {
         let size = lanes.next_multiple_of(K::BLOCK) * network.widest();
-        Self {
-            network,
-            kernel,
-            inputs: vec![0.0; size],
-            outputs: vec![0.0; size],
-        }
+        Self { network, kernel, inputs: vec![0.0; size], outputs: vec![0.0; size] }
     }
 
     /// The outputs for the first `lanes` trajectories of the groups `x`.

@@ -62,11 +62,7 @@ impl Cpu {
             .thread_name(|i| format!("rollout-{i}"))
             .build()
             .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
-        Ok(Self {
-            pool,
-            instructions,
-            model: model_name(),
-        })
+        Ok(Self { pool, instructions, model: model_name() })
     }
 
     /// The processor in words: model and instruction set. Not the number of threads: nothing that a
@@ -123,12 +119,7 @@ impl Cpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        check(
-            &task.pairs.nominal,
-            task.range.end,
-            task.tightening,
-            &task.spec,
-        )?;
+        check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
         let network = self.pack::<P, NX, NU>(plant.policy)?;
         let network = network.as_ref();
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
@@ -200,10 +191,6 @@ fn check<const NX: usize>(
 /// The processor's name as the system knows it, else its architecture.
 fn model_name() -> String {
     let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let named = listed
-        .lines()
-        .find_map(|line| line.strip_prefix("model name")?.split_once(':'));
-    named.map_or(std::env::consts::ARCH.to_owned(), |(_, name)| {
-        name.trim().to_owned()
-    })
+    let named = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    named.map_or(std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }

@@ -47,10 +47,7 @@ impl Schedule {
         let tiles = count.div_ceil(most).next_multiple_of(threads).max(1);
         let width = count.div_ceil(tiles).next_multiple_of(GRANULE).max(GRANULE);
         let tiles = count.div_ceil(width);
-        Self {
-            unit: width * tiles.div_ceil(UNITS * threads).max(1),
-            width,
-        }
+        Self { unit: width * tiles.div_ceil(UNITS * threads).max(1), width }
     }
 }
 

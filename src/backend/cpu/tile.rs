@@ -79,13 +79,7 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
     ) where
         S: System<NX, NU>,
     {
-        self.kernel.call(Judge {
-            system: self.plant.system,
-            x,
-            score,
-            loss,
-            gamma,
-        });
+        self.kernel.call(Judge { system: self.plant.system, x, score, loss, gamma });
     }
 
     /// The kernel, for other bodies.
@@ -195,10 +189,7 @@ impl<const N: usize> Score<N> {
     /// Before the first state.
     #[inline(always)]
     pub(super) fn new() -> Self {
-        Self {
-            fold: Fold::new(),
-            failed: [0; N],
-        }
+        Self { fold: Fold::new(), failed: [0; N] }
     }
 
     /// Adds the margins of the next states; fails the rollouts where `largest`, the largest bits

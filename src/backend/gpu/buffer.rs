@@ -11,10 +11,7 @@ use crate::error::Result;
 /// Parameters of one dispatch; twin: `shaders/params.wgsl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-#[expect(
-    missing_docs,
-    reason = "the names are those of the shader and say what they hold"
-)]
+#[expect(missing_docs, reason = "the names are those of the shader and say what they hold")]
 pub struct Params {
     pub key_low: u32,
     pub key_high: u32,
@@ -118,12 +115,7 @@ impl Pool {
                 mapped_at_creation: false,
             }),
         };
-        Buffer {
-            inner,
-            bytes,
-            reusable: true,
-            pool: self.clone(),
-        }
+        Buffer { inner, bytes, reusable: true, pool: self.clone() }
     }
 }
 
@@ -138,20 +130,12 @@ pub(super) struct Buffer {
 impl Buffer {
     /// The part asked for, as a kernel sees it.
     pub(super) fn binding(&self) -> wgpu::BufferBinding<'_> {
-        wgpu::BufferBinding {
-            buffer: &self.inner,
-            offset: 0,
-            size: NonZeroU64::new(self.bytes),
-        }
+        wgpu::BufferBinding { buffer: &self.inner, offset: 0, size: NonZeroU64::new(self.bytes) }
     }
 
     /// Its first block of parameters, moved by a dynamic offset.
     pub(super) fn first_block(&self) -> wgpu::BufferBinding<'_> {
-        wgpu::BufferBinding {
-            buffer: &self.inner,
-            offset: 0,
-            size: Some(Params::SIZE),
-        }
+        wgpu::BufferBinding { buffer: &self.inner, offset: 0, size: Some(Params::SIZE) }
     }
 
     /// Writes `data` at the start, before the next submission.
@@ -178,12 +162,10 @@ impl Buffer {
         encoder.copy_buffer_to_buffer(&self.inner, 0, &staging.inner, 0, bytes);
         device.queue.submit([encoder.finish()]);
         let (send, mapped) = mpsc::channel();
-        staging
-            .inner
-            .map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
-                // The receiver is gone only if the wait failed, which is reported by itself.
-                let _ = send.send(result);
-            });
+        staging.inner.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+            // The receiver is gone only if the wait failed, which is reported by itself.
+            let _ = send.send(result);
+        });
         device.wait(None)?;
         let failed = |text: String| device.failed(&format!("cannot read results: {text}"));
         match mapped.recv() {
@@ -192,9 +174,8 @@ impl Buffer {
             Err(e) => return Err(failed(e.to_string())),
         }
         let view = staging.inner.get_mapped_range(0..bytes);
-        let numbers = view
-            .map(|view| bytemuck::pod_collect_to_vec(&view))
-            .map_err(|e| failed(e.to_string()));
+        let numbers =
+            view.map(|view| bytemuck::pod_collect_to_vec(&view)).map_err(|e| failed(e.to_string()));
         staging.inner.unmap();
         staging.reusable = true;
         numbers
@@ -203,11 +184,7 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        let mut free = self
-            .pool
-            .free
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut free = self.pool.free.lock().unwrap_or_else(PoisonError::into_inner);
         let kept: u64 = free.iter().map(wgpu::Buffer::size).sum();
         if self.reusable && kept + self.inner.size() <= KEPT_BYTES {
             free.push(self.inner.clone());

@@ -110,11 +110,7 @@ pub struct Shape {
 impl Shape {
     /// The shape for a system of that many states and controls, driven by a network or a formula.
     pub fn new(states: usize, controls: usize, network: Option<&Mlp>) -> Self {
-        Self {
-            states,
-            controls,
-            network: network.map(|mlp| (mlp.activation(), mlp.output())),
-        }
+        Self { states, controls, network: network.map(|mlp| (mlp.activation(), mlp.output())) }
     }
 }
 
@@ -224,9 +220,7 @@ pub fn compose(kernel: Kernel, shape: &Shape, physics: &str) -> String {
             vec![recorded_activation(kernel, shape), MLP.to_owned()]
         }
     };
-    [vec![constants, PARAMS.to_owned()], parts]
-        .concat()
-        .join("\n")
+    [vec![constants, PARAMS.to_owned()], parts].concat().join("\n")
 }
 
 /// Sizes and sentinels that the kernels share with Rust.
@@ -263,11 +257,7 @@ fn state_glue(shape: &Shape) -> String {
     text += &format!("    let stride = {stride};\n");
     for quad in 0..quads {
         let entry = |i: usize| {
-            if i < shape.states {
-                format!("x[{i}]")
-            } else {
-                "0.0".to_owned()
-            }
+            if i < shape.states { format!("x[{i}]") } else { "0.0".to_owned() }
         };
         let entries: Vec<String> = (4 * quad..4 * quad + 4).map(entry).collect();
         let entries = entries.join(", ");
@@ -275,9 +265,7 @@ fn state_glue(shape: &Shape) -> String {
     }
     text += "}\n";
 
-    let tests: Vec<String> = (0..shape.states)
-        .map(|i| format!("finite(x[{i}])"))
-        .collect();
+    let tests: Vec<String> = (0..shape.states).map(|i| format!("finite(x[{i}])")).collect();
     text += "fn state_finite(x: State) -> bool {\n";
     text += &format!("    return {};\n}}\n", tests.join(" && "));
     text
@@ -291,18 +279,10 @@ fn component(i: usize) -> String {
 /// Calls of the recorded functions, whose single states and controls are plain numbers.
 fn plant_glue(shape: &Shape) -> String {
     let argument = |name: &str, length: usize| {
-        if length == 1 {
-            format!("{name}[0]")
-        } else {
-            name.to_owned()
-        }
+        if length == 1 { format!("{name}[0]") } else { name.to_owned() }
     };
     let result = |kind: &str, length: usize, call: String| {
-        if length == 1 {
-            format!("{kind}({call})")
-        } else {
-            call
-        }
+        if length == 1 { format!("{kind}({call})") } else { call }
     };
     let x = argument("x", shape.states);
     let u = argument("u", shape.controls);
@@ -349,13 +329,10 @@ fn recorded_normals() -> String {
 fn recorded_distance(states: usize) -> String {
     let graph = record(2 * states, |both| {
         let (nominal, perturbed) = both.split_at(states);
-        let square = nominal
-            .iter()
-            .zip(perturbed)
-            .fold(Expr::lit(0.0), |sum, (&a, &b)| {
-                let gap = b - a;
-                sum + gap * gap
-            });
+        let square = nominal.iter().zip(perturbed).fold(Expr::lit(0.0), |sum, (&a, &b)| {
+            let gap = b - a;
+            sum + gap * gap
+        });
         vec![square.sqrt()]
     });
     let recorded = function("distance_of", &[("a", states), ("b", states)], &graph);

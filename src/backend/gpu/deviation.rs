@@ -165,10 +165,7 @@ impl Chunks<'_> {
     /// Adds the dispatches of `count` steps, and the reduction of their distances.
     fn segment<'a>(&'a self, batch: &mut Batch<'a>, params: Params, first: u32, count: u32) {
         let plan = self.job.plan;
-        let params = Params {
-            segment_start: first,
-            ..params
-        };
+        let params = Params { segment_start: first, ..params };
         let mut step = first;
         while step < first + count {
             let steps = plan.steps.min(first + count - step);
@@ -176,18 +173,10 @@ impl Chunks<'_> {
                 && step < params.horizon
             {
                 // Perturbed states stand `stride` columns after the nominal ones.
-                let columns = if params.closed_loop == 0 {
-                    params.columns
-                } else {
-                    plan.row
-                };
+                let columns = if params.closed_loop == 0 { params.columns } else { plan.row };
                 network.forward(batch, &self.kernels.layers, columns, plan.row);
             }
-            batch.push_columns(
-                Kernel::Deviation,
-                &self.kernels.rollout,
-                &params.over(step, steps),
-            );
+            batch.push_columns(Kernel::Deviation, &self.kernels.rollout, &params.over(step, steps));
             step += steps;
         }
         batch.push(&self.kernels.reduce, &params.over(first, count), [count, 1]);

@@ -78,11 +78,7 @@ impl Adapter {
 impl fmt::Display for Adapter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ({}, {}", self.name, self.api, self.kind)?;
-        if self.driver.is_empty() {
-            f.write_str(")")
-        } else {
-            write!(f, ", {})", self.driver)
-        }
+        if self.driver.is_empty() { f.write_str(")") } else { write!(f, ", {})", self.driver) }
     }
 }
 
@@ -140,12 +136,7 @@ impl Device {
                 note(&seen, format!("device lost: {text}"));
             }
         });
-        Ok(Self {
-            adapter,
-            device,
-            queue,
-            faults,
-        })
+        Ok(Self { adapter, device, queue, faults })
     }
 
     /// The first failure since the last call, if any.
@@ -153,11 +144,7 @@ impl Device {
     /// # Errors
     /// [`Error::DeviceFailed`] with its text.
     pub(super) fn check(&self) -> Result<()> {
-        let fault = self
-            .faults
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let fault = self.faults.lock().unwrap_or_else(PoisonError::into_inner).take();
         fault.map_or(Ok(()), |text| Err(self.failed(&text)))
     }
 
@@ -166,10 +153,8 @@ impl Device {
     /// # Errors
     /// [`Error::DeviceFailed`], also for failures of earlier work.
     pub(super) fn wait(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<()> {
-        let polled = self.device.poll(wgpu::PollType::Wait {
-            submission_index: submission,
-            timeout: None,
-        });
+        let polled =
+            self.device.poll(wgpu::PollType::Wait { submission_index: submission, timeout: None });
         self.check()?;
         polled.map(drop).map_err(|e| self.failed(&e.to_string()))
     }
@@ -182,10 +167,7 @@ impl Device {
 
 /// Keeps the first failure: later ones follow from it.
 fn note(faults: &Mutex<Option<String>>, text: String) {
-    faults
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .get_or_insert(text);
+    faults.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
 }
 
 /// Adapters that can run compute kernels, best first.

@@ -30,10 +30,7 @@ pub(super) struct Pipelines {
 impl Pipelines {
     /// Pipelines whose texts go through `edit` first.
     pub(super) fn edited(edit: Edit) -> Self {
-        Self {
-            edit: Some(edit),
-            built: Mutex::default(),
-        }
+        Self { edit: Some(edit), built: Mutex::default() }
     }
 
     /// The pipeline of `kernel`, from the cache or built now.
@@ -74,19 +71,14 @@ impl Pipelines {
         if self.edit.is_some() {
             return device.device.create_shader_module(descriptor);
         }
-        #[allow(
-            unsafe_code,
-            reason = "unchecked modules compile two to five times faster"
-        )]
+        #[allow(unsafe_code, reason = "unchecked modules compile two to five times faster")]
         // SAFETY: columns are tested against `columns` or padded to the stride, steps are bounded
         // by the schedule's length, and `plan` sizes every buffer for that stride and length; the
         // recorded physics has neither loops nor indices that are not constant, and every loop of
         // the hand-written kernels ends.
         unsafe {
             let checks = wgpu::ShaderRuntimeChecks::unchecked();
-            device
-                .device
-                .create_shader_module_trusted(descriptor, checks)
+            device.device.create_shader_module_trusted(descriptor, checks)
         }
     }
 }
@@ -122,12 +114,7 @@ impl Pipeline {
             },
             cache: None,
         });
-        Self {
-            kernel,
-            layout,
-            bindings,
-            pipeline,
-        }
+        Self { kernel, layout, bindings, pipeline }
     }
 
     /// Binds the buffer that `buffer` names for each slot.
@@ -146,10 +133,7 @@ impl Pipeline {
             layout: &self.layout,
             entries: &entries,
         });
-        Bound {
-            pipeline: Arc::clone(self),
-            group,
-        }
+        Bound { pipeline: Arc::clone(self), group }
     }
 }
 

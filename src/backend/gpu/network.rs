@@ -62,21 +62,13 @@ impl Network {
         let mut packed = Vec::with_capacity(parameter_quads(mlp));
         let mut layers = Vec::new();
         for layer in mlp.layers() {
-            let shape = [
-                packed.len(),
-                input_quads(layer.inputs),
-                output_quads(layer.outputs),
-            ];
+            let shape = [packed.len(), input_quads(layer.inputs), output_quads(layer.outputs)];
             layers.push(shape.map(|number| number as u32));
             pack(layer, &mut packed);
         }
         let weights = job.storage(16 * packed.len() as u64);
         weights.write(job.device, &packed);
-        let widest = layers
-            .iter()
-            .map(|[.., outputs]| *outputs)
-            .max()
-            .unwrap_or(0);
+        let widest = layers.iter().map(|[.., outputs]| *outputs).max().unwrap_or(0);
         let bytes = 16 * u64::from(widest) * u64::from(row);
         Self {
             weights,
@@ -94,16 +86,8 @@ impl Network {
     pub(super) fn bind(&self, job: &Job<'_>, state: &Buffer) -> Result<Vec<Bound>> {
         let bind = |i: usize| {
             let last = i + 1 == self.layers.len();
-            let kernel = if last {
-                Kernel::OutputLayer
-            } else {
-                Kernel::HiddenLayer
-            };
-            let source = if i == 0 {
-                state
-            } else {
-                &self.activations[(i + 1) % 2]
-            };
+            let kernel = if last { Kernel::OutputLayer } else { Kernel::HiddenLayer };
+            let source = if i == 0 { state } else { &self.activations[(i + 1) % 2] };
             job.bind(kernel, |slot| match slot {
                 Slot::Weights => &self.weights,
                 Slot::Source => source,
@@ -153,16 +137,8 @@ mod tests {
         assert_eq!(packed.len(), layer_quads(&layer));
         assert_eq!(packed[0], [10.0, 20.0, 30.0, 0.0]);
         assert_eq!(packed[1], [0.0; 4], "bias of the padded tile");
-        assert_eq!(
-            packed[2 + 1],
-            [1.0, 6.0, 11.0, 0.0],
-            "column 1 of the weights"
-        );
-        assert_eq!(
-            packed[2 + 8],
-            [4.0, 9.0, 14.0, 0.0],
-            "column 4 of the weights"
-        );
+        assert_eq!(packed[2 + 1], [1.0, 6.0, 11.0, 0.0], "column 1 of the weights");
+        assert_eq!(packed[2 + 8], [4.0, 9.0, 14.0, 0.0], "column 4 of the weights");
         assert_eq!(packed[2 + 9], [0.0; 4], "padded input");
     }
 }

@@ -71,11 +71,7 @@ impl Plan {
     ) -> Result<Self> {
         let sides = if work == Work::Pairs { 2 } else { 1 };
         let segment = work.segment(network.is_some());
-        let cap = if network.is_some() {
-            NETWORK_COLUMNS
-        } else {
-            FORMULA_COLUMNS
-        };
+        let cap = if network.is_some() { NETWORK_COLUMNS } else { FORMULA_COLUMNS };
         let parts = column_bytes(work, states, network, segment);
         let largest = parts.iter().copied().max().unwrap_or(1);
         let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
@@ -84,12 +80,7 @@ impl Plan {
         let stride = wanted.min(fitting / COLUMN_UNIT * COLUMN_UNIT);
         let parameters = 16 * network.map_or(0, parameter_quads) as u64;
         if stride == 0 || parameters > binding {
-            return Err(too_large(
-                adapter,
-                largest * COLUMN_UNIT,
-                parameters,
-                binding,
-            ));
+            return Err(too_large(adapter, largest * COLUMN_UNIT, parameters, binding));
         }
         let steps = if network.is_some() { 1 } else { segment };
         let trips = longest_trips(states, network, stride, u64::from(steps));
@@ -99,12 +90,7 @@ impl Plan {
                  at {MAX_TRIPS} without notice; use the native CPU backend for this size"
             )));
         }
-        Ok(Self {
-            stride: stride as u32,
-            row: stride as u32 * sides,
-            segment,
-            steps,
-        })
+        Ok(Self { stride: stride as u32, row: stride as u32 * sides, segment, steps })
     }
 }
 
@@ -138,10 +124,7 @@ fn longest_trips(states: usize, network: Option<&Mlp>, stride: u64, steps: u64) 
     let layer = layers.map(|layer| input_quads(layer.inputs) as u64).max();
     let reduce = stride.div_ceil(u64::from(WORKGROUP)) + 8;
     let compact = states.div_ceil(4);
-    [sample, layer.unwrap_or(0), reduce, compact, steps]
-        .into_iter()
-        .max()
-        .unwrap_or(0)
+    [sample, layer.unwrap_or(0), reduce, compact, steps].into_iter().max().unwrap_or(0)
 }
 
 fn too_large(adapter: &Adapter, columns: u64, parameters: u64, binding: u64) -> Error {
@@ -184,11 +167,7 @@ mod tests {
     #[test]
     fn chunks_are_whole_tiles_within_the_limits() {
         let wide = network(&[12, 512, 512, 3]);
-        for (binding, count) in [
-            (1 << 27, 1),
-            (1 << 27, u64::MAX / 2),
-            (1 << 20, 100_000_000),
-        ] {
+        for (binding, count) in [(1 << 27, 1), (1 << 27, u64::MAX / 2), (1 << 20, 100_000_000)] {
             for network in [None, Some(&wide)] {
                 for work in [Work::Measure, Work::Sign, Work::Pairs] {
                     // Parameters of the wide network take a megabyte of their own.

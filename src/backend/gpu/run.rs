@@ -79,9 +79,7 @@ impl<'a> Job<'a> {
         buffer: impl Fn(Slot) -> &'b Buffer,
     ) -> Result<Bound> {
         let (device, shape) = (self.device, &self.shape);
-        let pipeline = self
-            .pipelines
-            .pipeline(device, kernel, shape, &self.physics)?;
+        let pipeline = self.pipelines.pipeline(device, kernel, shape, &self.physics)?;
         Ok(pipeline.bind(device, |slot| match slot {
             Slot::Params => self.uniform.first_block(),
             _ => buffer(slot).binding(),
@@ -91,10 +89,7 @@ impl<'a> Job<'a> {
     /// Starts `batch`, after clearing `cleared`; at most two submissions are under way at a time.
     pub(super) fn submit(&self, batch: &Batch<'_>, cleared: Option<&Buffer>) -> Result<()> {
         self.uniform.write(self.device, &batch.blocks);
-        let mut encoder = self
-            .device
-            .device
-            .create_command_encoder(&Default::default());
+        let mut encoder = self.device.device.create_command_encoder(&Default::default());
         if let Some(buffer) = cleared {
             buffer.clear(&mut encoder);
         }
@@ -145,8 +140,7 @@ impl<'a> Batch<'a> {
     pub(super) fn push(&mut self, bound: &'a Bound, params: &Params, groups: [u32; 2]) {
         self.calls.push((bound, self.blocks.len() as u32, groups));
         self.blocks.extend_from_slice(bytemuck::bytes_of(params));
-        self.blocks
-            .resize(self.blocks.len().next_multiple_of(Params::PITCH), 0);
+        self.blocks.resize(self.blocks.len().next_multiple_of(Params::PITCH), 0);
     }
 
     /// Adds a dispatch with a thread per column.
@@ -158,11 +152,8 @@ impl<'a> Batch<'a> {
 
 /// Parameters of the starts; the rest is 0.
 pub(super) fn start_params<const NX: usize>(starts: &Starts<'_, NX>, spec: &RolloutSpec) -> Params {
-    let mut params = Params {
-        horizon: spec.horizon,
-        region_kind: REGION_LISTED,
-        ..Params::default()
-    };
+    let mut params =
+        Params { horizon: spec.horizon, region_kind: REGION_LISTED, ..Params::default() };
     if let Starts::Drawn { region, stream } = starts {
         [params.key_low, params.key_high] = stream.key();
         params.stream = stream.id();

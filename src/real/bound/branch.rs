@@ -8,14 +8,9 @@ use super::pieces::{Caveats, Enclosure, Piece};
 /// The pieces of `a` that may have values in `window`, cut to it; `None` if there is none.
 fn within(a: &Enclosure, window: Interval) -> Option<Rc<Enclosure>> {
     let cut = |piece: &Piece| {
-        let value = Interval::new(
-            piece.value.low.max(window.low),
-            piece.value.high.min(window.high),
-        );
-        (value.low <= value.high).then(|| Piece {
-            value,
-            gradient: piece.gradient.clone(),
-        })
+        let value =
+            Interval::new(piece.value.low.max(window.low), piece.value.high.min(window.high));
+        (value.low <= value.high).then(|| Piece { value, gradient: piece.gradient.clone() })
     };
     let pieces: Vec<Piece> = a.pieces.iter().filter_map(cut).collect();
     let caveats = a.caveats;
@@ -114,11 +109,7 @@ pub(super) fn if_lt(
     if !(a.fixed() && b.fixed()) {
         let (yes, no) = (yes.value(), no.value());
         let jump = yes.high < no.low || no.high < yes.low;
-        let caveats = Caveats {
-            hulled: false,
-            assumed_continuous: !jump,
-            unbounded: jump,
-        };
+        let caveats = Caveats { hulled: false, assumed_continuous: !jump, unbounded: jump };
         either.caveats = either.caveats.or(caveats).or(a.caveats).or(b.caveats);
     }
     Rc::new(either)

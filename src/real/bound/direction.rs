@@ -85,13 +85,7 @@ mod tests {
             let side = |v: f64| Interval::new(v - 0.1, v + 0.1);
             let points = directions([side(x), side(y)]);
             assert!((3..=6).contains(&points.len()), "{}", points.len());
-            for (dx, dy) in [
-                (-0.1, -0.1),
-                (-0.1, 0.1),
-                (0.1, -0.1),
-                (0.1, 0.1),
-                (0.0, 0.0),
-            ] {
+            for (dx, dy) in [(-0.1, -0.1), (-0.1, 0.1), (0.1, -0.1), (0.1, 0.1), (0.0, 0.0)] {
                 let inside = f64::atan2(y + dy, x + dx);
                 assert!(support(&points, inside) >= 1.0 - 1e-15);
             }

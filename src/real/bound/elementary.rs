@@ -33,16 +33,8 @@ fn wave(x: Interval, crest: f64, function: fn(f64) -> f64) -> Interval {
     }
     let ends =
         rising(Interval::point(x.low), function).hull(rising(Interval::point(x.high), function));
-    let low = if passes(x, crest + 0.5) {
-        -1.0
-    } else {
-        ends.low.max(-1.0)
-    };
-    let high = if passes(x, crest) {
-        1.0
-    } else {
-        ends.high.min(1.0)
-    };
+    let low = if passes(x, crest + 0.5) { -1.0 } else { ends.low.max(-1.0) };
+    let high = if passes(x, crest) { 1.0 } else { ends.high.min(1.0) };
     Interval::new(low, high)
 }
 

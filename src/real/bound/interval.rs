@@ -94,11 +94,7 @@ impl Interval {
     /// The square root of each number; the interval must not reach below zero.
     pub fn sqrt(self) -> Self {
         let low = self.low.sqrt().next_down().max(0.0);
-        let high = if self.high == 0.0 {
-            0.0
-        } else {
-            self.high.sqrt().next_up()
-        };
+        let high = if self.high == 0.0 { 0.0 } else { self.high.sqrt().next_up() };
         Self::new(low, high)
     }
 
@@ -124,10 +120,7 @@ impl Interval {
 impl Add for Interval {
     type Output = Self;
     fn add(self, rhs: Self) -> Self {
-        Self::new(
-            sum_down(self.low, rhs.low),
-            -sum_down(-self.high, -rhs.high),
-        )
+        Self::new(sum_down(self.low, rhs.low), -sum_down(-self.high, -rhs.high))
     }
 }
 
@@ -155,21 +148,14 @@ impl Mul for Interval {
             product(self.high, rhs.high),
         ];
         let low = ends.iter().map(|end| end.0).fold(f64::INFINITY, f64::min);
-        let high = ends
-            .iter()
-            .map(|end| end.1)
-            .fold(f64::NEG_INFINITY, f64::max);
+        let high = ends.iter().map(|end| end.1).fold(f64::NEG_INFINITY, f64::max);
         Self::new(low, high)
     }
 }
 
 /// An upper bound of the Euclidean norm of every vector in the box `sides`.
 pub(super) fn norm(sides: &[Interval]) -> f64 {
-    sides
-        .iter()
-        .fold(Interval::ZERO, |sum, side| sum + side.square())
-        .sqrt()
-        .high
+    sides.iter().fold(Interval::ZERO, |sum, side| sum + side.square()).sqrt().high
 }
 
 #[cfg(test)]

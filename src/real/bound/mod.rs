@@ -79,10 +79,7 @@ pub fn enclose(domain: Domain<'_>, formula: impl FnOnce(&[Bound]) -> Vec<Bound>)
         "a lower end is not above its upper end"
     );
     let dimensions = varies.iter().filter(|&&varies| varies).count();
-    let outer = ARENA.replace(Arena {
-        dimensions,
-        expressions: Vec::new(),
-    });
+    let outer = ARENA.replace(Arena { dimensions, expressions: Vec::new() });
     let mut next = 0;
     let inputs: Vec<Bound> = (0..low.len())
         .map(|i| {
@@ -144,9 +141,7 @@ impl Bound {
 impl Add for Bound {
     type Output = Self;
     fn add(self, rhs: Self) -> Self {
-        Self::new(Enclosure::combine(&self.get(), &rhs.get(), |a, b| {
-            (a + b, [Interval::ONE; 2])
-        }))
+        Self::new(Enclosure::combine(&self.get(), &rhs.get(), |a, b| (a + b, [Interval::ONE; 2])))
     }
 }
 
@@ -200,11 +195,7 @@ impl Real for Bound {
         let value = f64::from(value);
         let range = Interval::new(value.min(f64::MAX), value.max(f64::MIN));
         let number = Enclosure::smooth(range, vec![Interval::ZERO; dimensions]);
-        Self::new(if value.is_nan() {
-            number.without_bound()
-        } else {
-            number
-        })
+        Self::new(if value.is_nan() { number.without_bound() } else { number })
     }
 
     fn abs(self) -> Self {
@@ -228,12 +219,7 @@ impl Real for Bound {
     }
 
     fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self::new(branch::if_lt(
-            &self.get(),
-            &rhs.get(),
-            &yes.get(),
-            &no.get(),
-        ))
+        Self::new(branch::if_lt(&self.get(), &rhs.get(), &yes.get(), &no.get()))
     }
 
     fn min(self, rhs: Self) -> Self {

@@ -56,10 +56,7 @@ pub struct Enclosure {
 impl Enclosure {
     /// An expression of one piece.
     pub(super) fn smooth(value: Interval, gradient: Vec<Interval>) -> Self {
-        Self {
-            pieces: vec![Piece { value, gradient }],
-            caveats: Caveats::default(),
-        }
+        Self { pieces: vec![Piece { value, gradient }], caveats: Caveats::default() }
     }
 
     /// All values.
@@ -118,10 +115,7 @@ impl Enclosure {
             let gradient = piece.gradient.iter().map(|&side| slope * side).collect();
             Piece { value, gradient }
         };
-        Self {
-            pieces: self.pieces.iter().map(apply).collect(),
-            caveats: self.caveats,
-        }
+        Self { pieces: self.pieces.iter().map(apply).collect(), caveats: self.caveats }
     }
 
     /// A smooth function of two: `range` gives the values and both partial derivatives.
@@ -176,11 +170,7 @@ impl Enclosure {
 
     /// The operand, or its hull if `count` pieces would come of it and pass the limit.
     fn within(self: &Rc<Self>, count: usize) -> Rc<Self> {
-        if count <= LIMIT {
-            Rc::clone(self)
-        } else {
-            Rc::new(self.hull())
-        }
+        if count <= LIMIT { Rc::clone(self) } else { Rc::new(self.hull()) }
     }
 
     /// The operands, with hulls in place of the shorter, then of both, where `count` of their
@@ -207,13 +197,7 @@ impl Enclosure {
     /// A coordinate that the operand does not depend on stays without influence.
     pub(super) fn without_bound(&self) -> Self {
         let everything = self.hull().map(|_| (Interval::ENTIRE, Interval::ENTIRE));
-        Self {
-            caveats: Caveats {
-                unbounded: true,
-                ..self.caveats
-            },
-            ..everything
-        }
+        Self { caveats: Caveats { unbounded: true, ..self.caveats }, ..everything }
     }
 }
 
@@ -221,12 +205,7 @@ impl Piece {
     /// The piece with gradient `slopes[0] grad a + slopes[1] grad b`.
     pub(super) fn sum(value: Interval, slopes: [Interval; 2], a: &Self, b: &Self) -> Self {
         let sides = a.gradient.iter().zip(&b.gradient);
-        Self {
-            value,
-            gradient: sides
-                .map(|(&a, &b)| slopes[0] * a + slopes[1] * b)
-                .collect(),
-        }
+        Self { value, gradient: sides.map(|(&a, &b)| slopes[0] * a + slopes[1] * b).collect() }
     }
 
     /// Whether the gradient is zero.

@@ -51,20 +51,13 @@ impl Ball {
 
     /// Whether the shadow is a different circle from the section.
     fn shadowed(&self) -> bool {
-        self.section
-            .is_none_or(|section| section < 0.999 * self.radius)
+        self.section.is_none_or(|section| section < 0.999 * self.radius)
     }
 
     fn draw(&self, plot: &mut Plot, verified: bool) {
         let half = |plot: &Plot, radius: f64| {
             let lengths = plot.lengths(radius);
-            [0, 1].map(|axis| {
-                if self.extends[axis] {
-                    lengths[axis]
-                } else {
-                    0.0
-                }
-            })
+            [0, 1].map(|axis| if self.extends[axis] { lengths[axis] } else { 0.0 })
         };
         if self.shadowed() {
             let half = half(plot, self.radius);
@@ -97,25 +90,16 @@ fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
     let entry = |swatch: Swatch, name: &str| (swatch, name.to_owned());
     let mut legend = vec![
         entry(Swatch::Area("certified"), "certified cells: V_check > 0"),
-        entry(
-            Swatch::Area("target-area target"),
-            "target set in this slice",
-        ),
+        entry(Swatch::Area("target-area target"), "target set in this slice"),
         entry(Swatch::Area("hatched constraint"), "constraint violated"),
         entry(Swatch::Mark(diamond()), "state"),
     ];
     if let Some(ball) = ball {
         let mark = CENTER.to_owned();
         legend.push(if verified {
-            (
-                Swatch::Marked("ball", mark),
-                "verified ball, its cut through this plane".to_owned(),
-            )
+            (Swatch::Marked("ball", mark), "verified ball, its cut through this plane".to_owned())
         } else {
-            (
-                Swatch::Marked("ball unverified", mark),
-                "last ball tried: not verified".to_owned(),
-            )
+            (Swatch::Marked("ball unverified", mark), "last ball tried: not verified".to_owned())
         });
         if ball.shadowed() {
             legend.push(entry(Swatch::Line("shadow"), "shadow of the whole ball"));
@@ -134,12 +118,7 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
     let values = &record.slice.check_margin;
     let positive = values.iter().filter(|&&value| value > 0.0).count();
     let mut caption = format!("{positive} of {} cells are certified.", values.len());
-    let varied = record
-        .growth
-        .varies
-        .iter()
-        .filter(|&&varies| varies)
-        .count();
+    let varied = record.growth.varies.iter().filter(|&&varies| varies).count();
     match (record.growth.outcome, ball) {
         (GrowthOutcome::NoBoundary, _) => {
             caption += " No boundary of the certified set was found, so there is no ball.";
@@ -173,18 +152,12 @@ fn spans(grid: &Grid, ball: Option<&Ball>) -> [Span; 2] {
     let mut spans = grid.spans();
     for axis in 0..2 {
         let starts = record.growth.samples.iter().map(|sample| &sample.x);
-        let marks = starts
-            .chain([&record.state.x])
-            .filter_map(|x| entry(x, states[axis]));
+        let marks = starts.chain([&record.state.x]).filter_map(|x| entry(x, states[axis]));
         // Something far off must not shrink the slice to a speck.
         let (low, high) = (spans[axis].low, spans[axis].high);
         let near = |value: f64| value.clamp(2.0 * low - high, 2.0 * high - low);
         let circle = ball.map(|ball| {
-            let reach = if ball.extends[axis] {
-                1.04 * ball.radius
-            } else {
-                0.0
-            };
+            let reach = if ball.extends[axis] { 1.04 * ball.radius } else { 0.0 };
             [ball.center[axis] - reach, ball.center[axis] + reach]
         });
         let all = marks.chain(circle.into_iter().flatten()).map(near);
@@ -197,11 +170,7 @@ fn drawing(grid: &Grid, ball: Option<&Ball>) -> String {
     let record = grid.record;
     let states = slice_states(record);
     let [x, y] = spans(grid, ball);
-    let shape = if same_unit(record, states) {
-        Shape::Equal
-    } else {
-        Shape::Free(330.0)
-    };
+    let shape = if same_unit(record, states) { Shape::Equal } else { Shape::Free(330.0) };
     let mut plot = Plot::new("certified", x, y, shape);
     let [across, up] = grid.spans();
     let slice = plot.rectangle([across.low, up.low, across.high, up.high]);
@@ -221,15 +190,8 @@ fn drawing(grid: &Grid, ball: Option<&Ball>) -> String {
         plot.mark(state, &diamond());
     }
     let [x, y] = states.map(|state| words::axis(record, state));
-    let labels = Labels {
-        x: &x,
-        y: &y,
-        whole: false,
-    };
-    plot.finish(
-        &labels,
-        &format!("Map of the slice. {}", caption(record, ball)),
-    )
+    let labels = Labels { x: &x, y: &y, whole: false };
+    plot.finish(&labels, &format!("Map of the slice. {}", caption(record, ball)))
 }
 
 /// Failures last, so that none hides behind a success.

@@ -61,28 +61,13 @@ fn drawing(record: &Record) -> Result<String, String> {
     let highest = Span::of(distances.chain([0.0])).ok_or("No bound is finite.")?;
     let steps = Span {
         low: 0.0,
-        high: all
-            .iter()
-            .map(|series| series.len())
-            .max()
-            .unwrap_or(1)
-            .max(2) as f64
-            - 1.0,
+        high: all.iter().map(|series| series.len()).max().unwrap_or(1).max(2) as f64 - 1.0,
     };
-    let room = Span {
-        low: 0.0,
-        high: if highest.high > 0.0 {
-            1.06 * highest.high
-        } else {
-            1.0
-        },
-    };
+    let room = Span { low: 0.0, high: if highest.high > 0.0 { 1.06 * highest.high } else { 1.0 } };
     let mut plot = Plot::new("deviation", steps, room, Shape::Free(250.0));
     let classes = ["bound", "seen-line", "exact"];
     for (class, series) in classes.into_iter().zip(all) {
-        let points = (0..)
-            .zip(series)
-            .map(|(step, &distance)| [f64::from(step), distance]);
+        let points = (0..).zip(series).map(|(step, &distance)| [f64::from(step), distance]);
         let line = plot.line(points);
         plot.path(class, &line);
     }
@@ -93,11 +78,7 @@ fn drawing(record: &Record) -> Result<String, String> {
         }
     }
     let unit = words::norm_unit(record, |_| true);
-    let labels = Labels {
-        x: "step t",
-        y: &format!("distance Δ_t ({unit})"),
-        whole: true,
-    };
+    let labels = Labels { x: "step t", y: &format!("distance Δ_t ({unit})"), whole: true };
     Ok(plot.finish(&labels, &description(record)))
 }
 

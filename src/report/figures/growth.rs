@@ -22,10 +22,7 @@ pub(super) fn figure(record: &Record) -> Figure {
         legend = vec![
             (Swatch::Mark(dot(5.0)), "round without failure".to_owned()),
             (Swatch::Mark(cross(4.0)), "round with failures".to_owned()),
-            (
-                Swatch::Mark(NEAREST.to_owned()),
-                "nearest failure: the next radius".to_owned(),
-            ),
+            (Swatch::Mark(NEAREST.to_owned()), "nearest failure: the next radius".to_owned()),
         ];
     }
     let outcome = match growth.outcome {
@@ -47,18 +44,10 @@ pub(super) fn figure(record: &Record) -> Figure {
 
 fn drawing(record: &Record) -> String {
     let rounds = &record.growth.rounds;
-    let radii = rounds
-        .iter()
-        .flat_map(|round| [Some(round.radius), round.nearest_failure]);
+    let radii = rounds.iter().flat_map(|round| [Some(round.radius), round.nearest_failure]);
     let highest = Span::of(radii.flatten().chain([0.0])).map_or(0.0, |span| span.high);
-    let x = Span {
-        low: 0.5,
-        high: rounds.len() as f64 + 0.5,
-    };
-    let y = Span {
-        low: 0.0,
-        high: if highest > 0.0 { 1.18 * highest } else { 1.0 },
-    };
+    let x = Span { low: 0.5, high: rounds.len() as f64 + 0.5 };
+    let y = Span { low: 0.0, high: if highest > 0.0 { 1.18 * highest } else { 1.0 } };
     let mut plot = Plot::new("growth", x, y, Shape::Free(190.0));
     for (index, round) in rounds.iter().enumerate() {
         let at = index as f64 + 1.0;
@@ -67,11 +56,7 @@ fn drawing(record: &Record) -> String {
         if let Some(nearest) = round.nearest_failure.filter(|&nearest| ordinary(nearest)) {
             plot.mark([at, nearest], NEAREST);
         }
-        let mark = if round.failures == 0 {
-            dot(6.0)
-        } else {
-            cross(5.0)
-        };
+        let mark = if round.failures == 0 { dot(6.0) } else { cross(5.0) };
         // Beyond eight rounds only the failures fit above a mark.
         let label = if rounds.len() > 8 {
             count(round.failures)
@@ -91,11 +76,7 @@ fn drawing(record: &Record) -> String {
         );
     }
     let unit = words::ball_unit(record);
-    let labels = Labels {
-        x: "round",
-        y: &format!("radius tried ({unit})"),
-        whole: true,
-    };
+    let labels = Labels { x: "round", y: &format!("radius tried ({unit})"), whole: true };
     plot.finish(&labels, &description(record))
 }
 
@@ -104,8 +85,5 @@ fn description(record: &Record) -> String {
         let radius = number(round.radius);
         format!("radius {radius} with {} failures", round.failures)
     });
-    format!(
-        "Rounds of growth: {}.",
-        rounds.collect::<Vec<_>>().join(", then ")
-    )
+    format!("Rounds of growth: {}.", rounds.collect::<Vec<_>>().join(", then "))
 }

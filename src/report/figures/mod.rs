@@ -39,10 +39,7 @@ fn lines(plot: &Plot, field: &Field) -> String {
 /// Path data of the region where a field is positive.
 fn region(plot: &Plot, field: &Field) -> String {
     let polygons = field.region();
-    polygons
-        .into_iter()
-        .map(|polygon| plot.polygon(polygon))
-        .collect()
+    polygons.into_iter().map(|polygon| plot.polygon(polygon)).collect()
 }
 
 /// Entry `index` of a state, if it is a number.
@@ -58,13 +55,7 @@ fn point(state: &[f32], [x, y]: [usize; 2]) -> Option<[f64; 2]> {
 
 /// Whether two states of the system have the same unit, so that one scale fits both.
 fn same_unit(record: &Record, [x, y]: [usize; 2]) -> bool {
-    let unit = |state: usize| {
-        record
-            .system
-            .states
-            .get(state)
-            .map(|axis| axis.unit.as_str())
-    };
+    let unit = |state: usize| record.system.states.get(state).map(|axis| axis.unit.as_str());
     unit(x).is_some() && unit(x) == unit(y)
 }
 

@@ -23,11 +23,7 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
     } else {
         drawing(record, &bodies, grid.filter(|_| overlaid(record, &bodies)))
     };
-    let legend = if drawing.is_ok() {
-        legend(record, &bodies)
-    } else {
-        Vec::new()
-    };
+    let legend = if drawing.is_ok() { legend(record, &bodies) } else { Vec::new() };
     Figure {
         id: "figure-paths",
         title: "Trajectories of a few rollouts".to_owned(),
@@ -43,19 +39,13 @@ fn bodies(record: &Record) -> Vec<Body> {
         return record.system.bodies.clone();
     }
     let [x, y] = slice_states(record);
-    vec![Body {
-        name: "state".to_owned(),
-        x,
-        y,
-    }]
+    vec![Body { name: "state".to_owned(), x, y }]
 }
 
 /// Whether the slice's margins are in the plane of the first body.
 fn overlaid(record: &Record, bodies: &[Body]) -> bool {
     let states = slice_states(record);
-    bodies
-        .first()
-        .is_some_and(|body| [body.x, body.y] == states)
+    bodies.first().is_some_and(|body| [body.x, body.y] == states)
 }
 
 fn class(body: usize, success: bool) -> String {
@@ -99,10 +89,7 @@ fn legend(record: &Record, bodies: &[Body]) -> Vec<(Swatch, String)> {
         legend.push((Swatch::Marked("body first failed", end(false)), name));
     }
     if overlaid(record, bodies) {
-        let (target, violated) = (
-            "target set at the state",
-            "constraint violated at the state",
-        );
+        let (target, violated) = ("target set at the state", "constraint violated at the state");
         legend.push((Swatch::Area("target-area target"), target.to_owned()));
         legend.push((Swatch::Area("hatched constraint"), violated.to_owned()));
     }
@@ -121,10 +108,7 @@ fn caption(record: &Record, bodies: &[Body]) -> String {
     if overlaid(record, bodies) {
         caption += " Target set and constraint are drawn over the slice";
         if bodies.len() > 1 {
-            let names = bodies[1..]
-                .iter()
-                .take(NAMED)
-                .map(|body| shorten(&body.name, 40));
+            let names = bodies[1..].iter().take(NAMED).map(|body| shorten(&body.name, 40));
             let names = names.collect::<Vec<_>>().join(", ");
             caption += &format!(", with the {names} where the state has it; they move with it");
         } else if record.system.states.len() > 2 {
@@ -162,14 +146,8 @@ fn drawing(record: &Record, bodies: &[Body], grid: Option<&Grid>) -> Result<Stri
         let [across, up] = grid.spans();
         (x, y) = (x.join(across), y.join(up));
     }
-    let equal = bodies
-        .iter()
-        .all(|body| same_unit(record, [body.x, body.y]));
-    let shape = if equal {
-        Shape::Equal
-    } else {
-        Shape::Free(330.0)
-    };
+    let equal = bodies.iter().all(|body| same_unit(record, [body.x, body.y]));
+    let shape = if equal { Shape::Equal } else { Shape::Free(330.0) };
     let mut plot = Plot::new("paths", x, y, shape);
     if let Some(grid) = grid {
         target_area(&mut plot, grid);
@@ -186,10 +164,7 @@ fn drawing(record: &Record, bodies: &[Body], grid: Option<&Grid>) -> Result<Stri
         y: &label(record, bodies, |body| body.y),
         whole: false,
     };
-    Ok(plot.finish(
-        &labels,
-        &format!("Trajectories. {}", caption(record, bodies)),
-    ))
+    Ok(plot.finish(&labels, &format!("Trajectories. {}", caption(record, bodies))))
 }
 
 /// Names of the states that the bodies move along, with the unit of the first.
@@ -207,10 +182,8 @@ fn label(record: &Record, bodies: &[Body], pick: impl Fn(&Body) -> usize) -> Str
 
 fn paths(plot: &mut Plot, bodies: &[Body], rollout: &RolloutRecord) {
     for (index, body) in bodies.iter().enumerate() {
-        let points = rollout
-            .states
-            .iter()
-            .map(|x| point(x, [body.x, body.y]).unwrap_or([f64::NAN; 2]));
+        let points =
+            rollout.states.iter().map(|x| point(x, [body.x, body.y]).unwrap_or([f64::NAN; 2]));
         let line = plot.line(points);
         plot.path(&class(index, rollout.success), &line);
     }

@@ -16,14 +16,8 @@ const BAR: f64 = 12.0;
 /// The figure.
 pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
     let mut legend = vec![
-        (
-            Swatch::Line("zero"),
-            "V_check = 0: boundary of the certified set".to_owned(),
-        ),
-        (
-            Swatch::Mark(diamond()),
-            "the state that the slice goes through".to_owned(),
-        ),
+        (Swatch::Line("zero"), "V_check = 0: boundary of the certified set".to_owned()),
+        (Swatch::Mark(diamond()), "the state that the slice goes through".to_owned()),
     ];
     let values = &record.slice.check_margin;
     if values.iter().any(|&value| !ordinary(f64::from(value))) {
@@ -57,11 +51,7 @@ fn drawing(grid: &Grid) -> String {
         x = x.join(Span::of([across]).unwrap_or(x));
         y = y.join(Span::of([up]).unwrap_or(y));
     }
-    let shape = if same_unit(record, states) {
-        Shape::Equal
-    } else {
-        Shape::Free(330.0)
-    };
+    let shape = if same_unit(record, states) { Shape::Equal } else { Shape::Free(330.0) };
     let mut plot = Plot::new("value", x, y, shape);
     let limit = limit(&record.slice.check_margin);
     for (class, data) in cells(&plot, grid, limit) {
@@ -75,11 +65,7 @@ fn drawing(grid: &Grid) -> String {
     }
     plot.strip(BAR + 45.0, |width| bar(width, limit));
     let [x, y] = states.map(|state| words::axis(record, state));
-    let labels = Labels {
-        x: &x,
-        y: &y,
-        whole: false,
-    };
+    let labels = Labels { x: &x, y: &y, whole: false };
     plot.finish(&labels, &description(grid))
 }
 

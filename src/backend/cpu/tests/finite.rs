@@ -35,10 +35,7 @@ fn starts() -> Vec<[f32; 1]> {
 fn a_state_that_is_not_finite_fails_the_rest_of_its_rollout() {
     let (starts, system) = (starts(), Burst { limit: 1e30 });
     let spec = RolloutSpec::new(8, 0.9).expect("a valid specification");
-    let plant = Plant {
-        system: &system,
-        policy: &Fragile,
-    };
+    let plant = Plant { system: &system, policy: &Fragile };
     for cpu in every_cpu() {
         for query in [Query::Measure, Query::Sign] {
             let task = ReachAvoidTask {
@@ -67,10 +64,7 @@ fn a_state_that_is_not_finite_fails_the_rest_of_its_rollout() {
 fn a_violation_before_the_burst_decides_the_sign() {
     let (starts, system) = ([[2.0], [0.5]], Burst { limit: 0.25 });
     let spec = RolloutSpec::new(8, 0.9).expect("a valid specification");
-    let plant = Plant {
-        system: &system,
-        policy: &Fragile,
-    };
+    let plant = Plant { system: &system, policy: &Fragile };
     let run = |query| {
         let task = ReachAvoidTask {
             starts: Starts::Listed(&starts),
@@ -89,10 +83,7 @@ fn a_violation_before_the_burst_decides_the_sign() {
 fn a_pair_that_is_not_finite_is_the_farthest() {
     let (starts, system) = (starts(), Burst { limit: 1e30 });
     let spec = RolloutSpec::new(8, 0.9).expect("a valid specification");
-    let plant = Plant {
-        system: &system,
-        policy: &Fragile,
-    };
+    let plant = Plant { system: &system, policy: &Fragile };
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Listed(&starts),
@@ -114,11 +105,7 @@ fn a_pair_that_is_not_finite_is_the_farthest() {
         assert_eq!((last.distance, last.pair), (HUGE, 1));
         for (i, measure) in (1..).zip(measures) {
             let fails = CASES[i % CASES.len()].1 == Fate::NotFinite;
-            assert_eq!(
-                measure.nominal == NON_FINITE,
-                fails,
-                "pair {i}: {measure:?}"
-            );
+            assert_eq!(measure.nominal == NON_FINITE, fails, "pair {i}: {measure:?}");
         }
     }
 }

@@ -21,8 +21,7 @@ pub(super) fn cpu(threads: usize) -> Cpu {
 /// One backend for each instruction set of this machine.
 pub(super) fn every_cpu() -> Vec<Cpu> {
     let all = Instructions::detect().into_iter();
-    all.map(|set| Cpu::with_instructions(Some(1), set).expect("a thread can be started"))
-        .collect()
+    all.map(|set| Cpu::with_instructions(Some(1), set).expect("a thread can be started")).collect()
 }
 
 /// T = 30, gamma = 0.95.
@@ -33,17 +32,12 @@ pub(super) fn spec() -> RolloutSpec {
 /// Losses that grow over time.
 pub(super) fn tightening(spec: &RolloutSpec) -> Tightening {
     let growing = |rate: f32| (0..=spec.horizon).map(|t| rate * t as f32).collect();
-    Tightening {
-        target: growing(0.01),
-        constraint: growing(0.02),
-    }
+    Tightening { target: growing(0.01), constraint: growing(0.02) }
 }
 
 /// Race starts near the study's: the positions of both drones vary with its box.
 pub(super) fn race_starts() -> Starts<'static, 12> {
-    let low = [
-        -0.8, 0.0, -2.5, 0.5, -0.1, -0.1, -0.8, 0.0, -2.5, 0.3, -0.1, -0.1,
-    ];
+    let low = [-0.8, 0.0, -2.5, 0.5, -0.1, -0.1, -0.8, 0.0, -2.5, 0.3, -0.1, -0.1];
     let high = [0.8, 0.0, -1.0, 0.7, 0.1, 0.1, 0.8, 0.0, -1.0, 0.5, 0.1, 0.1];
     Starts::Drawn {
         region: Region::new_box(low, high).expect("a valid box"),
@@ -53,11 +47,7 @@ pub(super) fn race_starts() -> Starts<'static, 12> {
 
 /// Pairs around [`race_starts`].
 pub(super) fn race_pairs() -> Pairs<'static, 12> {
-    Pairs {
-        nominal: race_starts(),
-        radius: 0.1,
-        stream: Stream::new(7, Purpose::User, 1),
-    }
+    Pairs { nominal: race_starts(), radius: 0.1, stream: Stream::new(7, Purpose::User, 1) }
 }
 
 /// The policy of the race.
@@ -70,9 +60,7 @@ pub(super) fn race_policy() -> Mlp {
 pub(super) fn network(widths: &[usize], activation: Activation, output: OutputActivation) -> Mlp {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut number = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (state >> 40) as f32 / (1_u32 << 23) as f32 - 1.0
     };
     let mut layer = |inputs: usize, outputs: usize| {
@@ -84,10 +72,7 @@ pub(super) fn network(widths: &[usize], activation: Activation, output: OutputAc
             outputs,
         }
     };
-    let layers = widths
-        .windows(2)
-        .map(|pair| layer(pair[0], pair[1]))
-        .collect();
+    let layers = widths.windows(2).map(|pair| layer(pair[0], pair[1])).collect();
     Mlp::new(layers, activation, output).expect("a valid network")
 }
 
@@ -103,11 +88,7 @@ where
 {
     let mut all = Vec::new();
     cpu.reach_avoid(plant, task, &mut |first, values| {
-        assert_eq!(
-            first,
-            task.range.start + all.len() as u64,
-            "order of the sink"
-        );
+        assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
     })
@@ -131,10 +112,7 @@ pub(super) fn race<P: Policy<12, 3>>(
         tightening: &tightening(&spec),
         query,
     };
-    let plant = Plant {
-        system: &system,
-        policy,
-    };
+    let plant = Plant { system: &system, policy };
     measures(cpu, plant, &task)
 }
 
@@ -150,11 +128,7 @@ where
 {
     let mut all = Vec::new();
     let farthest = cpu.deviation(plant, task, &mut |first, values| {
-        assert_eq!(
-            first,
-            task.range.start + all.len() as u64,
-            "order of the sink"
-        );
+        assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
     });

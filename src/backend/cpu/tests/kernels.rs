@@ -33,21 +33,13 @@ impl EveryShape {
         // NaN must come through the floor, in its own lane only.
         x[5] = f32::NAN;
         let mut y = vec![0.25; rows * K::BLOCK];
-        let panel = Panel {
-            weights: &weights,
-            bias: &bias,
-            floor,
-        };
+        let panel = Panel { weights: &weights, bias: &bias, floor };
         kernel.panel(panel, lanes, &x, &mut y);
         for (r, bias) in bias.iter().enumerate() {
             for lane in 0..lanes {
                 let sum = (0..inputs).fold(*bias, |sum, i| {
                     let (weight, x) = (weights[i * rows + r], x[i * K::BLOCK + lane]);
-                    if self.fused {
-                        weight.mul_add(x, sum)
-                    } else {
-                        sum + weight * x
-                    }
+                    if self.fused { weight.mul_add(x, sum) } else { sum + weight * x }
                 });
                 let expected = if sum < floor { floor } else { sum };
                 let got = y[r * K::BLOCK + lane];

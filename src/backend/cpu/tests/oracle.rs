@@ -11,13 +11,8 @@ use crate::system::{DroneRace, System};
 /// Networks of odd widths with every activation.
 fn networks() -> Vec<Mlp> {
     let mut networks = Vec::new();
-    let shapes: [&[usize]; 5] = [
-        &[12, 3],
-        &[12, 1, 3],
-        &[12, 3, 7, 3],
-        &[12, 64, 64, 3],
-        &[12, 100, 17, 3],
-    ];
+    let shapes: [&[usize]; 5] =
+        [&[12, 3], &[12, 1, 3], &[12, 3, 7, 3], &[12, 64, 64, 3], &[12, 100, 17, 3]];
     for widths in shapes {
         for activation in [Activation::Relu, Activation::Tanh, Activation::Silu] {
             for output in [OutputActivation::Tanh, OutputActivation::Identity] {
@@ -53,10 +48,7 @@ fn networks_are_as_near_to_f64_as_the_scalar_loop() {
     let tightening = tightening(&spec);
     let mut quotient = 0.0_f64;
     for policy in networks() {
-        let plant = Plant {
-            system: &system,
-            policy: &policy,
-        };
+        let plant = Plant { system: &system, policy: &policy };
         let (mut truth, mut worst_scalar) = (Vec::new(), 0.0_f64);
         for index in 0..COUNT {
             let start = race_starts().start(index);
@@ -94,10 +86,7 @@ fn signs_are_those_of_the_measures() {
         assert_eq!(*sign, expected, "start {index} has the measure {measure}");
         positive += u32::from(*measure > 0.0);
     }
-    assert!(
-        (5_000..95_000).contains(&positive),
-        "{positive} of either sign"
-    );
+    assert!((5_000..95_000).contains(&positive), "{positive} of either sign");
 }
 
 /// Distances, farthest pairs and measures of a formula are those of a scalar f32 loop to the bit.
@@ -106,10 +95,7 @@ fn deviation_of_a_formula_is_the_scalar_loop() {
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
         let (system, spec) = (DroneRace::default(), spec());
         let (tightening, plain) = (tightening(&spec), Tightening::none(&spec));
-        let plant = Plant {
-            system: &system,
-            policy: &Damping,
-        };
+        let plant = Plant { system: &system, policy: &Damping };
         let task = DeviationTask {
             pairs: race_pairs(),
             range: 3..130,
@@ -165,10 +151,7 @@ fn scalar_pair(
 fn deviation_of_a_network_is_near_f64() {
     let (system, spec, policy) = (DroneRace::default(), spec(), race_policy());
     let tightening = tightening(&spec);
-    let plant = Plant {
-        system: &system,
-        policy: &policy,
-    };
+    let plant = Plant { system: &system, policy: &policy };
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
         let task = DeviationTask {
             pairs: race_pairs(),
@@ -188,9 +171,6 @@ fn deviation_of_a_network_is_near_f64() {
         }
         println!("{control:?}: worst error {worst:e}");
         // Margins are of the order of 10, an f32 has 24 bits, and errors add up over 30 steps.
-        assert!(
-            worst < 30.0 * 10.0 * f64::from(f32::EPSILON),
-            "{control:?}: {worst}"
-        );
+        assert!(worst < 30.0 * 10.0 * f64::from(f32::EPSILON), "{control:?}: {worst}");
     }
 }

@@ -48,17 +48,9 @@ fn race_deviation<P: Policy<12, 3>>(
     control: PairControl,
 ) -> (Vec<Farthest>, Vec<PairMeasure>) {
     let (system, spec) = (DroneRace::default(), spec());
-    let plant = Plant {
-        system: &system,
-        policy,
-    };
-    let task = DeviationTask {
-        pairs: race_pairs(),
-        range,
-        spec,
-        tightening: &tightening(&spec),
-        control,
-    };
+    let plant = Plant { system: &system, policy };
+    let task =
+        DeviationTask { pairs: race_pairs(), range, spec, tightening: &tightening(&spec), control };
     deviation(cpu, plant, &task)
 }
 
@@ -80,11 +72,7 @@ fn deviation_does_not_depend_on_threads_or_place() {
                     }
                     measures.extend(part.1);
                 }
-                assert_eq!(
-                    (farthest, measures),
-                    whole,
-                    "{threads} threads, cuts {cuts:?}"
-                );
+                assert_eq!((farthest, measures), whole, "{threads} threads, cuts {cuts:?}");
             }
         }
     }
@@ -109,11 +97,7 @@ fn physics_is_the_same_on_all_instructions() {
 
 #[test]
 fn fused_kernels_agree_to_the_bit() {
-    let policy = network(
-        &[12, 100, 3, 3],
-        Activation::Tanh,
-        OutputActivation::Identity,
-    );
+    let policy = network(&[12, 100, 3, 3], Activation::Tanh, OutputActivation::Identity);
     let mut cpus = every_cpu();
     let baseline = cpus.pop().expect("baseline instructions are always there");
     let expected = race(&baseline, &policy, 0..COUNT, Query::Measure);
@@ -136,19 +120,12 @@ fn an_error_of_the_sink_ends_the_batch() {
         tightening: &Tightening::none(&spec),
         query: Query::Sign,
     };
-    let plant = Plant {
-        system: &system,
-        policy: &Damping,
-    };
+    let plant = Plant { system: &system, policy: &Damping };
     let (caller, mut seen) = (std::thread::current().id(), Vec::new());
     let outcome = cpu(2).reach_avoid(plant, &task, &mut |first, values| {
         assert_eq!(std::thread::current().id(), caller);
         seen.push((first, values.len()));
-        if seen.len() == 2 {
-            Err(Error::Interrupted)
-        } else {
-            Ok(())
-        }
+        if seen.len() == 2 { Err(Error::Interrupted) } else { Ok(()) }
     });
     assert!(matches!(outcome, Err(Error::Interrupted)));
     assert_eq!(seen, [(10, 65_536), (65_546, 65_536)]);
@@ -167,19 +144,13 @@ fn wrong_tasks_are_refused() {
             tightening,
             query: Query::Measure,
         };
-        let plant = Plant {
-            system: &system,
-            policy,
-        };
+        let plant = Plant { system: &system, policy };
         let outcome = cpu(1).reach_avoid(plant, &task, &mut |_, _| Ok(()));
         outcome.err().map(|error| error.to_string())
     };
     let none = Tightening::none(&spec);
     assert_eq!(run(5, &none, &policy), None);
-    let short = Tightening {
-        target: vec![0.0; 30],
-        ..none.clone()
-    };
+    let short = Tightening { target: vec![0.0; 30], ..none.clone() };
     let wide = network(&[12, 4], Activation::Relu, OutputActivation::Tanh);
     let cases = [
         (run(6, &none, &policy), "the list has 5 starts"),

@@ -53,16 +53,8 @@ fn every_arc_of_hypot_is_needed() {
         });
         // The f32 direction is a unit vector up to 1e-7.
         let slope = 1.0 + f64::hypot(f64::from(angle.cos()), f64::from(angle.sin()));
-        assert!(
-            found.constant >= slope - 1e-15,
-            "{angle}: {}",
-            found.constant
-        );
-        assert!(
-            found.constant <= 1.0013 * slope,
-            "{angle}: {}",
-            found.constant
-        );
+        assert!(found.constant >= slope - 1e-15, "{angle}: {}", found.constant);
+        assert!(found.constant <= 1.0013 * slope, "{angle}: {}", found.constant);
         assert_eq!(found.pieces, 64);
     }
 }
@@ -78,16 +70,10 @@ fn every_piece_counts() {
             let high = (x[0] * slope(2)).max(x[1] * slope(3)) - Bound::lit(0.5);
             low.max(high.abs())
         });
-        assert!(
-            found.constant >= 3.0 && found.constant < 3.0 + 1e-14,
-            "{found:?}"
-        );
+        assert!(found.constant >= 3.0 && found.constant < 3.0 + 1e-14, "{found:?}");
     }
     assert_eq!(constant(&sides, |x| x[0].abs()).pieces, 2);
-    assert_eq!(
-        constant(&sides, |x| x[0].max(Bound::lit(0.0)).sqrt()).constant,
-        f64::INFINITY
-    );
+    assert_eq!(constant(&sides, |x| x[0].max(Bound::lit(0.0)).sqrt()).constant, f64::INFINITY);
 }
 
 #[test]
@@ -97,9 +83,7 @@ fn decided_branches_leave_one_piece() {
         let far = x[0] * Bound::lit(100.0) + Bound::lit(200.0);
         let wild = Bound::lit(1.0) / x[1];
         let low = x[0].if_lt(Bound::lit(2.0), x[1], wild);
-        far.min(low)
-            .max(far - Bound::lit(400.0))
-            .clamp(Bound::lit(-9.0), Bound::lit(9.0))
+        far.min(low).max(far - Bound::lit(400.0)).clamp(Bound::lit(-9.0), Bound::lit(9.0))
     });
     assert_eq!(
         found,
@@ -131,21 +115,12 @@ fn jumps_and_lost_domains_have_no_constant() {
     infinite(|x| x[0].ln_unit().min(Bound::lit(3.0)));
     infinite(|x| x[0] + Bound::lit(f32::NAN));
     // What does not touch a varying coordinate does not jump along it.
-    let across = Sides {
-        varies: vec![false, true],
-        ..Sides::cube(2, 1.0)
-    };
-    let found = constant(&across, |x| {
-        x[0].if_lt(Bound::lit(0.0), Bound::lit(1.0), -x[1]) + x[0].floor()
-    });
-    assert!(
-        found.constant == 1.0_f64.next_up() && !found.assumed_continuous,
-        "{found:?}"
-    );
+    let across = Sides { varies: vec![false, true], ..Sides::cube(2, 1.0) };
+    let found =
+        constant(&across, |x| x[0].if_lt(Bound::lit(0.0), Bound::lit(1.0), -x[1]) + x[0].floor());
+    assert!(found.constant == 1.0_f64.next_up() && !found.assumed_continuous, "{found:?}");
     // Sides that meet are taken to be continuous, and this is said.
-    let bent = constant(&sides, |x| {
-        x[0].if_lt(Bound::lit(0.0), x[0] * Bound::lit(0.5), x[0])
-    });
+    let bent = constant(&sides, |x| x[0].if_lt(Bound::lit(0.0), x[0] * Bound::lit(0.5), x[0]));
     assert!(bent.assumed_continuous && bent.constant == 1.0_f64.next_up());
     assert!(!constant(&sides, |x| x[0].if_lt(x[1], x[1], x[0])).assumed_continuous);
     assert!(!constant(&sides, |x| x[0].if_lt(x[1], x[0], x[0])).assumed_continuous);
@@ -158,9 +133,7 @@ fn hulls_past_the_limit_are_said_and_sound() {
     let sides = Sides::cube(3, 1.0);
     fn formula<R: Real>(x: &[R]) -> R {
         let around = x[0].hypot(x[1]) + x[1].hypot(x[2] + R::lit(0.5));
-        let folded = (0..11).fold(x[2], |sum, i| {
-            sum + (x[i % 3] - R::lit(0.05 * i as f32)).abs()
-        });
+        let folded = (0..11).fold(x[2], |sum, i| sum + (x[i % 3] - R::lit(0.05 * i as f32)).abs());
         (around * folded).min(around + folded * x[0])
     }
     let found = enclose(sides.domain(), |x| vec![formula(x)]).remove(0);
@@ -169,11 +142,7 @@ fn hulls_past_the_limit_are_said_and_sound() {
     let name = || "sum of distances".to_owned();
     let slope = (0..300).map(|_| steepest(&found, &sides, &mut rng, formula, &name));
     let slope = slope.fold(0.0, f64::max);
-    assert!(
-        slope > 10.0 && slope <= found.constant(),
-        "{slope} of {}",
-        found.constant()
-    );
+    assert!(slope > 10.0 && slope <= found.constant(), "{slope} of {}", found.constant());
     let small = constant(&sides, |x| x[0].hypot(x[1]) + x[2].abs());
     assert!(!small.hulled && small.pieces == 128);
     // A product with itself needs no pairs.
@@ -188,11 +157,7 @@ fn hulls_past_the_limit_are_said_and_sound() {
 #[test]
 fn gradients_over_a_point_are_derivatives() {
     let at = [0.3, 0.7];
-    let domain = Domain {
-        low: &at,
-        high: &at,
-        varies: &[true, true],
-    };
+    let domain = Domain { low: &at, high: &at, varies: &[true, true] };
     let outputs = enclose(domain, |x| {
         vec![
             x[0].sin(),
@@ -219,10 +184,7 @@ fn gradients_over_a_point_are_derivatives() {
             panic!("a smooth function has one piece");
         };
         for (side, expected) in piece.gradient.iter().zip(expected) {
-            assert!(
-                side.contains(expected) && side.high - side.low < 1e-14,
-                "{side:?} {expected}"
-            );
+            assert!(side.contains(expected) && side.high - side.low < 1e-14, "{side:?} {expected}");
         }
     }
 }

@@ -103,34 +103,22 @@ impl Sides {
         let width = |rng: &mut StdRng| [0.1, 1.0, 3.0][rng.random_range(0..3)];
         Self {
             high: low.iter().map(|low| low + width(rng)).collect(),
-            varies: (0..inputs)
-                .map(|i| i == 0 || rng.random_bool(0.7))
-                .collect(),
+            varies: (0..inputs).map(|i| i == 0 || rng.random_bool(0.7)).collect(),
             low,
         }
     }
 
     pub(super) fn cube(inputs: usize, half: f64) -> Self {
-        Self {
-            low: vec![-half; inputs],
-            high: vec![half; inputs],
-            varies: vec![true; inputs],
-        }
+        Self { low: vec![-half; inputs], high: vec![half; inputs], varies: vec![true; inputs] }
     }
 
     pub(super) fn domain(&self) -> Domain<'_> {
-        Domain {
-            low: &self.low,
-            high: &self.high,
-            varies: &self.varies,
-        }
+        Domain { low: &self.low, high: &self.high, varies: &self.varies }
     }
 
     fn point(&self, rng: &mut StdRng) -> Vec<f64> {
         let sides = self.low.iter().zip(&self.high);
-        sides
-            .map(|(&low, &high)| rng.random_range(low..=high))
-            .collect()
+        sides.map(|(&low, &high)| rng.random_range(low..=high)).collect()
     }
 
     /// A second point, apart from `x` in varying coordinates only, near or far.
@@ -138,18 +126,12 @@ impl Sides {
         let share = [1.0, 0.1, 1e-3][rng.random_range(0..3)];
         let far = self.point(rng);
         let toward = |i: usize| x[i] + share * (far[i] - x[i]);
-        (0..x.len())
-            .map(|i| if self.varies[i] { toward(i) } else { x[i] })
-            .collect()
+        (0..x.len()).map(|i| if self.varies[i] { toward(i) } else { x[i] }).collect()
     }
 }
 
 fn distance(x: &[f64], y: &[f64]) -> f64 {
-    x.iter()
-        .zip(y)
-        .map(|(x, y)| (x - y).powi(2))
-        .sum::<f64>()
-        .sqrt()
+    x.iter().zip(y).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Largest slope between sampled pairs; checks values and slopes against the enclosure.
@@ -170,20 +152,11 @@ pub(super) fn steepest(
         let y = sides.partner(rng, &x);
         let (at_x, at_y) = (formula(&x), formula(&y));
         if !at_x.is_finite() || !at_y.is_finite() {
-            assert_eq!(
-                constant,
-                f64::INFINITY,
-                "{}: no value at {x:?} or {y:?}",
-                name()
-            );
+            assert_eq!(constant, f64::INFINITY, "{}: no value at {x:?} or {y:?}", name());
             continue;
         }
         let inside = |v: f64| value.low - rounding <= v && v <= value.high + rounding;
-        assert!(
-            inside(at_x),
-            "{}: {at_x} at {x:?} is not in {value:?}",
-            name()
-        );
+        assert!(inside(at_x), "{}: {at_x} at {x:?} is not in {value:?}", name());
         let (rise, apart) = ((at_x - at_y).abs(), distance(&x, &y));
         if !found.caveats.assumed_continuous {
             assert!(

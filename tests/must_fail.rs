@@ -1,0 +1,198 @@
+//! Checks that must fail: a parity check that does not notice a changed kernel proves nothing.
+//!
+//! Each test changes the composed WGSL in one place and requires the comparison with the f64
+//! reference to see it; the comparison itself passes on the kernels as they are.
+
+mod common;
+
+use common::race_policy;
+use reachcast::backend::Backend;
+use reachcast::backend::gpu::{Choice, Gpu};
+use reachcast::rollout::{
+    Ball, DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
+    RolloutSpec, Starts, Stream, Tightening, measure, pair_measures,
+};
+use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+
+/// Starts of each comparison.
+const BATCH: u64 = 96;
+/// Steps.
+const HORIZON: u32 = 20;
+/// Largest distance from f64 that parity allows; the suite measures below 2e-5 on this batch.
+const BAND: f64 = 1e-3;
+
+/// An adapter, or a skip said aloud.
+fn adapter() -> Option<Gpu> {
+    match Gpu::open(&Choice::Any) {
+        Ok(gpu) => Some(gpu),
+        Err(error) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
+            panic!("REACHCAST_REQUIRE_GPU is 1: {error}")
+        }
+        Err(_) => {
+            println!("SKIPPED: no adapter");
+            None
+        }
+    }
+}
+
+/// Losses that differ from step to step and from each other.
+fn losses(spec: &RolloutSpec) -> Tightening {
+    let steps = 0..=spec.horizon;
+    Tightening {
+        target: steps.clone().map(|t| 0.05 + 0.01 * t as f32).collect(),
+        constraint: steps.map(|t| 0.02 + 0.003 * t as f32).collect(),
+    }
+}
+
+/// Whether the adapter agrees with f64 on measures, signs, pairs and distances of the race and
+/// the double integrator; a kernel that no longer compiles does not.
+fn parity(gpu: Gpu) -> bool {
+    let backend = Backend::Gpu(gpu);
+    let race = DroneRace::default();
+    let (low, high) = (race.states().map(|a| a.low), race.states().map(|a| a.high));
+    let region = Region::new_box(low, high).expect("box");
+    let policy = race_policy();
+    let plant = Plant { system: &race, policy: &policy };
+    let ball = Region::Ball(Ball {
+        center: [0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.4, 0.0, -2.0, 0.3, 0.0, 0.0],
+        radius: 0.4,
+        varies: [true; 12],
+    });
+    let integrator = DoubleIntegrator::default();
+    let bang = BangBang { acceleration: 1.0 };
+    let simple = Plant { system: &integrator, policy: &bang };
+    let square = Region::new_box([-1.2, -1.5], [1.2, 1.5]).expect("box");
+    measures_agree(&backend, plant, region.clone())
+        && measures_agree(&backend, plant, ball)
+        && measures_agree(&backend, simple, square)
+        && pairs_agree(&backend, plant, region, PairControl::Replay)
+}
+
+fn measures_agree<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    region: Region<NX>,
+) -> bool
+where
+    S: System<NX, NU>,
+    P: reachcast::policy::Policy<NX, NU>,
+{
+    let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
+    let tightening = losses(&spec);
+    let starts = Starts::Drawn { region, stream: Stream::new(3, Purpose::User, 5) };
+    [Query::Measure, Query::Sign].into_iter().all(|query| {
+        let task = ReachAvoidTask {
+            starts: starts.clone(),
+            range: 0..BATCH,
+            spec,
+            tightening: &tightening,
+            query,
+        };
+        let mut agree = true;
+        let ran = backend.reach_avoid(plant, &task, &mut |first, values| {
+            for (index, value) in (first..).zip(values) {
+                let truth = measure(plant, starts.start(index), &spec, &tightening);
+                agree &= match query {
+                    Query::Measure => (f64::from(*value) - truth).abs() <= BAND,
+                    Query::Sign => truth.abs() <= BAND || (*value > 0.0) == (truth > 0.0),
+                };
+            }
+            Ok(())
+        });
+        ran.is_ok() && agree
+    })
+}
+
+fn pairs_agree<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    region: Region<NX>,
+    control: PairControl,
+) -> bool
+where
+    S: System<NX, NU>,
+    P: reachcast::policy::Policy<NX, NU>,
+{
+    let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
+    let tightening = losses(&spec);
+    let pairs = Pairs {
+        nominal: Starts::Drawn { region, stream: Stream::new(3, Purpose::User, 6) },
+        radius: 0.1,
+        stream: Stream::new(3, Purpose::User, 7),
+    };
+    let task = DeviationTask {
+        pairs: pairs.clone(),
+        range: 0..BATCH,
+        spec,
+        tightening: &tightening,
+        control,
+    };
+    let mut agree = true;
+    let ran = backend.deviation(plant, &task, &mut |first, values| {
+        for (index, value) in (first..).zip(values) {
+            let pair = pairs.load::<1>(index).map(|start| start.map(|lane| lane.0[0]));
+            let (nominal, perturbed) = pair_measures(plant, pair, &spec, &tightening, control);
+            agree &= (f64::from(value.nominal) - nominal).abs() <= BAND
+                && (f64::from(value.perturbed) - perturbed).abs() <= BAND;
+        }
+        Ok(())
+    });
+    // The host's own kernel is the reference of the distances: it is tested against f64 apart.
+    let host = common::cpu(1).deviation(plant, &task, &mut |_, _| Ok(())).expect("host runs");
+    agree
+        && ran.is_ok_and(|farthest| {
+            farthest.iter().zip(&host).all(|(device, host)| {
+                f64::from((device.distance - host.distance).abs()) <= BAND
+                    && device.pair == host.pair
+            })
+        })
+}
+
+/// Requires that parity fails once `old` is replaced by `new`, and that the text had `old`.
+fn caught(old: &'static str, new: &'static str) {
+    let Some(gpu) = adapter() else { return };
+    let seen = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let found = seen.clone();
+    let gpu = gpu.with_shader_edit(move |text| {
+        found.fetch_or(text.contains(old), std::sync::atomic::Ordering::Relaxed);
+        text.replace(old, new)
+    });
+    assert!(!parity(gpu), "`{old}` changed to `{new}` and nothing noticed");
+    assert!(seen.load(std::sync::atomic::Ordering::Relaxed), "no kernel has `{old}`");
+}
+
+#[test]
+fn kernels_as_they_are_agree() {
+    if let Some(gpu) = adapter() {
+        assert!(parity(gpu));
+    }
+}
+
+macro_rules! mutants {
+    ($($name:ident: $old:expr => $new:expr;)*) => {
+        $(
+            #[test]
+            fn $name() {
+                caught($old, $new);
+            }
+        )*
+    };
+}
+
+mutants! {
+    one_step_too_few: "if t < params.horizon {" => "if t + 1u < params.horizon {";
+    one_state_too_many: "t < params.step + params.steps;" => "t <= params.step + params.steps;";
+    last_state_not_judged: "t < params.step + params.steps;" => "t + 1u < params.step + params.steps;";
+    constraint_not_discounted: "discount * constraint_margin" => "constraint_margin";
+    target_not_discounted: "discount * target_margin" => "target_margin";
+    target_without_constraint: "min(safe, discount * target_margin)" => "discount * target_margin";
+    constraint_forgotten: "min(fold.safe, discount * constraint_margin)" => "discount * constraint_margin";
+    losses_swapped: "target_at(x) - row.y" => "target_at(x) - row.z";
+    loss_added: "constraint_at(x) - row.z" => "constraint_at(x) + row.z";
+    early_exit_on_safety: "fold.best > 0.0 || fold.safe <= 0.0" => "fold.best > 0.0 || fold.safe > 0.0";
+    survivors_mixed_up: "kept_origin[place] = origin[column];" => "kept_origin[place] = origin[place];";
+    largest_is_smallest: "b.x > a.x ||" => "b.x < a.x ||";
+    perturbed_is_nominal: "perturbed = advance(perturbed, replayed);" => "perturbed = advance(nominal, replayed);";
+    states_swapped: "let v1 = x[1];" => "let v1 = x[0];";
+    branches_turned: " < v" => " > v";
+}
