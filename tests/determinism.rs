@@ -115,6 +115,21 @@ fn a_changed_certificate_is_caught() {
     assert!(is_caught(|record| record.provenance.policy_sha256 = "0".repeat(64)));
     assert!(is_caught(|record| record.provenance.physics_sha256 = "0".repeat(64)));
     assert!(is_caught(|record| record.schema += 1));
+    assert!(is_caught(|record| record.statements[0].push_str(" And more.")));
+    assert!(is_caught(|record| record.provenance.seed += 1));
+    assert!(is_caught(|record| record.gamma = 0.9));
+    assert!(is_caught(|record| record.system.states[0].high = 9.0));
+    assert!(is_caught(|record| record.deviation.claim.epsilon = 0.01));
+    assert!(is_caught(|record| record.deviation.claim.scenarios *= 2));
+    assert!(is_caught(|record| record.global.draws *= 1000));
+    assert!(is_caught(|record| record.global.share_interval[0] *= 1.1));
+    assert!(is_caught(|record| record.growth.varies[1] = false));
+    assert!(is_caught(|record| record.slice.check_margin[7] += 0.01));
+    assert!(is_caught(|record| record.state.tier = 0));
+    assert!(is_caught(|record| record.beta_total *= 0.5));
+    // What only says who ran it, and how long it took, is free.
+    assert!(!is_caught(|record| record.timing.wall_seconds *= 2.0));
+    assert!(!is_caught(|record| record.provenance.device = "another".to_owned()));
 }
 
 /// A certificate of another system's parameters is refused, by `check` and by `query`.

@@ -271,10 +271,11 @@ fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
 }
 
 /// Layer of each top-level module; a file may name its own layer and those above it.
-const LAYERS: [(&str, u32); 13] = [
+const LAYERS: [(&str, u32); 14] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
+    ("files", 1),
     ("system", 2),
     ("policy", 2),
     ("rollout", 3),

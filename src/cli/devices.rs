@@ -59,7 +59,9 @@ struct Listing {
 /// Lists the processor and the adapters, and which one `--backend auto` takes.
 pub(super) fn list(global: &Global) -> Result<Outcome> {
     let adapters = adapters();
-    let cpu = cpu(global)?.device();
+    let count = threads(global);
+    let plural = if count == 1 { "" } else { "s" };
+    let cpu = format!("{}, {count} thread{plural}", cpu(global)?.device());
     let chosen = adapters.iter().find(|adapter| is_hardware(adapter));
     let auto = chosen.map_or("cpu".to_owned(), |adapter| adapter.name.clone());
     let listing = Listing { cpu, adapters, auto };

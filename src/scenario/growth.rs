@@ -71,7 +71,7 @@ where
         rounds.push(round.record);
         match nearest {
             None => return Ok((Growth::Verified(ball), rounds, samples)),
-            Some(distance) if number + 1 < asked.rounds && distance > 0.0 => {
+            Some(distance) if number + 1 < asked.rounds && distance as f32 > 0.0 => {
                 // Rounded down: the failure itself stays outside.
                 ball.radius = (distance as f32).next_down();
             }

@@ -3,6 +3,7 @@
 pub mod bound;
 pub mod boundary;
 mod certify;
+mod compare;
 pub mod deviation;
 pub mod global;
 pub mod growth;

@@ -6,7 +6,7 @@ use super::bound::lower_bound;
 use super::certify::{certify, hashes, tightening};
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
 use super::settings::Settings;
-use super::{Context, Unwatched, Watch, global};
+use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::policy::Policy;
@@ -166,6 +166,7 @@ where
     let again = certify(backend, plant, settings, record.provenance.config.clone(), watch)?;
     let context = Context { backend, plant, watch };
     let mut findings = recomputed(record, &again);
+    findings.push(compare::fields(record, &again));
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
     let purposes = [Purpose::Check, Purpose::CheckPerturbation];
     let fresh = global::conditional(context, settings, &tightening, purposes)?;
@@ -225,13 +226,13 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
             "certified starts",
             stored.global.accepted,
             again.global.accepted,
-            stored.global.draws,
+            again.global.draws,
         ),
         count(
             "failures among them",
             stored.global.claim.failures,
             again.global.claim.failures,
-            stored.global.draws,
+            again.global.draws,
         ),
         number(
             "conditional failure bound",

@@ -1,0 +1,118 @@
+//! Compares a stored record with the one computed again from its seed, field by field.
+
+use serde_json::Value;
+
+use super::record::Record;
+use super::verify::Finding;
+
+/// Difference, relative to the larger number or to one, that another device's rounding may make.
+const TOLERANCE: f64 = 1e-3;
+/// Difference of a count beside its share of the draws that another device's rounding may make.
+const MOVED: f64 = 2.0;
+/// Fields that a second run may change: who ran it and how long it took.
+const FREE: [&str; 4] = ["timing", "provenance.backend", "provenance.device", "provenance.version"];
+/// Fields that are measured on the device, or that put its numbers into words.
+const OF_THE_DEVICE: [&str; 5] =
+    ["statements", "global.f32_error", "global.band", "global.f64_reruns", "growth.rounds"];
+/// Counts of rollouts, in which a measure may have crossed zero.
+const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
+
+/// One finding: whether every field of the record is what its seed and configuration give.
+///
+/// On the device that made it the record must be the same to the last digit; on another one
+/// numbers may differ by rounding.
+pub(super) fn fields(stored: &Record, again: &Record) -> Finding {
+    let same_device = stored.provenance.backend == again.provenance.backend
+        && stored.provenance.device == again.provenance.device
+        && stored.provenance.version == again.provenance.version;
+    let (Ok(was), Ok(is)) = (serde_json::to_value(stored), serde_json::to_value(again)) else {
+        return finding(vec!["the record has no JSON form".to_owned()]);
+    };
+    let mut walk = Walk { same_device, draws: again.global.draws as f64, differences: Vec::new() };
+    walk.compare("", &was, &is);
+    finding(walk.differences)
+}
+
+fn finding(differences: Vec<String>) -> Finding {
+    let found = match differences.as_slice() {
+        [] => "the same".to_owned(),
+        [only] => only.clone(),
+        [first, rest @ ..] => format!("{first}, and {} more", rest.len()),
+    };
+    Finding {
+        name: "every field of the record".to_owned(),
+        stored: "as its seed and configuration give it".to_owned(),
+        found,
+        holds: differences.is_empty(),
+    }
+}
+
+/// A walk through two JSON values side by side.
+struct Walk {
+    same_device: bool,
+    draws: f64,
+    differences: Vec<String>,
+}
+
+impl Walk {
+    fn compare(&mut self, path: &str, was: &Value, is: &Value) {
+        let under = |names: &[&str]| {
+            names.iter().any(|name| {
+                path.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+            })
+        };
+        if under(&FREE) || (!self.same_device && under(&OF_THE_DEVICE)) {
+            return;
+        }
+        match (was, is) {
+            (Value::Object(was_map), Value::Object(is_map)) if was_map.len() == is_map.len() => {
+                for (key, was) in was_map {
+                    let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                    self.compare(&inner, was, is_map.get(key).unwrap_or(&Value::Null));
+                }
+            }
+            (Value::Array(was_list), Value::Array(is_list)) if was_list.len() == is_list.len() => {
+                for (i, (was, is)) in was_list.iter().zip(is_list).enumerate() {
+                    self.compare(&format!("{path}.{i}"), was, is);
+                }
+            }
+            (Value::Number(_), Value::Number(_)) if self.close(path, was, is) => {}
+            (Value::String(_), Value::String(_)) if !self.same_device && in_words(path) => {}
+            _ if was == is => {}
+            _ => self.differences.push(format!(
+                "{path} is {} here, {} stored",
+                short(is),
+                short(was)
+            )),
+        }
+    }
+
+    /// Whether two numbers agree as far as the devices do.
+    fn close(&self, path: &str, was: &Value, is: &Value) -> bool {
+        let (Some(was), Some(is)) = (was.as_f64(), is.as_f64()) else { return false };
+        if self.same_device {
+            return was == is;
+        }
+        let last = path.rsplit('.').next().unwrap_or(path);
+        let allowed = if COUNTS.contains(&last) || path == "global.claim.scenarios" {
+            MOVED + TOLERANCE * self.draws
+        } else {
+            TOLERANCE * was.abs().max(is.abs()).max(1.0)
+        };
+        (was - is).abs() <= allowed
+    }
+}
+
+/// Whether the field puts computed numbers into words.
+fn in_words(path: &str) -> bool {
+    path.ends_with(".statement") || path.ends_with(".measure")
+}
+
+/// A value in few characters.
+fn short(value: &Value) -> String {
+    let text = value.to_string();
+    match text.char_indices().nth(60) {
+        Some((end, _)) => format!("{} ...", &text[..end]),
+        None => text,
+    }
+}
