@@ -1,5 +1,7 @@
 //! `certify`, `query` and `check` end to end on the CPU: files, exit codes, determinism, Ctrl-C.
 
+#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 

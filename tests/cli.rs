@@ -1,5 +1,7 @@
 //! The command line from outside: exit codes, messages, files, and what bad input meets.
 
+#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

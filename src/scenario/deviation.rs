@@ -91,7 +91,8 @@ where
     };
     Ok(DeviationRecord {
         claim: claim(context.plant.system, settings, &program)?,
-        radius: f64::from(asked.radius),
+        // As it was written: 0.1, not 0.10000000149.
+        radius: asked.radius.to_string().parse().unwrap_or(f64::from(asked.radius)),
         control: asked.control,
         joint: asked.joint,
         source: asked.source,
@@ -211,9 +212,9 @@ where
     let asked = &settings.deviation;
     let horizon = settings.spec.horizon;
     let joint = match asked.joint {
-        Joint::FixedShape => format!("at all steps 0..={horizon} at once (fixed shape)"),
-        Joint::Variables => format!("at all steps 0..={horizon} at once ({horizon} variables)"),
-        Joint::Bonferroni => format!("at all steps 0..={horizon} at once (Bonferroni)"),
+        Joint::FixedShape => format!("at all steps 0 to {horizon} at once (fixed shape)"),
+        Joint::Variables => format!("at all steps 0 to {horizon} at once ({horizon} variables)"),
+        Joint::Bonferroni => format!("at all steps 0 to {horizon} at once (Bonferroni)"),
         Joint::Separate => "at each single step (no joint statement)".to_owned(),
     };
     let driven = match asked.control {

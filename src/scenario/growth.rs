@@ -217,9 +217,13 @@ where
             1.0 - asked.epsilon
         ),
         measure: format!(
-            "start uniform in the Euclidean ball of radius {:.4} in {dimension} of {NX} \
-             coordinates, the others frozen at the centre's values",
-            ball.radius
+            "start uniform in the Euclidean ball of radius {:.4} in {}",
+            ball.radius,
+            match dimension {
+                all if all == NX => format!("all {NX} coordinates"),
+                some =>
+                    format!("{some} of {NX} coordinates, the others frozen at the centre's values"),
+            }
         ),
         dimension,
         frozen,
