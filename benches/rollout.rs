@@ -241,7 +241,7 @@ fn growth_round(criterion: &mut Criterion) {
         let context = Context { backend, plant, watch: &Unwatched };
         group.bench_function(BenchmarkId::new(*name, "slice + 5 x 159"), |b| {
             b.iter(|| {
-                let slice = global::slice(context, &settings, &bench.tightening);
+                let slice = global::slice(context, &settings, &bench.tightening, 0.0);
                 black_box(slice.expect("a slice"));
                 let (outcome, rounds, _) =
                     growth::grow(context, &settings, &boundary, 0.0, 0).expect("a growth");

@@ -5,9 +5,9 @@
 
 mod common;
 
-use common::race_policy;
+use common::{adapter, race_policy};
 use reachcast::backend::Backend;
-use reachcast::backend::gpu::{Choice, Gpu};
+use reachcast::backend::gpu::Gpu;
 use reachcast::rollout::{
     Ball, DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
     RolloutSpec, Starts, Stream, Tightening, measure, pair_measures,
@@ -20,20 +20,6 @@ const BATCH: u64 = 96;
 const HORIZON: u32 = 20;
 /// Largest distance from f64 that parity allows; the suite measures below 2e-5 on this batch.
 const BAND: f64 = 1e-3;
-
-/// An adapter, or a skip said aloud.
-fn adapter() -> Option<Gpu> {
-    match Gpu::open(&Choice::Any) {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
-            panic!("REACHCAST_REQUIRE_GPU is 1: {error}")
-        }
-        Err(_) => {
-            println!("SKIPPED: no adapter");
-            None
-        }
-    }
-}
 
 /// Losses that differ from step to step and from each other.
 fn losses(spec: &RolloutSpec) -> Tightening {

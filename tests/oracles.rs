@@ -3,7 +3,7 @@
 mod common;
 
 use common::{
-    ClosedForm, FALSE_ALARM, backends, literal, race_policy, race_settings, settings, supremum,
+    ClosedForm, FALSE_ALARM, backends, cpu, literal, race_policy, race_settings, settings, supremum,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -12,7 +12,7 @@ use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::rollout::{
     DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Purpose, Query,
-    ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening,
+    ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening, measure,
 };
 use reachcast::scenario::settings::{Joint, Settings};
 use reachcast::scenario::{Context, Unwatched, certify, deviation, global};
@@ -236,6 +236,40 @@ fn grid(side: usize) -> Vec<[f32; 2]> {
     (0..side * side).map(|i| [node(i / side, 1.2), node(i % side, 1.5)]).collect()
 }
 
+/// Margins within the band are f64's, those outside stay as the backend has them.
+#[test]
+fn margins_within_the_band_are_decided_in_f64() {
+    let system = DroneRace::default();
+    let policy = race_policy();
+    let spec = RolloutSpec::new(30, 0.95).expect("spec");
+    let tightening = deviation::tightening(&supremum(&system, 0.1, 30), 14.15, 14.44, &spec);
+    let region = Region::new_box(
+        system.states().map(|axis| axis.low),
+        system.states().map(|axis| axis.high),
+    );
+    let starts =
+        Starts::Drawn { region: region.expect("box"), stream: Stream::new(5, Purpose::User, 3) };
+    let states: Vec<[f32; 12]> = (0..200).map(|index| starts.start(index)).collect();
+    let backend = cpu(2);
+    let context = context(&backend, &system, &policy);
+    let margins = |band: f64| {
+        global::check_margins(context, &spec, &tightening, &states, Query::Measure, band)
+            .expect("margins")
+    };
+    let (plain, banded) = (margins(0.0), margins(1.0));
+    let mut changed = 0;
+    for ((x, plain), banded) in states.iter().zip(plain).zip(banded) {
+        if plain.abs() > 1.0 {
+            assert_eq!(plain, banded);
+            continue;
+        }
+        let truth = measure(context.plant, *x, &spec, &tightening) as f32;
+        assert_eq!(banded, truth);
+        changed += u32::from(banded != plain);
+    }
+    assert!(changed > 10, "only {changed} margins differ between f32 and f64");
+}
+
 /// Each certified start is inside the true set, with the whole ball around it; the certified share
 /// of the set grows to at least nine tenths as the ball shrinks.
 #[test]
@@ -255,7 +289,7 @@ fn certified_starts_are_inside_the_true_set() {
             let bound = supremum(&system, radius, 30);
             let tightening = deviation::tightening(&bound, 1.0, 1.0, &spec);
             let margins =
-                global::check_margins(context, &spec, &tightening, &starts, Query::Measure)
+                global::check_margins(context, &spec, &tightening, &starts, Query::Measure, 0.0)
                     .expect("margins");
             let certified = starts.iter().zip(margins).filter(|(_, m)| *m > 0.0);
             let mut count = 0;

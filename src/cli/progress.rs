@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::args::Global;
 use crate::error::{Error, Result};
@@ -63,11 +63,20 @@ impl Drop for Progress {
     }
 }
 
+/// Rollouts per second, whole.
+fn rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
+    // A bar that cannot be written to is no reason to stop the work.
+    let _ = write!(out, "{}/s", HumanCount(state.per_sec() as u64));
+}
+
 impl Watch for Progress {
     fn begin(&self, stage: &str, total: u64) {
-        let template = "{msg:28} [{bar:24}] {percent:>3} %  {per_sec}, {eta} left";
+        let template = "{msg:28} [{bar:24}] {percent:>3} %  {rate}, {eta} left";
         let style = ProgressStyle::with_template(template);
-        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ");
+        let style = style
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .with_key("rate", rate)
+            .progress_chars("=> ");
         self.with_bar(|bar| {
             bar.finish_and_clear();
             *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden())

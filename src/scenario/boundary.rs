@@ -117,7 +117,7 @@ where
     let rays = DIRECTIONS * (POINTS + BISECTIONS) as u64;
     context.watch.begin("boundary search", rays * SPREADS.len() as u64);
     let certified = |states: &[[f32; NX]]| -> Result<Vec<bool>> {
-        let margins = check_margins(context, &settings.spec, tightening, states, Query::Sign)?;
+        let margins = check_margins(context, &settings.spec, tightening, states, Query::Sign, 0.0)?;
         let inside =
             |x: &[f32; NX]| (0..NX).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
         Ok(states.iter().zip(margins).map(|(x, margin)| margin > 0.0 && inside(x)).collect())

@@ -67,10 +67,10 @@ where
     let tightening = tightening(&deviation.bound, &constants, &settings.spec);
     let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
     let global = global::conditional(context, settings, &tightening, purposes)?;
-    let slice = global::slice(context, settings, &tightening)?;
+    let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
-    let state = state(context, settings, &tightening, &growth)?;
+    let state = state(context, settings, &tightening, (&growth, global.band))?;
     let picture = picture(plant, settings, &growth);
     let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
     let mut statements: Vec<String> =
@@ -259,7 +259,7 @@ fn state<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
     settings: &Settings<NX>,
     tightening: &Tightening,
-    growth: &GrowthRecord,
+    (growth, band): (&GrowthRecord, f64),
 ) -> Result<StateRecord>
 where
     S: System<NX, NU>,
@@ -267,7 +267,7 @@ where
 {
     let x = settings.state;
     let query = Query::Measure;
-    let margins = global::check_margins(context, &settings.spec, tightening, &[x], query)?;
+    let margins = global::check_margins(context, &settings.spec, tightening, &[x], query, band)?;
     let check_margin = f64::from(margins[0]);
     let target_margin = f64::from(context.plant.system.target(x));
     let tier = super::verify::tier(target_margin, check_margin, growth, &x);

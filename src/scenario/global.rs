@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::policy::Policy;
 use crate::rollout::{
     DeviationTask, NON_FINITE, PairMeasure, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, Stream, Tightening, pair_measures,
+    RolloutSpec, Starts, Stream, Tightening, measure, pair_measures,
 };
 use crate::system::System;
 
@@ -22,13 +22,14 @@ const BAND_FACTOR: f64 = 8.0;
 /// The least band: rounding of a margin of order 10 in f32.
 const LEAST_BAND: f64 = 1e-5;
 
-/// `V_check` (or its sign) of each of `states`.
+/// `V_check` (or its sign) of each of `states`; a measure within `band` of zero is that of f64.
 pub fn check_margins<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
     spec: &RolloutSpec,
     tightening: &Tightening,
     states: &[[f32; NX]],
     query: Query,
+    band: f64,
 ) -> Result<Vec<f32>>
 where
     S: System<NX, NU>,
@@ -49,14 +50,24 @@ where
         margins.extend_from_slice(values);
         context.watch.advance(values.len() as u64)
     })?;
+    if query == Query::Measure {
+        let near = |margin: &&mut f32| f64::from(margin.abs()) <= band;
+        let pairs = margins.iter_mut().zip(states);
+        for (margin, start) in pairs.filter(|(margin, _)| near(margin)) {
+            // Rounding to f32 keeps the sign.
+            *margin = measure(context.plant, *start, spec, tightening) as f32;
+        }
+    }
     Ok(margins)
 }
 
-/// `V_check`, target and constraint margin over the slice through the state.
+/// `V_check`, target and constraint margin over the slice through the state; `band` as in
+/// [`check_margins`].
 pub fn slice<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
     settings: &Settings<NX>,
     tightening: &Tightening,
+    band: f64,
 ) -> Result<SliceRecord>
 where
     S: System<NX, NU>,
@@ -72,7 +83,14 @@ where
     Ok(SliceRecord {
         x: axis(0),
         y: axis(1),
-        check_margin: check_margins(context, &settings.spec, tightening, &states, Query::Measure)?,
+        check_margin: check_margins(
+            context,
+            &settings.spec,
+            tightening,
+            &states,
+            Query::Measure,
+            band,
+        )?,
         target_margin: states.iter().map(|x| system.target(*x)).collect(),
         constraint_margin: states.iter().map(|x| system.constraint(*x)).collect(),
     })

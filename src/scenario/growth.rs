@@ -210,11 +210,16 @@ where
         name: "growth".to_owned(),
         statement: format!(
             "With confidence 1 - {}, a start drawn from the verified ball of radius {:.4} reaches \
-             the target safely within {} steps with probability at least {}.",
+             the target safely within {} steps with probability at least {}{}.",
             asked.beta,
             ball.radius,
             settings.spec.horizon,
-            1.0 - asked.epsilon
+            1.0 - asked.epsilon,
+            if asked.split_beta || asked.rounds == 1 {
+                ""
+            } else {
+                " (as published: each round spends all of beta, which holds for one round only)"
+            }
         ),
         measure: format!(
             "start uniform in the Euclidean ball of radius {:.4} in {}",

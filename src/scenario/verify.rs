@@ -134,7 +134,14 @@ where
     let spec = RolloutSpec::new(record.horizon, record.gamma as f32)?;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
     let context = Context { backend, plant, watch: &Unwatched };
-    let margins = global::check_margins(context, &spec, &tightening, states, Query::Measure)?;
+    let margins = global::check_margins(
+        context,
+        &spec,
+        &tightening,
+        states,
+        Query::Measure,
+        record.global.band,
+    )?;
     let row = |(x, check_margin): (&[f32; NX], f32)| {
         let target_margin: f32 = plant.system.target(*x);
         let check = f64::from(check_margin);

@@ -25,17 +25,24 @@ pub(crate) fn cpu(threads: usize) -> Backend {
     Backend::Cpu(Cpu::new(Some(threads)).expect("threads start"))
 }
 
-/// Every backend of this machine: the CPU, and an adapter (software included) where one opens.
-pub(crate) fn backends() -> Vec<Backend> {
-    let mut all = vec![cpu(2)];
+/// An adapter, software included; where none opens this is said, and is a failure if
+/// `REACHCAST_REQUIRE_GPU` is 1.
+pub(crate) fn adapter() -> Option<Gpu> {
     match Gpu::open(&Choice::Any) {
-        Ok(gpu) => all.push(Backend::Gpu(gpu)),
+        Ok(gpu) => Some(gpu),
         Err(error) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
             panic!("REACHCAST_REQUIRE_GPU is 1: {error}")
         }
-        Err(_) => println!("SKIPPED: no adapter"),
+        Err(_) => {
+            println!("SKIPPED: no adapter");
+            None
+        }
     }
-    all
+}
+
+/// Every backend of this machine: the CPU, and an adapter where one opens.
+pub(crate) fn backends() -> Vec<Backend> {
+    std::iter::once(cpu(2)).chain(adapter().map(Backend::Gpu)).collect()
 }
 
 /// The trained race policy of the repository.
