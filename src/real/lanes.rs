@@ -27,39 +27,6 @@ pub(crate) use per_lane;
 #[repr(align(64))]
 pub struct Lanes<const N: usize>(pub [f32; N]);
 
-impl<const N: usize> Lanes<N> {
-    /// The first `N` numbers of `values`.
-    ///
-    /// # Panics
-    /// If there are fewer than `N`.
-    #[inline(always)]
-    pub fn load(values: &[f32]) -> Self {
-        let mut lanes = [0.0; N];
-        lanes.copy_from_slice(&values[..N]);
-        Self(lanes)
-    }
-
-    /// Writes the lanes to the first `N` places of `values`.
-    ///
-    /// # Panics
-    /// If there are fewer than `N`.
-    #[inline(always)]
-    pub fn store(self, values: &mut [f32]) {
-        values[..N].copy_from_slice(&self.0);
-    }
-
-    /// One bit pattern per lane that is 0 where the lane is finite, else not.
-    ///
-    /// Tests exponent bits: a compiler or driver may remove `x != x`.
-    #[inline(always)]
-    pub fn non_finite(self) -> [u32; N] {
-        per_lane!(N, i => u32::from(self.0[i].to_bits() & EXPONENT == EXPONENT))
-    }
-}
-
-/// Exponent bits of an f32: all set for infinities and NaN.
-const EXPONENT: u32 = 0x7f80_0000;
-
 macro_rules! lanewise {
     ($trait:ident, $method:ident, $op:tt) => {
         impl<const N: usize> $trait for Lanes<N> {

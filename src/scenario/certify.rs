@@ -59,7 +59,7 @@ where
 {
     let begun = Instant::now();
     let context = Context { backend, plant, watch };
-    let region = Region::new_box(settings.low, settings.high)?;
+    Region::new_box(settings.low, settings.high)?;
     growth::check_scenarios(&settings.growth)?;
     let ledger = ledger(settings)?;
     let constants = constants(plant.system, settings)?;
@@ -88,7 +88,6 @@ where
     for (axis, (low, high)) in states.iter_mut().zip(settings.low.into_iter().zip(settings.high)) {
         (axis.low, axis.high) = (low, high);
     }
-    debug_assert!(region.volume() > 0.0);
     Ok(Record {
         schema: SCHEMA,
         holds,
