@@ -10,6 +10,7 @@ pub mod cli;
 pub mod config;
 pub mod digest;
 pub mod error;
+pub mod experiment;
 pub mod files;
 pub mod policy;
 pub mod real;

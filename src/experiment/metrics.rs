@@ -1,0 +1,1 @@
+//! Metrics of a race in SI units.

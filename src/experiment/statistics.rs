@@ -1,0 +1,1 @@
+//! Comparison of controllers: intervals, and paired tests on the same starts.
