@@ -8,6 +8,7 @@
 pub mod backend;
 pub mod cli;
 pub mod config;
+pub mod cost;
 pub mod digest;
 pub mod error;
 pub mod experiment;

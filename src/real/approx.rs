@@ -78,6 +78,29 @@ pub(super) fn tanh<R: Real>(x: R) -> R {
     x * (polynomial(square, above) / polynomial(square, below))
 }
 
+/// Exponential of `x <= 0`, relative error below 3e-7 down to -87; 0 below that, for NaN too.
+///
+/// `x = n ln 2 + r` with `|r| <= ln 2 / 2`: a polynomial in `r`, then the power of two as a product
+/// of those that the binary digits of `-n` pick, which is exact.
+#[inline(always)]
+pub(super) fn exp_negative<R: Real>(x: R) -> R {
+    let (zero, least) = (R::lit(0.0), R::lit(-87.0));
+    let bounded = least.if_lt(x, x, least);
+    let halvings = -(bounded * R::lit(std::f32::consts::LOG2_E) + R::lit(0.5)).floor();
+    // ln 2 in two parts, the first exact in products with integers up to 2^8.
+    let rest = (bounded + halvings * R::lit(0.693_145_75)) + halvings * R::lit(1.428_606_8e-6);
+    let tail = polynomial(rest, [0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0]);
+    let mut value = R::lit(1.0) + (rest + rest * rest * tail);
+    let mut left = halvings;
+    for digit in [64.0, 32.0, 16.0, 8.0, 4.0, 2.0, 1.0] {
+        let below = left - R::lit(digit);
+        let halved = value * R::lit((-digit).exp2());
+        value = below.if_lt(zero, value, halved);
+        left = below.if_lt(zero, left, below);
+    }
+    least.if_lt(x, value, zero)
+}
+
 /// Natural logarithm of `u` in `[2^-24, 1]`.
 ///
 /// The exponent is found by comparisons and exact products with powers of two; the rest is
@@ -120,6 +143,9 @@ mod tests {
         assert!(worst(-1000.0, 1000.0, <f32 as Real>::cos, f64::cos) < 6e-7);
         assert!(worst(-12.0, 12.0, <f32 as Real>::tanh, f64::tanh) < 4e-7);
         assert!(worst(6e-8, 1.0, <f32 as Real>::ln_unit, f64::ln) < 1.2e-6);
+        let relative = |x: f32| (f64::from(x.exp_negative()) / f64::from(x).exp() - 1.0).abs();
+        let largest = (0..86_000).map(|i| relative(i as f32 * -1e-3)).fold(0.0, f64::max);
+        assert!(largest < 3e-7, "{largest}");
     }
 
     #[test]
@@ -130,5 +156,9 @@ mod tests {
         assert_eq!(<f32 as Real>::tanh(0.0), 0.0);
         assert!(<f32 as Real>::tanh(1e30) <= 1.0);
         assert!(<f32 as Real>::tanh(f32::NAN).is_nan());
+        assert_eq!(<f32 as Real>::exp_negative(0.0), 1.0);
+        for far in [-87.5, -1e30, f32::NEG_INFINITY, f32::NAN] {
+            assert_eq!(far.exp_negative(), 0.0, "{far}");
+        }
     }
 }

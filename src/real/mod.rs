@@ -84,6 +84,12 @@ pub trait Real:
         approx::tanh(self)
     }
 
+    /// Exponential of a number that is not positive; 0 below -87, where f32 has no normal numbers.
+    #[inline(always)]
+    fn exp_negative(self) -> Self {
+        approx::exp_negative(self)
+    }
+
     /// Natural logarithm of a number in `[2^-24, 1]`, the range of a uniform draw.
     #[inline(always)]
     fn ln_unit(self) -> Self {

@@ -58,6 +58,9 @@ impl Real for f64 {
     fn tanh(self) -> Self {
         f64::tanh(self)
     }
+    fn exp_negative(self) -> Self {
+        f64::exp(self)
+    }
     fn ln_unit(self) -> Self {
         f64::ln(self)
     }

@@ -37,6 +37,8 @@ pub enum Purpose {
     CheckPerturbation,
     /// The rollouts drawn in a report.
     Picture,
+    /// Control noise of MPPI.
+    ControlNoise,
 }
 
 /// A sequence of random samples, addressed by index.
@@ -97,7 +99,7 @@ impl Stream {
 
 /// Uniform numbers in `[0, 1)` from random words: the upper 23 bits become the mantissa.
 #[inline(always)]
-fn unit<const N: usize>(words: [u32; N]) -> Lanes<N> {
+pub(super) fn unit<const N: usize>(words: [u32; N]) -> Lanes<N> {
     Lanes(per_lane!(N, i => f32::from_bits(words[i] >> 9 | 0x3f80_0000) - 1.0))
 }
 

@@ -178,8 +178,19 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
         lanes: usize,
         u: &mut [[Lanes<N>; NU]],
     ) {
+        self.forward_some(x, lanes, u, NU);
+    }
+
+    /// The same for a network of `outputs` outputs, the first entries of `u`.
+    pub(super) fn forward_some<const N: usize, const NX: usize, const NU: usize>(
+        &mut self,
+        x: &[[Lanes<N>; NX]],
+        lanes: usize,
+        u: &mut [[Lanes<N>; NU]],
+        outputs: usize,
+    ) {
         for granule in 0..lanes.div_ceil(GRANULE) {
-            let (group, lane, at) = places::<K, N, NX>(granule);
+            let (group, lane, at) = places::<K, N>(granule, NX);
             for (feature, x) in x[group].iter().enumerate() {
                 self.inputs[at + feature * K::BLOCK..][..GRANULE]
                     .copy_from_slice(&x.0[lane..][..GRANULE]);
@@ -190,8 +201,8 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
             std::mem::swap(&mut self.inputs, &mut self.outputs);
         }
         for granule in 0..lanes.div_ceil(GRANULE) {
-            let (group, lane, at) = places::<K, N, NU>(granule);
-            for (feature, u) in u[group].iter_mut().enumerate() {
+            let (group, lane, at) = places::<K, N>(granule, outputs);
+            for (feature, u) in u[group].iter_mut().take(outputs).enumerate() {
                 u.0[lane..][..GRANULE]
                     .copy_from_slice(&self.inputs[at + feature * K::BLOCK..][..GRANULE]);
             }
@@ -199,10 +210,11 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
     }
 }
 
-/// Where a granule lies: its group, its first lane there, and its offset in `[blocks, F, BLOCK]`.
+/// Where a granule lies: its group, its first lane there, and its offset in
+/// `[blocks, features, BLOCK]`.
 #[inline(always)]
-fn places<K: Kernel, const N: usize, const F: usize>(granule: usize) -> (usize, usize, usize) {
+fn places<K: Kernel, const N: usize>(granule: usize, features: usize) -> (usize, usize, usize) {
     let first = granule * GRANULE;
-    let at = first / K::BLOCK * F * K::BLOCK + first % K::BLOCK;
+    let at = first / K::BLOCK * features * K::BLOCK + first % K::BLOCK;
     (first / N, first % N, at)
 }

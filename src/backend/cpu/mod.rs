@@ -8,6 +8,9 @@ mod kernel;
 mod kernel_x86;
 mod load;
 mod mlp;
+mod mppi;
+mod mppi_rollout;
+mod mppi_update;
 mod reach_avoid;
 mod schedule;
 #[cfg(test)]

@@ -14,9 +14,10 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::{MeasureSink, PairSink};
+use crate::cost::Cost;
 use crate::error::Result;
 use crate::policy::Policy;
-use crate::rollout::{DeviationTask, Farthest, Plant, ReachAvoidTask};
+use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, Plant, ReachAvoidTask};
 use crate::system::System;
 
 use buffer::Pool;
@@ -96,6 +97,20 @@ impl Gpu {
         P: Policy<NX, NU>,
     {
         deviation::deviation(self, plant, task, sink)
+    }
+
+    /// See [`super::Backend::mppi`].
+    pub(super) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
+        &self,
+        _system: &S,
+        _cost: &C,
+        _task: &MppiTask<'_, NX, NU, NC>,
+    ) -> Result<Vec<MppiResult<NU>>>
+    where
+        S: System<NX, NU>,
+        C: Cost<NX, NU, NC>,
+    {
+        Err(crate::Error::Device("MPPI on an adapter is being written".to_owned()))
     }
 }
 

@@ -1,0 +1,79 @@
+//! MPPI problems cut into units for the threads, merged in order.
+
+use rayon::prelude::*;
+
+use super::Cpu;
+use super::mlp::Packed;
+use super::mppi_rollout::MppiRollout;
+use crate::backend::softmin::Partial;
+use crate::cost::Cost;
+use crate::error::Result;
+use crate::policy::Mlp;
+use crate::rollout::{CostQuery, MppiResult, MppiTask};
+use crate::system::System;
+
+/// Samples of a unit: the softmin is merged unit by unit, so the bits depend on it. Half of the
+/// study's 500 samples, so that two threads share one problem.
+const UNIT: u32 = 256;
+
+impl Cpu {
+    /// See [`crate::backend::Backend::mppi`].
+    pub(in crate::backend) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
+        &self,
+        system: &S,
+        cost: &C,
+        task: &MppiTask<'_, NX, NU, NC>,
+    ) -> Result<Vec<MppiResult<NU>>>
+    where
+        S: System<NX, NU>,
+        C: Cost<NX, NU, NC>,
+    {
+        let pack = |network: &Mlp| Packed::new(network, self.instructions.rows());
+        let value = task.value.map(|value| pack(value.network));
+        let disturbance = task.disturbance.map(|disturbance| pack(disturbance.network));
+        let samples = task.spec.settings().samples;
+        let mut costs = match task.costs {
+            CostQuery::Summary => Vec::new(),
+            CostQuery::Each => vec![0.0; task.problems.len() * samples as usize],
+        };
+        let units = samples.div_ceil(UNIT);
+        let unit_of = |number: usize| {
+            let first = (number as u32 % units) * UNIT;
+            (number / units as usize, first..(first + UNIT).min(samples))
+        };
+        let count = task.problems.len() * units as usize;
+        let mut outs = cut(&mut costs, samples as usize, count);
+        let parts: Vec<Partial<NU>> = self.pool.install(|| {
+            let units = outs.par_iter_mut().enumerate().map(|(number, out)| {
+                let (problem, samples) = unit_of(number);
+                let networks = [value.as_ref(), disturbance.as_ref()];
+                let costs = out.take();
+                let unit = MppiRollout { system, cost, task, networks, problem, samples, costs };
+                self.instructions.run(unit)
+            });
+            units.collect()
+        });
+        drop(outs);
+        let merged = parts.chunks(units as usize).zip(task.problems).enumerate();
+        let results = merged.map(|(number, (parts, problem))| {
+            let settings = task.spec.settings();
+            let mut all = Partial::none(settings.horizon as usize);
+            parts.iter().for_each(|part| all.merge(part, settings.temperature));
+            let costs = match task.costs {
+                CostQuery::Summary => Vec::new(),
+                CostQuery::Each => costs[number * samples as usize..][..samples as usize].to_vec(),
+            };
+            all.finish(samples, &problem.plan, &settings.bounds, costs)
+        });
+        Ok(results.collect())
+    }
+}
+
+/// `costs` by units: `count` parts, none where no costs are wanted.
+fn cut(costs: &mut [f32], samples: usize, count: usize) -> Vec<Option<&mut [f32]>> {
+    if costs.is_empty() {
+        return (0..count).map(|_| None).collect();
+    }
+    let problems = costs.chunks_mut(samples);
+    problems.flat_map(|problem| problem.chunks_mut(UNIT as usize)).map(Some).collect()
+}

@@ -1,0 +1,34 @@
+//! Costs: what a plan pays at each stage, written once over `Real`.
+
+mod quadratic;
+mod race;
+
+pub use quadratic::{Obstacle, Quadratic};
+pub use race::{
+    CenterlineCost, Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    SafetyCone,
+};
+
+use crate::real::Real;
+
+/// The cost of one stage of a plan, `l(x_t, u_t, context_t)`.
+///
+/// Parameters are recorded as literals, like those of a system; what changes from problem to
+/// problem or from step to step comes through the `NC >= 1` numbers of the context. Mark the
+/// formula `#[inline(always)]`.
+pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {
+    /// The cost of the stage; lower is better.
+    fn stage<R: Real>(&self, x: [R; NX], u: [R; NU], context: [R; NC]) -> R;
+}
+
+/// `x^2`.
+#[inline(always)]
+fn square<R: Real>(x: R) -> R {
+    x * x
+}
+
+/// `max(0, x)^2`.
+#[inline(always)]
+fn hinge<R: Real>(x: R) -> R {
+    square(x.max(R::lit(0.0)))
+}
