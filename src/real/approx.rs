@@ -92,9 +92,18 @@ pub(super) fn exp_negative<R: Real>(x: R) -> R {
     let tail = polynomial(rest, [0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0]);
     let mut value = R::lit(1.0) + (rest + rest * rest * tail);
     let mut left = halvings;
-    for digit in [64.0, 32.0, 16.0, 8.0, 4.0, 2.0, 1.0] {
+    let (large, small) = (1.0 / 18_446_744_073_709_551_616.0, 1.0 / 4_294_967_296.0);
+    for (digit, power) in [
+        (64.0, large),
+        (32.0, small),
+        (16.0, 1.0 / 65_536.0),
+        (8.0, 1.0 / 256.0),
+        (4.0, 1.0 / 16.0),
+        (2.0, 0.25),
+        (1.0, 0.5),
+    ] {
         let below = left - R::lit(digit);
-        let halved = value * R::lit((-digit).exp2());
+        let halved = value * R::lit(power);
         value = below.if_lt(zero, value, halved);
         left = below.if_lt(zero, left, below);
     }
@@ -108,10 +117,11 @@ pub(super) fn exp_negative<R: Real>(x: R) -> R {
 #[inline(always)]
 pub(super) fn ln_unit<R: Real>(u: R) -> R {
     let (mut mantissa, mut exponent) = (u, R::lit(0.0));
-    for shift in [12, 6, 3, 2, 1] {
-        let small = R::lit((-shift as f32).exp2() * std::f32::consts::SQRT_2);
-        let scaled = mantissa * R::lit((shift as f32).exp2());
-        exponent = mantissa.if_lt(small, exponent - R::lit(shift as f32), exponent);
+    // Powers of two as literals: calls of `exp2` are not folded.
+    for (shift, power) in [(12.0, 4096.0), (6.0, 64.0), (3.0, 8.0), (2.0, 4.0), (1.0, 2.0)] {
+        let small = R::lit(std::f32::consts::SQRT_2 / power);
+        let scaled = mantissa * R::lit(power);
+        exponent = mantissa.if_lt(small, exponent - R::lit(shift), exponent);
         mantissa = mantissa.if_lt(small, scaled, mantissa);
     }
     let ratio = (mantissa - R::lit(1.0)) / (mantissa + R::lit(1.0));

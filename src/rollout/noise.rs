@@ -149,8 +149,8 @@ impl<const NU: usize> Noise<NU> {
         for (block, four) in normals[..self.room()].as_chunks_mut::<4>().0.iter_mut().enumerate() {
             let counter = [index, [iteration; N], [block as u32; N], [stream.id(); N]];
             let [a, b, c, d] = philox(counter, stream.key());
-            let [even, odd] = [[a, b], [c, d]]
-                .map(|[magnitude, turn]| normal_pair(one - unit(magnitude), unit(turn)));
+            let even = normal_pair(one - unit(a), unit(b));
+            let odd = normal_pair(one - unit(c), unit(d));
             *four = [even[0], even[1], odd[0], odd[1]];
             if self.antithetic {
                 for z in four {

@@ -71,23 +71,22 @@ impl<const N: usize, const NU: usize> Softmin<N, NU> {
             let excess = f64::from(smallest) - f64::from(least);
             *scale = (excess / f64::from(self.temperature)).exp() as f32;
         }
-        let weighed = |values: [f32; SHARES], power: i32| {
-            let terms = per_lane!(SHARES, i => values[i] * scale[i].powi(power));
-            f64::from(tree(terms))
-        };
+        let weighed =
+            |values: [f32; SHARES]| f64::from(tree(per_lane!(SHARES, i => values[i] * scale[i])));
         let horizon = self.sets[0].controls.len();
         let controls = (0..horizon).map(|t| {
-            std::array::from_fn(|i| weighed(gather(&self.sets, |sums| sums.controls[t][i].0), 1))
+            std::array::from_fn(|i| weighed(gather(&self.sets, |sums| sums.controls[t][i].0)))
         });
         let best = self.sets.iter().flat_map(|sums| sums.least.0.into_iter().zip(sums.best));
         let best = best.filter(|(cost, _)| *cost == smallest).map(|(_, best)| best).min();
         let non_finite = self.sets.iter().flat_map(|sums| sums.non_finite).sum();
-        let weight = weighed(all(|sums| sums.weight.0), 1);
+        let squares = all(|sums| sums.squares.0);
+        let weight = weighed(all(|sums| sums.weight.0));
         Partial {
             least: if weight > 0.0 { smallest } else { f32::INFINITY },
             best: best.filter(|best| *best != u32::MAX).unwrap_or(0),
             weight,
-            squares: weighed(all(|sums| sums.squares.0), 2),
+            squares: weighed(per_lane!(SHARES, i => squares[i] * scale[i])),
             cost: all(|sums| sums.cost.0).into_iter().map(f64::from).sum(),
             non_finite,
             controls: controls.collect(),

@@ -1,0 +1,114 @@
+//! MPPI: plans per second with and without the value network, on one thread and on all.
+
+use std::hint::black_box;
+use std::path::Path;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use reachcast::backend::Backend;
+use reachcast::backend::cpu::Cpu;
+use reachcast::cost::{
+    Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+};
+use reachcast::policy::Mlp;
+use reachcast::rollout::{
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Purpose, Sigma, Stream, ValueTerm,
+};
+use reachcast::system::DroneRace;
+
+/// Steps of a plan.
+const HORIZON: u32 = 20;
+
+fn problems(count: u32) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
+    let reference = RaceReference { speed: 0.7, ..RaceReference::default() };
+    let start = [0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.3, 0.0, -1.6, 0.4, 0.0, 0.0];
+    let problem = |number| MppiProblem {
+        start,
+        plan: vec![[0.0; 3]; HORIZON as usize],
+        context: vec![reference.context(); HORIZON as usize],
+        stream: Stream::new(1, Purpose::ControlNoise, number),
+    };
+    (0..count).map(problem).collect()
+}
+
+fn spec(samples: u32) -> MppiSpec<3> {
+    let settings = MppiSettings {
+        temperature: 10.0,
+        sigma: Sigma::PerControl([0.4; 3]),
+        ..MppiSettings::new(&DroneRace::default(), samples, HORIZON)
+    };
+    MppiSpec::new(settings).expect("settings")
+}
+
+fn lane() -> RaceCost {
+    RaceCost::Lane(LaneCost {
+        lane: 25e3,
+        speed: 2.0,
+        control: 0.001,
+        away: 5e4,
+        wide: 5e4,
+        last: 1e4,
+        safety: Safety::NONE,
+        fence: Fence::NONE,
+    })
+}
+
+fn recovery() -> RaceCost {
+    RaceCost::Recovery(RecoveryCost {
+        position: 5.0,
+        velocity: 1.0,
+        control: 0.1,
+        safety: Safety { weight: 5.0, ..Safety::NONE },
+        fence: Fence::NONE,
+    })
+}
+
+fn plain(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("mppi");
+    let system = DroneRace::default();
+    for threads in [Some(1), None] {
+        let backend = Backend::Cpu(Cpu::new(threads).expect("threads"));
+        for samples in [500, 1024, 16_384] {
+            let (spec, problems) = (spec(samples), problems(1));
+            let (value, disturbance, costs) = (None, None, CostQuery::Summary);
+            let task = MppiTask {
+                spec: &spec,
+                problems: &problems,
+                iteration: 0,
+                value,
+                disturbance,
+                costs,
+            };
+            let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
+            group.throughput(Throughput::Elements(u64::from(samples * HORIZON)));
+            group.bench_with_input(BenchmarkId::new(name, samples), &task, |bencher, task| {
+                bencher.iter(|| black_box(backend.mppi(&system, &lane(), task).expect("a plan")));
+            });
+        }
+    }
+    group.finish();
+}
+
+fn with_value(criterion: &mut Criterion) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let network =
+        Mlp::load(&root.join("configs/policies/race_value.safetensors")).expect("network");
+    let mut group = criterion.benchmark_group("mppi with value");
+    let system = DroneRace::default();
+    for (threads, count) in [(Some(1), 1), (None, 1), (None, 64)] {
+        let backend = Backend::Cpu(Cpu::new(threads).expect("threads"));
+        let (spec, problems) = (spec(500), problems(count));
+        let value = Some(ValueTerm { network: &network, weight: 1e6, threshold: -0.02 });
+        let (disturbance, costs) = (None, CostQuery::Summary);
+        let task =
+            MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
+        let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
+        group.throughput(Throughput::Elements(u64::from(500 * HORIZON * count)));
+        group.bench_with_input(BenchmarkId::new(name, count), &task, |bencher, task| {
+            bencher.iter(|| black_box(backend.mppi(&system, &recovery(), task).expect("plans")));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, plain, with_value);
+criterion_main!(benches);

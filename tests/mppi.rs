@@ -1,0 +1,574 @@
+//! MPPI against mathematics: closed forms, an f64 loop on the same noise, limits of the
+//! temperature, statistics of the noise.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+mod common;
+
+use common::cpu;
+use nalgebra::{DMatrix, DVector};
+use reachcast::backend::Backend;
+use reachcast::cost::{
+    Cost, Fence, LaneCost, Obstacle, Quadratic, RACE_CONTEXT, RaceCost, RaceReference,
+    RecoveryCost, Safety, SafetyCone,
+};
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::real::Real;
+use reachcast::rollout::{
+    CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
+    Purpose, Sigma, Stream, ValueTerm,
+};
+use reachcast::system::{Axis, DoubleIntegrator, DroneRace, System};
+
+/// A chain of two integrators without any bound that matters: linear, so that the optimum of a
+/// quadratic cost is known.
+struct Linear;
+
+impl System<2, 1> for Linear {
+    fn name(&self) -> &str {
+        "linear"
+    }
+    fn states(&self) -> [Axis; 2] {
+        ["position", "velocity"].map(|name| Axis::new(name, "", -10.0, 10.0))
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("force", "", -100.0, 100.0)]
+    }
+    fn step<R: Real>(&self, [x, v]: [R; 2], [u]: [R; 1]) -> [R; 2] {
+        [x + R::lit(0.25) * v, v + R::lit(0.25) * u]
+    }
+    fn target<R: Real>(&self, [x, _]: [R; 2]) -> R {
+        x
+    }
+    fn constraint<R: Real>(&self, [x, _]: [R; 2]) -> R {
+        x
+    }
+}
+
+const STEPS: usize = 8;
+const LAMBDA: f32 = 2.0;
+const SIGMA: f32 = 0.75;
+
+fn linear_cost() -> Quadratic<2, 1> {
+    Quadratic { state: [1.0, 0.25], control: [0.125], last: [2.0, 1.0], obstacle: None }
+}
+
+fn linear_problem(plan: Vec<[f32; 1]>, seed: u64) -> MppiProblem<2, 1, 3> {
+    let context = (0..STEPS).map(|t| [0.0, 0.0, f32::from(u8::from(t + 1 == STEPS))]);
+    MppiProblem {
+        start: [1.0, -0.5],
+        plan,
+        context: context.collect(),
+        stream: Stream::new(seed, Purpose::ControlNoise, 0),
+    }
+}
+
+fn linear_spec(samples: u32) -> MppiSpec<1> {
+    let settings = MppiSettings {
+        temperature: LAMBDA,
+        sigma: Sigma::PerControl([SIGMA]),
+        ..MppiSettings::new(&Linear, samples, STEPS as u32)
+    };
+    MppiSpec::new(settings).unwrap()
+}
+
+fn improve(backend: &Backend, samples: u32, plan: Vec<[f32; 1]>, seed: u64) -> MppiResult<1> {
+    let spec = linear_spec(samples);
+    let problems = [linear_problem(plan, seed)];
+    backend.mppi(&Linear, &linear_cost(), &task(&spec, &problems)).unwrap().remove(0)
+}
+
+fn task<'a, const NX: usize, const NU: usize, const NC: usize>(
+    spec: &'a MppiSpec<NU>,
+    problems: &'a [MppiProblem<NX, NU, NC>],
+) -> MppiTask<'a, NX, NU, NC> {
+    let (value, disturbance) = (None, None);
+    MppiTask { spec, problems, iteration: 0, value, disturbance, costs: CostQuery::Each }
+}
+
+/// `S(v) = v' M v + 2 b' v + c` of the linear problem, by evaluating it in f64.
+fn quadratic_form() -> (DMatrix<f64>, DVector<f64>) {
+    let value = |v: &DVector<f64>| {
+        let mut x = [1.0, -0.5];
+        let mut sum = 0.0;
+        for t in 0..STEPS {
+            let last = f64::from(u8::from(t + 1 == STEPS));
+            sum += linear_cost().stage::<f64>(x, [v[t]], [0.0, 0.0, last]);
+            x = Linear.step(x, [v[t]]);
+        }
+        sum
+    };
+    let unit = |i: usize| DVector::from_fn(STEPS, |j, _| f64::from(u8::from(i == j)));
+    let zero = value(&DVector::zeros(STEPS));
+    let matrix = DMatrix::from_fn(STEPS, STEPS, |i, j| {
+        let both = value(&(unit(i) + unit(j)));
+        0.5 * (both - value(&unit(i)) - value(&unit(j)) + zero)
+    });
+    let linear =
+        DVector::from_fn(STEPS, |i, _| 0.5 * (value(&unit(i)) - zero) - 0.5 * matrix[(i, i)]);
+    (matrix, linear)
+}
+
+/// The limit of one update for K to infinity: Gaussian noise weighted by `exp(-S / lambda)` is
+/// Gaussian again, its mean the minimiser of `S(v) / lambda + |v - U|^2 / (2 sigma^2)`.
+fn limit(plan: &DVector<f64>) -> DVector<f64> {
+    let (matrix, linear) = quadratic_form();
+    let (lambda, precision) = (f64::from(LAMBDA), 1.0 / f64::from(SIGMA).powi(2));
+    let left = matrix * (2.0 / lambda) + DMatrix::identity(STEPS, STEPS) * precision;
+    let right = plan * precision - linear * (2.0 / lambda);
+    left.lu().solve(&right).unwrap()
+}
+
+fn distance(plan: &[[f32; 1]], truth: &DVector<f64>) -> f64 {
+    plan.iter().zip(truth.iter()).map(|(u, v)| (f64::from(u[0]) - v).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The error of one update against its closed-form limit falls as one over the root of K.
+#[test]
+fn one_update_converges_to_its_closed_form_at_the_rate_of_monte_carlo() {
+    for backend in [cpu(2)] {
+        let truth = limit(&DVector::zeros(STEPS));
+        let error = |samples: u32| {
+            let square = |seed| {
+                distance(&improve(&backend, samples, vec![[0.0]; STEPS], seed).plan, &truth).powi(2)
+            };
+            ((0..24).map(square).sum::<f64>() / 24.0).sqrt()
+        };
+        let errors = [256, 4096, 65_536].map(error);
+        println!("{}: errors {errors:?}", backend.name());
+        // 16 times the samples: a quarter of the error, within the scatter of 24 seeds.
+        for pair in errors.windows(2) {
+            let ratio = pair[0] / pair[1];
+            assert!((2.8..5.7).contains(&ratio), "{errors:?}");
+        }
+        assert!(errors[2] < 0.08 * truth.norm(), "{errors:?} of {}", truth.norm());
+    }
+}
+
+/// Updates one after the other approach the optimum of the linear quadratic regulator.
+#[test]
+fn iterated_updates_approach_the_optimum_of_the_regulator() {
+    let (matrix, linear) = quadratic_form();
+    let optimum = matrix.lu().solve(&(-linear)).unwrap();
+    let backend = cpu(2);
+    let reach = |samples: u32| {
+        let mut plan = vec![[0.0]; STEPS];
+        let mut far = Vec::new();
+        for seed in 0..60 {
+            plan = improve(&backend, samples, plan, seed).plan;
+            if seed >= 50 {
+                far.push(distance(&plan, &optimum));
+            }
+        }
+        far.iter().sum::<f64>() / far.len() as f64
+    };
+    let [few, many] = [512, 32_768].map(reach);
+    println!("distance from the optimum of norm {}: {few}, {many}", optimum.norm());
+    assert!(many < 0.03 * optimum.norm());
+    assert!(few > 3.0 * many, "64 times the samples: about an eighth of the distance");
+}
+
+#[test]
+fn weights_sum_to_one_and_follow_the_temperature() {
+    for backend in [cpu(2)] {
+        let run = |temperature: f32| {
+            let settings =
+                MppiSettings { temperature, bounds: [[-1.0, 1.5]], ..*linear_spec(500).settings() };
+            let spec = MppiSpec::new(settings).unwrap();
+            let problems = [linear_problem(vec![[0.25]; STEPS], 3)];
+            let asked = task(&spec, &problems);
+            let result = backend.mppi(&Linear, &linear_cost(), &asked).unwrap().remove(0);
+            let samples: Vec<_> = (0..500).map(|k| asked.controls(0, k)).collect();
+            (result, samples)
+        };
+        let (middle, samples) = run(2.0);
+        let weights = middle.weights(2.0);
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        let squares: f64 = weights.iter().map(|w| w * w).sum();
+        assert!((middle.effective_samples * squares - 1.0).abs() < 1e-4);
+        for t in 0..STEPS {
+            let terms = samples.iter().zip(&weights).map(|(v, w)| f64::from(v[t][0]) * w);
+            assert!((terms.sum::<f64>() - f64::from(middle.plan[t][0])).abs() < 1e-5);
+        }
+        let least = middle.costs.iter().copied().fold(f32::INFINITY, f32::min);
+        assert_eq!((middle.least_cost, middle.costs[middle.best as usize]), (least, least));
+        let mean = middle.costs.iter().map(|cost| f64::from(*cost)).sum::<f64>() / 500.0;
+        assert!((middle.mean_cost / mean - 1.0).abs() < 1e-5);
+
+        let (cold, samples) = run(1e-9);
+        assert_eq!(cold.effective_samples, 1.0);
+        for (u, v) in cold.plan.iter().zip(&samples[cold.best as usize]) {
+            assert!((u[0] - v[0]).abs() < 1e-6, "the best sample");
+        }
+        let (hot, samples) = run(1e12);
+        assert!((hot.effective_samples - 500.0).abs() < 1e-3);
+        for t in 0..STEPS {
+            let mean = samples.iter().map(|v| f64::from(v[t][0])).sum::<f64>() / 500.0;
+            assert!((mean - f64::from(hot.plan[t][0])).abs() < 1e-5, "the mean");
+        }
+    }
+}
+
+fn network(inputs: usize, outputs: usize, scale: f32) -> Mlp {
+    let layer = |inputs: usize, outputs: usize, seed: usize| Layer {
+        weight: (0..inputs * outputs)
+            .map(|i| scale * (((i * 37 + seed * 11) % 41) as f32 / 20.0 - 1.0))
+            .collect(),
+        bias: (0..outputs).map(|i| 0.1 * (i as f32 - 0.5)).collect(),
+        inputs,
+        outputs,
+    };
+    let layers = vec![layer(inputs, 20, 1), layer(20, outputs, 2)];
+    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap()
+}
+
+/// The f64 cost of each sample, by a plain loop over its controls.
+fn f64_costs<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    system: &S,
+    cost: &C,
+    task: &MppiTask<'_, NX, NU, NC>,
+    problem: usize,
+) -> Vec<f64>
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let asked = &task.problems[problem];
+    let samples = task.spec.settings().samples;
+    let one = |sample: u32| {
+        let mut x = asked.start.map(f64::from);
+        let mut sum = 0.0;
+        for (t, v) in task.controls(problem, sample).iter().enumerate() {
+            let v = v.map(f64::from);
+            sum += cost.stage(x, v, asked.context[t].map(f64::from));
+            if let Some(penalty) = task.spec.penalty() {
+                for i in 0..NU {
+                    for j in 0..NU {
+                        sum += f64::from(asked.plan[t][j])
+                            * f64::from(penalty[j][i])
+                            * (v[i] - f64::from(asked.plan[t][i]));
+                    }
+                }
+            }
+            if let Some(value) = task.value {
+                let short = f64::from(value.threshold) - value.network.forward(&x)[0];
+                sum += f64::from(value.weight) * short.max(0.0).powi(2);
+            }
+            let push = task.disturbance.map(|d| (d.entries, d.network.forward(&x)));
+            x = system.step(x, v);
+            for (entries, push) in push {
+                for ((state, scale), push) in entries.iter().zip(push) {
+                    x[*state] += f64::from(*scale) * push;
+                }
+            }
+        }
+        sum
+    };
+    (0..samples).map(one).collect()
+}
+
+/// Compares a task with the f64 loop on every backend: the costs, and the plan that the f64 costs
+/// and the samples' controls make.
+fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    system: &S,
+    cost: &C,
+    task: &MppiTask<'_, NX, NU, NC>,
+) where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let (samples, temperature) = {
+        let settings = task.spec.settings();
+        (settings.samples, f64::from(settings.temperature))
+    };
+    for backend in [cpu(2)] {
+        let results = backend.mppi(system, cost, task).unwrap();
+        assert_eq!(results.len(), task.problems.len());
+        for (problem, result) in results.iter().enumerate() {
+            let truth = f64_costs(system, cost, task, problem);
+            // Terms of either sign cancel, so rounding is relative to the largest cost.
+            let scale = truth.iter().fold(1.0_f64, |largest, cost| largest.max(cost.abs()));
+            let error = |(cost, truth): (&f32, &f64)| (f64::from(*cost) - truth).abs() / scale;
+            let mut errors: Vec<f64> = result.costs.iter().zip(&truth).map(error).collect();
+            errors.sort_by(f64::total_cmp);
+            // The lane cost jumps where a drone is 0.15 m off: one sample may sit on the edge.
+            let worst = errors[errors.len().saturating_sub(2)];
+            assert!(worst < 2e-5, "{}, problem {problem}: costs off by {worst}", backend.name());
+            assert!(errors[errors.len() - 1] < 1e-2, "{}: {errors:?}", backend.name());
+            let least = truth.iter().copied().fold(f64::INFINITY, f64::min);
+            let weights: Vec<f64> =
+                truth.iter().map(|cost| (-(cost - least) / temperature).exp()).collect();
+            let sum: f64 = weights.iter().sum();
+            let mut mean = vec![[0.0_f64; NU]; result.plan.len()];
+            for sample in 0..samples {
+                for (mean, v) in mean.iter_mut().zip(task.controls(problem, sample)) {
+                    for i in 0..NU {
+                        mean[i] += weights[sample as usize] / sum * f64::from(v[i]);
+                    }
+                }
+            }
+            for (u, mean) in result.plan.iter().flatten().zip(mean.iter().flatten()) {
+                assert!((f64::from(*u) - mean).abs() < 2e-3, "{}: {u} {mean}", backend.name());
+            }
+        }
+    }
+}
+
+fn race_problems(horizon: usize) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
+    let start = |i: f32| {
+        [0.3 - 0.2 * i, 0.05, -1.2 - 0.1 * i, 0.6, 0.05, -0.02, -0.2, 0.0, -1.0, 0.4, 0.1, 0.0]
+    };
+    let context = |i: usize, t: usize| {
+        RaceReference {
+            position: [0.05 * i as f32, 0.1, -0.05],
+            velocity: [-0.1, 0.6 + 0.01 * t as f32, 0.0],
+            speed: 0.5 + 0.1 * i as f32,
+            last: t + 1 == horizon,
+        }
+        .context()
+    };
+    let plan = |i: usize| {
+        let step = |t: usize| [0.3 * i as f32 - 0.02 * t as f32, 0.2, -0.1];
+        (0..horizon).map(step).collect()
+    };
+    (0..3)
+        .map(|i| MppiProblem {
+            start: start(i as f32),
+            plan: plan(i),
+            context: (0..horizon).map(|t| context(i, t)).collect(),
+            stream: Stream::new(40 + i as u64, Purpose::ControlNoise, 7 * i as u32),
+        })
+        .collect()
+}
+
+fn race_costs() -> [RaceCost; 2] {
+    let safety = Safety { weight: 50.0, radius: 0.2, margin: 0.3, cone: SafetyCone::Either };
+    let fence = Fence { weight: 20.0, margin: 0.1 };
+    let recovery = RecoveryCost { position: 5.0, velocity: 1.0, control: 0.1, safety, fence };
+    let lane = LaneCost {
+        lane: 25.0,
+        speed: 2.0,
+        control: 0.001,
+        away: 50.0,
+        wide: 50.0,
+        last: 10.0,
+        safety,
+        fence,
+    };
+    [RaceCost::Recovery(recovery), RaceCost::Lane(lane)]
+}
+
+fn race_settings(samples: u32, horizon: u32) -> MppiSettings<3> {
+    MppiSettings {
+        temperature: 10.0,
+        sigma: Sigma::PerControl([0.4; 3]),
+        ..MppiSettings::new(&DroneRace::default(), samples, horizon)
+    }
+}
+
+#[test]
+fn costs_and_plans_agree_with_an_f64_loop() {
+    let system = DroneRace::default();
+    let kinds =
+        [NoiseKind::Independent, NoiseKind::Colored { time: 5.0 }, NoiseKind::Spline { knots: 5 }];
+    for (cost, noise) in race_costs().into_iter().cycle().zip(kinds) {
+        let settings = MppiSettings {
+            noise,
+            antithetic: noise != NoiseKind::Independent,
+            noise_cost: noise == NoiseKind::Independent,
+            sigma: Sigma::Covariance([[0.16, 0.05, 0.0], [0.05, 0.2, -0.02], [0.0, -0.02, 0.1]]),
+            ..race_settings(333, 20)
+        };
+        let spec = MppiSpec::new(settings).unwrap();
+        compare(&system, &cost, &task(&spec, &race_problems(20)));
+    }
+}
+
+#[test]
+fn networks_along_the_rollout_agree_with_an_f64_loop() {
+    let system = DroneRace::default();
+    let (value, push) = (network(12, 1, 0.3), network(12, 3, 0.3));
+    let spec = MppiSpec::new(race_settings(300, 12)).unwrap();
+    let problems = race_problems(12);
+    let entries = [(7, 0.05), (9, 0.04), (11, -0.03)];
+    let both = MppiTask {
+        value: Some(ValueTerm { network: &value, weight: 30.0, threshold: 0.4 }),
+        disturbance: Some(Disturbance { network: &push, entries: &entries }),
+        iteration: 3,
+        ..task(&spec, &problems)
+    };
+    for asked in [both, MppiTask { value: None, ..both }, MppiTask { disturbance: None, ..both }] {
+        for cost in race_costs() {
+            compare(&system, &cost, &asked);
+        }
+    }
+}
+
+#[test]
+fn small_and_long_problems() {
+    let system = DoubleIntegrator::default();
+    let obstacle = Obstacle { states: [0, 1], center: [0.3, 0.0], radius: 0.4, weight: 8.0 };
+    let cost = Quadratic {
+        state: [1.0, 0.1],
+        control: [0.01],
+        last: [5.0, 1.0],
+        obstacle: Some(obstacle),
+    };
+    for (samples, horizon) in [(1, 1), (1, 5), (7, 1), (65, 512), (257, 33)] {
+        let settings =
+            MppiSettings { temperature: 20.0, ..MppiSettings::new(&system, samples, horizon) };
+        let spec = MppiSpec::new(settings).unwrap();
+        let context = (0..horizon).map(|t| [0.1, 0.0, f32::from(u8::from(t + 1 == horizon))]);
+        let problem = MppiProblem {
+            start: [0.6, -0.1],
+            plan: vec![[0.1]; horizon as usize],
+            context: context.collect(),
+            stream: Stream::new(5, Purpose::ControlNoise, 1),
+        };
+        compare(&system, &cost, &task(&spec, &[problem]));
+    }
+}
+
+#[test]
+fn the_same_bits_on_any_number_of_threads() {
+    let system = DroneRace::default();
+    let value = network(12, 1, 0.3);
+    let spec = MppiSpec::new(race_settings(2000, 20)).unwrap();
+    let problems = race_problems(20);
+    let value = Some(ValueTerm { network: &value, weight: 30.0, threshold: 0.4 });
+    for asked in [task(&spec, &problems), MppiTask { value, ..task(&spec, &problems) }] {
+        let [one, two, five] =
+            [1, 2, 5].map(|threads| cpu(threads).mppi(&system, &race_costs()[0], &asked).unwrap());
+        assert!(one == two && one == five);
+        // And each problem by itself.
+        for (i, result) in one.iter().enumerate() {
+            let alone = MppiTask { problems: &problems[i..=i], ..asked };
+            assert_eq!(cpu(2).mppi(&system, &race_costs()[0], &alone).unwrap()[0], *result);
+        }
+    }
+}
+
+/// Costs that overflow weigh nothing; where all do, the plan stays and says so.
+#[test]
+fn costs_that_are_not_finite_weigh_nothing() {
+    let cost =
+        Quadratic::<2, 1> { state: [1e30; 2], control: [0.0], last: [1e30; 2], obstacle: None };
+    let spec = linear_spec(100);
+    let mut problems = [linear_problem(vec![[150.0]; STEPS], 1)];
+    problems[0].start = [1e12, 0.0];
+    for backend in [cpu(2)] {
+        let result = backend.mppi(&Linear, &cost, &task(&spec, &problems)).unwrap().remove(0);
+        assert_eq!((result.non_finite, result.effective_samples), (100, 0.0));
+        assert!(
+            result.least_cost == f32::INFINITY && result.costs.iter().all(|c| *c == f32::INFINITY)
+        );
+        assert_eq!(result.plan, vec![[100.0]; STEPS], "the nominal plan, clipped");
+    }
+}
+
+/// Mean, covariance and correlation of the noise, within 5 standard errors.
+#[test]
+fn the_noise_has_the_moments_that_were_asked_for() {
+    let covariance = [[0.16, 0.05, 0.0], [0.05, 0.2, -0.02], [0.0, -0.02, 0.1]];
+    let count = 20_000_u32;
+    for kind in
+        [NoiseKind::Independent, NoiseKind::Colored { time: 4.0 }, NoiseKind::Spline { knots: 6 }]
+    {
+        let settings = MppiSettings {
+            noise: kind,
+            sigma: Sigma::Covariance(covariance),
+            ..race_settings(count, 12)
+        };
+        let spec = MppiSpec::new(settings).unwrap();
+        let stream = Stream::new(9, Purpose::ControlNoise, 0);
+        let samples: Vec<_> = (0..count).map(|k| spec.noise().sample(stream, 0, k)).collect();
+        let moment = |s: usize, t: usize, i: usize, j: usize| {
+            let terms = samples.iter().map(|e| f64::from(e[s][i]) * f64::from(e[t][j]));
+            terms.sum::<f64>() / f64::from(count)
+        };
+        let slack = 5.0 * 0.2 * 2.0_f64.sqrt() / f64::from(count).sqrt();
+        for t in 0..12 {
+            for i in 0..3 {
+                let mean =
+                    samples.iter().map(|e| f64::from(e[t][i])).sum::<f64>() / f64::from(count);
+                assert!(mean.abs() < 5.0 * 0.45 / f64::from(count).sqrt(), "{kind:?} {mean}");
+                for j in 0..3 {
+                    let truth = f64::from(covariance[i][j]);
+                    assert!((moment(t, t, i, j) - truth).abs() < slack, "{kind:?} {t} {i} {j}");
+                }
+            }
+        }
+        let correlation = moment(3, 6, 1, 1) / 0.2;
+        let expected = match kind {
+            NoiseKind::Independent => 0.0..1e-9,
+            NoiseKind::Colored { .. } => {
+                let truth = (-0.75_f64).exp();
+                truth..truth + 1e-9
+            }
+            // Three steps are 1.4 knots: neighbours still share knots.
+            NoiseKind::Spline { .. } => 0.05..0.5,
+        };
+        let (low, high) = (expected.start - 5.0 / f64::from(count).sqrt(), expected.end + 0.036);
+        assert!((low..high).contains(&correlation), "{kind:?}: {correlation}");
+    }
+}
+
+#[test]
+fn antithetic_samples_mirror_each_other() {
+    let settings = MppiSettings { antithetic: true, ..race_settings(10, 6) };
+    let spec = MppiSpec::new(settings).unwrap();
+    let stream = Stream::new(9, Purpose::ControlNoise, 0);
+    for pair in 0..5 {
+        let [a, b] = [0, 1].map(|i| spec.noise().sample(stream, 0, 2 * pair + i));
+        assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| *a == -*b && *a != 0.0));
+    }
+    assert_ne!(spec.noise().sample(stream, 0, 0), spec.noise().sample(stream, 1, 0), "iteration");
+}
+
+#[test]
+fn what_cannot_be_is_refused_by_name() {
+    let good = race_settings(10, 5);
+    let sigma = |sigma| MppiSettings { sigma, ..good };
+    let noise = |noise| MppiSettings { noise, ..good };
+    let cases = [
+        ("samples", MppiSettings { samples: 0, ..good }),
+        ("samples", MppiSettings { samples: 1_000_001, ..good }),
+        ("horizon", MppiSettings { horizon: 0, ..good }),
+        ("horizon", MppiSettings { horizon: 513, ..good }),
+        ("temperature", MppiSettings { temperature: 0.0, ..good }),
+        ("temperature", MppiSettings { temperature: f32::NAN, ..good }),
+        ("sigma", sigma(Sigma::PerControl([0.4, -0.1, 0.4]))),
+        ("sigma", sigma(Sigma::Covariance([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))),
+        ("sigma", sigma(Sigma::Covariance([[1.0, 0.5, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]]))),
+        ("bounds", MppiSettings { bounds: [[-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]], ..good }),
+        ("noise.time", noise(NoiseKind::Colored { time: 0.0 })),
+        ("noise.knots", noise(NoiseKind::Spline { knots: 6 })),
+        ("noise.knots", noise(NoiseKind::Spline { knots: 0 })),
+        ("noise_cost", MppiSettings { noise_cost: true, ..noise(NoiseKind::Spline { knots: 3 }) }),
+        (
+            "noise_cost",
+            MppiSettings { noise_cost: true, ..sigma(Sigma::PerControl([0.4, 0.0, 0.4])) },
+        ),
+    ];
+    for (name, settings) in cases {
+        let text = MppiSpec::new(settings).expect_err(name).to_string();
+        assert!(text.contains(name), "{name}: {text}");
+    }
+    let spec = MppiSpec::new(good).unwrap();
+    let refused = |change: &dyn Fn(&mut MppiProblem<12, 3, RACE_CONTEXT>)| {
+        let mut problems = race_problems(5);
+        change(&mut problems[1]);
+        let result = cpu(1).mppi(&DroneRace::default(), &race_costs()[0], &task(&spec, &problems));
+        result.expect_err("refused").to_string()
+    };
+    assert!(refused(&|problem| drop(problem.plan.pop())).contains("problem 1 has 4 steps"));
+    assert!(refused(&|problem| problem.context.clear()).contains("problem 1 has 0 steps"));
+    assert!(refused(&|problem| problem.start[3] = f32::NAN).contains("not finite"));
+    let wrong = network(12, 2, 0.1);
+    let problems = race_problems(5);
+    let value = Some(ValueTerm { network: &wrong, weight: 1.0, threshold: 0.0 });
+    let asked = MppiTask { value, ..task(&spec, &problems) };
+    let text =
+        cpu(1).mppi(&DroneRace::default(), &race_costs()[0], &asked).expect_err("two outputs");
+    assert!(text.to_string().contains("value network"), "{text}");
+}
