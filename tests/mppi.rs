@@ -316,7 +316,20 @@ fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
 
 fn race_problems(horizon: usize) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
     let start = |i: f32| {
-        [0.3 - 0.2 * i, 0.05, -1.2 - 0.1 * i, 0.6, 0.05, -0.02, -0.2, 0.0, -1.0, 0.4, 0.1, 0.0]
+        [
+            0.3117 - 0.2 * i,
+            0.0531,
+            -1.2 - 0.1 * i,
+            0.6,
+            0.0517,
+            -0.0213,
+            -0.2,
+            0.0,
+            -1.0,
+            0.4,
+            0.1,
+            0.0,
+        ]
     };
     let context = |i: usize, t: usize| {
         RaceReference {
