@@ -91,10 +91,11 @@ impl FailureClass {
 /// * At the crossing sample `|x_e| <= 0.3`, `|z_e| <= 0.3` and `y_e > y_o`, under every judge.
 ///
 /// The first sample with a violation decides; of several at one sample, the first in the order of
-/// [`FailureClass`]. Any violation at the first sample is `UnsafeStart`. So is a start at or past
-/// the plane: the ego can no longer cross it. A race that ends before the plane is `Overtaken`
-/// where the opponent reached it, which `Study` does not count before the end, else `Timeout`;
-/// so is a race without samples.
+/// [`FailureClass`]. Any violation at the first sample is `UnsafeStart`, and so is a start at or
+/// past the plane, which the ego can no longer cross. A race that ends short of the plane is
+/// `Overtaken` where the opponent reached it, else `Timeout`, as is a race without samples.
+/// `Study` asks for the order of the two at the crossing sample only: there it may still win
+/// against an opponent that was on the plane before.
 pub fn verdict(judge: Judge, states: &[[f32; 12]]) -> Option<FailureClass> {
     let mut opponent_through = false;
     for (t, state) in states.iter().enumerate() {

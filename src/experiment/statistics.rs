@@ -43,7 +43,8 @@ pub fn mcnemar(only_this: u64, only_other: u64) -> f64 {
 /// If there is no race, or the two did not run the same starts.
 pub fn paired(this: &Verdicts, other: &Verdicts) -> PairedRecord {
     let starts = this[0].len();
-    assert!(this.iter().chain(other).all(|seed| seed.len() == starts), "starts are the same");
+    let same = this.iter().chain(other).all(|seed| seed.len() == starts);
+    assert!(starts > 0 && same, "races were run, and from the same starts");
     let [this_rates, other_rates] = [this, other].map(rates_by_start);
     let differences: Vec<f64> = this_rates.iter().zip(other_rates).map(|(a, b)| a - b).collect();
     let difference = mean(&differences);

@@ -303,6 +303,7 @@ mod tests {
             with_entry("x.npy", &content).unwrap_err().to_string()
         };
         assert!(problem("<f4", &[3], 8).contains("2 elements do not fill the shape [3]"));
+        assert!(problem("<f4", &[1], 8).contains("2 elements do not fill the shape [1]"));
         assert!(problem("<f4", &[2], 7).contains("7 bytes are no array of type `<f4`"));
         assert!(problem(">f4", &[2], 8).contains("`>f4`"));
         assert!(problem("<f4", &[1 << 40, 1 << 40], 8).contains("do not fill"));
