@@ -2,12 +2,14 @@
 //! that they support.
 //!
 //! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
-//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`]; [`report`]; the command line.
+//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`experiment`]; [`report`]; the
+//! command line.
 //! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
 
 pub mod backend;
 pub mod cli;
 pub mod config;
+pub mod control;
 pub mod cost;
 pub mod digest;
 pub mod error;

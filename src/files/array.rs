@@ -1,6 +1,6 @@
 //! Arrays as .npy files: the header, read strictly and written, and measures as they come.
 
-use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -13,8 +13,11 @@ const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest header that is read, bytes: NumPy's own limit, since a damaged length must not decide
 /// how much memory is taken.
 const LONGEST_HEADER: usize = 10_000;
-/// Length of the headers that are written, bytes: room for any shape, and a multiple of 64.
+/// Length of the headers that are written, bytes: room for any usual shape, a multiple of 64.
 const WRITTEN_HEADER: usize = 128;
+
+/// Type of the elements of measures and pictures.
+const F32: &str = "<f4";
 
 /// What a .npy file says about its array.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,7 +32,7 @@ pub(super) struct NpyHeader {
 
 impl NpyHeader {
     /// Reads the header and leaves `file` at the first element.
-    pub(super) fn read(file: &mut BufReader<std::fs::File>) -> std::result::Result<Self, String> {
+    pub(super) fn read(file: &mut impl Read) -> std::result::Result<Self, String> {
         let whole = |e: std::io::Error| format!("not a whole .npy file ({e})");
         let mut fixed = [0; 8];
         file.read_exact(&mut fixed).map_err(whole)?;
@@ -75,15 +78,17 @@ impl NpyHeader {
     }
 }
 
-/// The header of an f32 array of this shape, [`WRITTEN_HEADER`] bytes.
-fn header(shape: &[u64]) -> Vec<u8> {
+/// The header of an array of this type and shape, [`WRITTEN_HEADER`] bytes or, for many
+/// dimensions, a multiple of them.
+pub(super) fn header(descr: &str, shape: &[u64]) -> Vec<u8> {
     let lengths: String = shape.iter().map(|length| format!("{length},")).collect();
-    let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({lengths}), }}");
+    let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({lengths}), }}");
+    let length = (text.len() + 11).next_multiple_of(WRITTEN_HEADER);
     let mut bytes = MAGIC.to_vec();
     bytes.extend([1, 0]);
-    bytes.extend(((WRITTEN_HEADER - 10) as u16).to_le_bytes());
+    bytes.extend(((length - 10) as u16).to_le_bytes());
     bytes.extend(text.as_bytes());
-    bytes.resize(WRITTEN_HEADER - 1, b' ');
+    bytes.resize(length - 1, b' ');
     bytes.push(b'\n');
     bytes
 }
@@ -91,7 +96,7 @@ fn header(shape: &[u64]) -> Vec<u8> {
 /// The bytes of a .npy file with the f32 `values`, row by row, in the shape `[rows, columns]`.
 pub fn npy_bytes(values: &[f32], [rows, columns]: [usize; 2]) -> Vec<u8> {
     debug_assert_eq!(values.len(), rows * columns);
-    let mut bytes = header(&[rows as u64, columns as u64]);
+    let mut bytes = header(F32, &[rows as u64, columns as u64]);
     bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     bytes
 }
@@ -115,7 +120,7 @@ impl MeasureWriter {
         let mut file = BufWriter::new(temporary(folder_of(path))?);
         // The number of measures is known at the end only.
         let begun = match format {
-            Format::Npy => file.write_all(&header(&[0])),
+            Format::Npy => file.write_all(&header(F32, &[0])),
             Format::Csv => writeln!(file, "measure"),
         };
         let path = path.to_owned();
@@ -149,7 +154,7 @@ impl MeasureWriter {
         let mut complete = || {
             if format == Format::Npy {
                 file.seek(SeekFrom::Start(0))?;
-                file.write_all(&header(&[count]))?;
+                file.write_all(&header(F32, &[count]))?;
             }
             file.flush()?;
             file.get_ref().as_file().sync_all()

@@ -1,9 +1,11 @@
 //! Files: results that appear whole or not at all, and states and measures as arrays.
 
 mod array;
+mod npz;
 mod states;
 
 pub use array::{MeasureWriter, npy_bytes};
+pub use npz::{Array, Data, npz_bytes, read_npz};
 pub use states::StateReader;
 
 use std::io::Write;

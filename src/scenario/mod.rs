@@ -12,7 +12,7 @@ pub mod linear;
 pub mod lipschitz;
 pub mod record;
 pub mod settings;
-mod tail;
+pub(crate) mod tail;
 mod verify;
 
 pub use certify::{certify, hashes};

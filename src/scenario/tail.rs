@@ -27,7 +27,7 @@ pub(super) fn ln_term(k: f64, n: f64, p: f64) -> f64 {
 }
 
 /// `ln P(X <= k)`.
-pub(super) fn ln_at_most(k: f64, n: f64, p: f64) -> f64 {
+pub(crate) fn ln_at_most(k: f64, n: f64, p: f64) -> f64 {
     if k >= n || p <= 0.0 {
         0.0
     } else if p >= 1.0 {

@@ -7,12 +7,8 @@ use crate::real::Real;
 const DT: f32 = 0.1;
 /// Factor on both margins, from the published study.
 const MARGIN_SCALE: f32 = 10.0;
-/// Half width of the gate, metres.
-const GATE: f32 = 0.3;
 /// Offset of the fences that lead to the gate, metres.
 const FENCE: f32 = 0.05;
-/// Radius of the cone around the opponent at equal height, metres (`distance` form).
-const CONE: f32 = 0.2;
 /// Slowest admissible opponent speed toward the gate that its feedback holds, m/s.
 const OPPONENT_SPEED: f32 = 0.3;
 /// Feedback gains of the opponent: position across the gate, velocity across, velocity along.
@@ -53,12 +49,18 @@ impl Default for DroneRace {
 }
 
 impl DroneRace {
-    /// Margin to the collision cone, metres (square metres in the squared form).
+    /// Half width of the gate, metres.
+    pub const GATE: f32 = 0.3;
+    /// Radius of the cone around the opponent at equal height, metres (`distance` form).
+    pub const CONE: f32 = 0.2;
+
+    /// Margin to the collision cone, metres (square metres in the squared form): a part of the
+    /// constraint margin, before the factor on it.
     #[inline(always)]
-    fn cone_margin<R: Real>(&self, x: [R; 12]) -> R {
+    pub fn cone_margin<R: Real>(&self, x: [R; 12]) -> R {
         let [ego_x, _, ego_y, _, ego_z, _, opp_x, _, opp_y, _, opp_z, _] = x;
         let (dx, dy) = (ego_x - opp_x, ego_y - opp_y);
-        let radius = R::lit(CONE) * (R::lit(1.0) + (opp_z - ego_z).max(R::lit(0.0)));
+        let radius = R::lit(Self::CONE) * (R::lit(1.0) + (opp_z - ego_z).max(R::lit(0.0)));
         match self.cone {
             Cone::Distance => dx.hypot(dy) - radius,
             Cone::Squared => dx * dx + dy * dy - radius,
@@ -131,7 +133,7 @@ impl System<12, 3> for DroneRace {
     #[inline(always)]
     fn target<R: Real>(&self, x: [R; 12]) -> R {
         let [ego_x, _, ego_y, ego_vy, ego_z, _, _, _, opp_y, opp_vy, _, _] = x;
-        let gate = R::lit(GATE);
+        let gate = R::lit(Self::GATE);
         let ahead = (ego_y - opp_y).min(ego_vy - opp_vy);
         let across = (ego_x + gate).min(gate - ego_x);
         let height = (ego_z + gate).min(gate - ego_z);
