@@ -1,6 +1,6 @@
 //! Boundary search: the point of the certified set's boundary that is closest to a state.
 
-use super::global::{check_margins, slice_states};
+use super::global::{check_margins, slice_through};
 use super::record::SliceRecord;
 use super::settings::Settings;
 use super::{Context, settings::BoundarySearch};
@@ -44,19 +44,28 @@ where
     P: Policy<NX, NU>,
 {
     match settings.growth.boundary {
-        BoundarySearch::Slice => Ok(on_slice(settings, slice)),
+        BoundarySearch::Slice => {
+            let certified: Vec<bool> = slice.check_margin.iter().map(|v| *v > 0.0).collect();
+            Ok(on_slice(settings, &settings.state, &certified))
+        }
         BoundarySearch::Rays => along_rays(context, settings, tightening),
     }
 }
 
 /// The study's choice: a certified cell with an uncertified neighbour (of eight; the rim of the
 /// slice counts as uncertified), cells ahead of the velocity preferred, then the nearest.
-fn on_slice<const NX: usize>(settings: &Settings<NX>, slice: &SliceRecord) -> Option<Boundary<NX>> {
-    let (rows, columns) = (slice.y.values.len(), slice.x.values.len());
+///
+/// `certified` says it of each cell of the slice through `state`, row by row.
+pub(crate) fn on_slice<const NX: usize>(
+    settings: &Settings<NX>,
+    state: &[f32; NX],
+    certified: &[bool],
+) -> Option<Boundary<NX>> {
+    let [columns, rows] = [0, 1].map(|axis| settings.slice[axis].values.len());
     let certified = |row: usize, column: usize| {
-        row < rows && column < columns && slice.check_margin[row * columns + column] > 0.0
+        row < rows && column < columns && certified[row * columns + column]
     };
-    let states = slice_states(settings);
+    let states = slice_through(settings, state);
     let mut cells = Vec::new();
     for row in 0..rows {
         for column in 0..columns {
@@ -68,16 +77,16 @@ fn on_slice<const NX: usize>(settings: &Settings<NX>, slice: &SliceRecord) -> Op
             }
         }
     }
-    nearest(settings, cells)
+    nearest(settings.growth.heading, state, cells)
 }
 
 /// The nearest of `cells`, of those ahead of the velocity if there are any.
 fn nearest<const NX: usize>(
-    settings: &Settings<NX>,
+    heading: Option<[usize; 4]>,
+    state: &[f32; NX],
     mut cells: Vec<[f32; NX]>,
 ) -> Option<Boundary<NX>> {
-    let state = settings.state;
-    if let Some([x, vx, y, vy]) = settings.growth.heading {
+    if let Some([x, vx, y, vy]) = heading {
         let speed = f64::from(state[vx]).hypot(f64::from(state[vy]));
         let ahead = |cell: &[f32; NX], least_cosine: f64| {
             let (dx, dy) = (f64::from(cell[x] - state[x]), f64::from(cell[y] - state[y]));
@@ -91,7 +100,7 @@ fn nearest<const NX: usize>(
         }
     }
     let measured =
-        cells.into_iter().map(|point| Boundary { point, distance: distance(&point, &state) });
+        cells.into_iter().map(|point| Boundary { point, distance: distance(&point, state) });
     measured.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 

@@ -5,8 +5,8 @@ use std::time::Instant;
 use super::boundary;
 use super::ledger::{Entry, Ledger, Spend};
 use super::record::{
-    ConstantRecord, ConstantsRecord, GrowthOutcome, GrowthRecord, PictureRecord, Provenance,
-    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
+    ConstantRecord, ConstantsRecord, DeviationRecord, GrowthOutcome, GrowthRecord, PictureRecord,
+    Provenance, Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
 };
 use super::settings::Settings;
 use super::{Context, Watch, deviation, global, growth, lipschitz};
@@ -59,12 +59,9 @@ where
 {
     let begun = Instant::now();
     let context = Context { backend, plant, watch };
-    Region::new_box(settings.low, settings.high)?;
     growth::check_scenarios(&settings.growth)?;
     let ledger = ledger(settings)?;
-    let constants = constants(plant.system, settings)?;
-    let deviation = deviation::bound(context, settings)?;
-    let tightening = tightening(&deviation.bound, &constants, &settings.spec);
+    let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
     let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
     let global = global::conditional(context, settings, &tightening, purposes)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
@@ -121,6 +118,36 @@ pub(super) fn tightening(
     spec: &RolloutSpec,
 ) -> Tightening {
     deviation::tightening(bound, constants.target.used, constants.constraint.used, spec)
+}
+
+/// Constants and deviation bound that `settings` ask for, and what they take off the margins.
+///
+/// # Errors
+/// [`Error::TooFewScenarios`] and [`Error::Invalid`] before any work; those of the backend.
+pub fn tightened<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+) -> Result<Tightened>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    Region::new_box(settings.low, settings.high)?;
+    let constants = constants(context.plant.system, settings)?;
+    let deviation = deviation::bound(context, settings)?;
+    let losses = tightening(&deviation.bound, &constants, &settings.spec);
+    Ok(Tightened { constants, deviation, losses })
+}
+
+/// What V_check is computed with.
+#[derive(Clone, Debug)]
+pub struct Tightened {
+    /// Lipschitz constants.
+    pub constants: ConstantsRecord,
+    /// Deviation bound.
+    pub deviation: DeviationRecord,
+    /// What the margins lose.
+    pub losses: Tightening,
 }
 
 /// The Lipschitz constants, computed, sampled, and used as `settings` ask.

@@ -73,7 +73,7 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let states = slice_states(settings);
+    let states = slice_through(settings, &settings.state);
     context.watch.begin("slice", states.len() as u64);
     let system = context.plant.system;
     let axis = |i: usize| SliceAxisRecord {
@@ -96,11 +96,14 @@ where
     })
 }
 
-/// The states of the slice, row by row.
-pub(super) fn slice_states<const NX: usize>(settings: &Settings<NX>) -> Vec<[f32; NX]> {
+/// The cells of the slice through `state`, row by row.
+pub(crate) fn slice_through<const NX: usize>(
+    settings: &Settings<NX>,
+    state: &[f32; NX],
+) -> Vec<[f32; NX]> {
     let [across, along] = &settings.slice;
     let cell = |y: f32, x: f32| {
-        let mut state = settings.state;
+        let mut state = *state;
         state[across.state] = x;
         state[along.state] = y;
         state
@@ -138,7 +141,7 @@ where
     };
     context.watch.begin("certified set", draws);
     let f32_error = f32_error(context, &task)?;
-    let mut count = Count::new(BAND_FACTOR * f32_error);
+    let mut count = Count::new(band_of(f32_error));
     context.backend.deviation(context.plant, &task, &mut |first, pairs| {
         count.add(context.plant, &task, first, pairs);
         context.watch.advance(pairs.len() as u64)
@@ -199,7 +202,6 @@ struct Count {
 
 impl Count {
     fn new(band: f64) -> Self {
-        let band = band.max(LEAST_BAND);
         Self { band, accepted: 0, failures: 0, reached: 0, non_finite: 0, f64_reruns: 0 }
     }
 
@@ -242,6 +244,41 @@ where
 {
     let pair = task.pairs.load::<1>(index).map(|start| start.map(|lane| lane.0[0]));
     pair_measures(plant, pair, &task.spec, task.tightening, task.control)
+}
+
+/// The band around zero that a measured f32 error asks for.
+fn band_of(f32_error: f64) -> f64 {
+    (BAND_FACTOR * f32_error).max(LEAST_BAND)
+}
+
+/// The band around zero within which measures are run again in f64, from the f32 error measured
+/// on pairs drawn from the box.
+pub fn band<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+    tightening: &Tightening,
+) -> Result<f64>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
+    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
+    let task = DeviationTask {
+        pairs: Pairs {
+            nominal: Starts::Drawn {
+                region: Region::new_box(settings.low, settings.high)?,
+                stream: nominal,
+            },
+            radius: settings.deviation.radius,
+            stream: perturbation,
+        },
+        range: 0..ERROR_SAMPLE,
+        spec: settings.spec,
+        tightening,
+        control: settings.deviation.control,
+    };
+    Ok(band_of(f32_error(context, &task)?))
 }
 
 /// The largest distance of an f32 measure from f64 over the first pairs, those that are finite.

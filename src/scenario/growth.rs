@@ -71,14 +71,25 @@ where
         rounds.push(round.record);
         match nearest {
             None => return Ok((Growth::Verified(ball), rounds, samples)),
-            Some(distance) if number + 1 < asked.rounds && distance as f32 > 0.0 => {
-                // Rounded down: the failure itself stays outside.
-                ball.radius = (distance as f32).next_down();
-            }
-            Some(_) => break,
+            Some(distance) => match next_radius(asked, number, distance) {
+                Some(radius) => ball.radius = radius,
+                None => break,
+            },
         }
     }
     Ok((Growth::Exhausted { last_radius: ball.radius }, rounds, samples))
+}
+
+/// The radius of the round after `number`, whose nearest failure was that far; none after the
+/// last round, and where nothing is left.
+pub(super) fn next_radius<const NX: usize>(
+    asked: &GrowthSettings<NX>,
+    number: u32,
+    nearest: f64,
+) -> Option<f32> {
+    // Rounded down: the failure itself stays outside.
+    let next = (nearest as f32 > 0.0).then(|| (nearest as f32).next_down());
+    next.filter(|_| number + 1 < asked.rounds)
 }
 
 /// Refuses fewer starts than one clean round needs.

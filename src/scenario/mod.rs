@@ -7,6 +7,7 @@ mod compare;
 pub mod deviation;
 pub mod global;
 pub mod growth;
+pub mod growth_batch;
 pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
@@ -15,7 +16,7 @@ pub mod settings;
 pub(crate) mod tail;
 mod verify;
 
-pub use certify::{certify, hashes};
+pub use certify::{Tightened, certify, hashes, tightened};
 pub use verify::{CheckReport, Finding, QueryRow, check, query};
 
 use crate::backend::Backend;

@@ -1,0 +1,248 @@
+//! The tier of many states at once: certificates that are made while the plant moves.
+
+use crate::backend::Backend;
+use crate::error::Result;
+use crate::policy::Policy;
+use crate::rollout::{Ball, Plant, Query};
+use crate::scenario::boundary::on_slice;
+use crate::scenario::global::{band, check_margins, slice_through};
+use crate::scenario::growth::Growth;
+use crate::scenario::growth_batch::{Request, grow_each};
+use crate::scenario::ledger::{Entry, Ledger, Spend};
+use crate::scenario::settings::Settings;
+use crate::scenario::{Context, Tightened, Unwatched, tightened};
+use crate::system::System;
+
+/// Who controls at a state, section 6 of `docs/method.md` and Algorithm 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tier {
+    /// Tier 0, in the target: the fast controller.
+    Target,
+    /// Tier 1, in the certified set: the policy.
+    Global,
+    /// Tier 2, in the locally verified ball: the policy.
+    Local,
+    /// Tier 3, elsewhere: recovery.
+    Recovery,
+}
+
+impl Tier {
+    /// Its number, 0 to 3.
+    pub fn number(self) -> u8 {
+        self as u8
+    }
+}
+
+/// Which certificates are asked for; without one its tier is empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Tier 1: the certified set.
+    pub global: bool,
+    /// Tier 2: local growth.
+    pub local: bool,
+}
+
+/// What the certificates say of a state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing<const NX: usize> {
+    /// Tier 1, 2 or 3.
+    pub tier: Tier,
+    /// `V_check`.
+    pub check_margin: f32,
+    /// The certified cells of the slice through the state, row by row; empty if it was not needed.
+    pub certified: Vec<bool>,
+    /// The ball of local growth; none if there was nothing to grow from, or no beta left.
+    pub growth: Option<LocalGrowth<NX>>,
+}
+
+/// A ball grown for a state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LocalGrowth<const NX: usize> {
+    /// The ball: verified, or the last one tried.
+    pub ball: Ball<NX>,
+    /// Whether it passed clean.
+    pub verified: bool,
+    /// Rounds taken.
+    pub rounds: u32,
+    /// Starts run again in f64.
+    pub f64_reruns: u64,
+}
+
+/// A state to be judged, with the identity of its run.
+#[derive(Debug)]
+pub struct Case<'a, const NX: usize> {
+    /// The state.
+    pub state: [f32; NX],
+    /// Seed of the run's random numbers.
+    pub seed: u64,
+    /// Number of the control step: each has samples of its own.
+    pub step: u32,
+    /// What the run has spent.
+    pub ledger: &'a mut Ledger,
+}
+
+/// Everything that is known before the plant moves: constants, deviation bound, band.
+pub struct Certifier<'a, S, P, const NX: usize> {
+    backend: &'a Backend,
+    plant: Plant<'a, S, P>,
+    settings: &'a Settings<NX>,
+    tightened: Tightened,
+    band: f64,
+    asked: Asked,
+}
+
+impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
+    /// Computes the constants, draws the deviation bound and measures the f32 error.
+    ///
+    /// # Errors
+    /// Those of [`tightened`].
+    pub fn new<const NU: usize>(
+        backend: &'a Backend,
+        plant: Plant<'a, S, P>,
+        settings: &'a Settings<NX>,
+        asked: Asked,
+    ) -> Result<Self>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let context = Context { backend, plant, watch: &Unwatched };
+        let tightened = tightened(context, settings)?;
+        let band = band(context, settings, &tightened.losses)?;
+        Ok(Self { backend, plant, settings, tightened, band, asked })
+    }
+
+    /// The settings of the certificates.
+    pub fn settings(&self) -> &Settings<NX> {
+        self.settings
+    }
+
+    /// Constants and deviation bound.
+    pub fn tightened(&self) -> &Tightened {
+        &self.tightened
+    }
+
+    /// Beta of one call of local growth, all its rounds together.
+    pub fn call_beta(&self) -> f64 {
+        let growth = &self.settings.growth;
+        if growth.split_beta { growth.beta } else { growth.beta * f64::from(growth.rounds) }
+    }
+
+    /// The standing of each case, all in a few batches: V_check of all, then slice and growth of
+    /// those that it does not certify.
+    ///
+    /// # Errors
+    /// Those of the backend.
+    pub fn standings<const NU: usize>(
+        &self,
+        cases: &mut [Case<'_, NX>],
+    ) -> Result<Vec<Standing<NX>>>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let states: Vec<[f32; NX]> = cases.iter().map(|case| case.state).collect();
+        let margins = self.margins(&states, Query::Measure)?;
+        let standing = |check_margin: f32| Standing {
+            tier: match self.asked.global && check_margin > 0.0 {
+                true => Tier::Global,
+                false => Tier::Recovery,
+            },
+            check_margin,
+            certified: Vec::new(),
+            growth: None,
+        };
+        let mut standings: Vec<Standing<NX>> = margins.into_iter().map(standing).collect();
+        let open = |standing: &Standing<NX>| standing.tier == Tier::Recovery;
+        let left: Vec<usize> = (0..cases.len()).filter(|&i| open(&standings[i])).collect();
+        self.slices(&states, &left, &mut standings)?;
+        if self.asked.local {
+            self.grow(cases, &left, &mut standings)?;
+        }
+        Ok(standings)
+    }
+
+    /// `V_check` of each state, or its sign.
+    fn margins<const NU: usize>(&self, states: &[[f32; NX]], query: Query) -> Result<Vec<f32>>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let context = Context { backend: self.backend, plant: self.plant, watch: &Unwatched };
+        let (spec, losses) = (&self.settings.spec, &self.tightened.losses);
+        check_margins(context, spec, losses, states, query, self.band)
+    }
+
+    /// The certified cells of the slices through the states `left`. Signs in f32: a cell says
+    /// where to grow a ball and where to steer, and claims nothing.
+    fn slices<const NU: usize>(
+        &self,
+        states: &[[f32; NX]],
+        left: &[usize],
+        standings: &mut [Standing<NX>],
+    ) -> Result<()>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let cells: Vec<[f32; NX]> =
+            left.iter().flat_map(|&i| slice_through(self.settings, &states[i])).collect();
+        let per_slice = cells.len() / left.len().max(1);
+        let signs = self.margins(&cells, Query::Sign)?;
+        for (&i, signs) in left.iter().zip(signs.chunks(per_slice.max(1))) {
+            standings[i].certified = signs.iter().map(|sign| *sign > 0.0).collect();
+        }
+        Ok(())
+    }
+
+    /// Grows a ball for each of the cases `left` whose slice has a boundary and whose ledger
+    /// allows it.
+    fn grow<const NU: usize>(
+        &self,
+        cases: &mut [Case<'_, NX>],
+        left: &[usize],
+        standings: &mut [Standing<NX>],
+    ) -> Result<()>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let mut requests = Vec::new();
+        let mut asking = Vec::new();
+        for &i in left {
+            let case = &mut cases[i];
+            let found = on_slice(self.settings, &case.state, &standings[i].certified);
+            let Some(boundary) = found else { continue };
+            let entry = Entry {
+                claim: "local growth".to_owned(),
+                purpose: "tier 2".to_owned(),
+                call: u64::from(case.step),
+                round: 0,
+                beta: self.call_beta(),
+            };
+            if let Spend::Granted { .. } = case.ledger.spend(entry) {
+                let center = boundary.point;
+                requests.push(Request { center, seed: case.seed, call: case.step });
+                asking.push(i);
+            }
+        }
+        let context = Context { backend: self.backend, plant: self.plant, watch: &Unwatched };
+        let grown = grow_each(context, self.settings, &requests, self.band)?;
+        for ((i, request), grown) in asking.into_iter().zip(requests).zip(grown) {
+            let (ball, verified) = match grown.outcome {
+                Growth::Verified(ball) => (ball, true),
+                Growth::Exhausted { last_radius: radius } => {
+                    let varies = self.settings.growth.varies;
+                    (Ball { center: request.center, radius, varies }, false)
+                }
+            };
+            if verified && ball.contains(&cases[i].state) {
+                standings[i].tier = Tier::Local;
+            }
+            let (rounds, f64_reruns) = (grown.rounds, grown.f64_reruns);
+            standings[i].growth = Some(LocalGrowth { ball, verified, rounds, f64_reruns });
+        }
+        Ok(())
+    }
+}

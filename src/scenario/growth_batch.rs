@@ -1,0 +1,163 @@
+//! Algorithm 1 for many balls at once: a round of all that are open is one batch.
+
+use rayon::prelude::*;
+
+use super::Context;
+use super::growth::{Growth, check_scenarios, next_radius};
+use super::settings::Settings;
+use crate::error::Result;
+use crate::policy::Policy;
+use crate::rollout::{
+    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, measure,
+};
+use crate::system::System;
+
+/// Starts that are drawn side by side.
+const GROUP: usize = 16;
+
+/// A ball to be grown: where, and with which random numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request<const NX: usize> {
+    /// Centre, and the values of the coordinates that do not vary.
+    pub center: [f32; NX],
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Number of the call under that seed: none reuses another's samples.
+    pub call: u32,
+}
+
+/// What came of a ball.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown<const NX: usize> {
+    /// The outcome.
+    pub outcome: Growth<NX>,
+    /// Rounds taken.
+    pub rounds: u32,
+    /// Starts that were run again in f64.
+    pub f64_reruns: u64,
+}
+
+/// A ball under way.
+struct Open<const NX: usize> {
+    ball: Ball<NX>,
+    /// The request that it answers.
+    request: usize,
+    rounds: u32,
+    f64_reruns: u64,
+}
+
+/// Grows a ball for each request, for at most M rounds of N fresh starts each, as
+/// [`super::growth::grow`] does one; a measure within `band` of zero is that of f64.
+///
+/// # Errors
+/// [`crate::Error::TooFewScenarios`], and those of the backend.
+pub fn grow_each<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+    requests: &[Request<NX>],
+    band: f64,
+) -> Result<Vec<Grown<NX>>>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let asked = &settings.growth;
+    check_scenarios(asked)?;
+    let open = |(request, center): (usize, [f32; NX])| Open {
+        ball: Ball { center, radius: asked.radius, varies: asked.varies },
+        request,
+        rounds: 0,
+        f64_reruns: 0,
+    };
+    let centers = requests.iter().map(|request| request.center).enumerate();
+    let mut balls: Vec<Open<NX>> = centers.map(open).collect();
+    let mut grown: Vec<Option<Grown<NX>>> = vec![None; requests.len()];
+    for number in 0..asked.rounds {
+        round(context, settings, requests, &mut balls, band)?
+            .into_iter()
+            .zip(std::mem::take(&mut balls))
+            .for_each(|(nearest, mut open)| {
+                let next = nearest.and_then(|nearest| next_radius(asked, number, nearest));
+                if let Some(radius) = next {
+                    open.ball.radius = radius;
+                    balls.push(open);
+                } else {
+                    let request = open.request;
+                    grown[request] = Some(finished(open, nearest));
+                }
+            });
+    }
+    Ok(grown.into_iter().flatten().collect())
+}
+
+/// The ball as it ended, its nearest failure that far, or nowhere.
+fn finished<const NX: usize>(open: Open<NX>, nearest: Option<f64>) -> Grown<NX> {
+    let Open { ball, rounds, f64_reruns, .. } = open;
+    let outcome = match nearest {
+        None => Growth::Verified(ball),
+        Some(_) => Growth::Exhausted { last_radius: ball.radius },
+    };
+    Grown { outcome, rounds, f64_reruns }
+}
+
+/// One round of all balls: the distance of the nearest failure of each.
+fn round<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+    requests: &[Request<NX>],
+    balls: &mut [Open<NX>],
+    band: f64,
+) -> Result<Vec<Option<f64>>>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    if balls.is_empty() {
+        return Ok(Vec::new());
+    }
+    let count = settings.growth.scenarios;
+    let draw = |open: &Open<NX>| {
+        let Request { seed, call, .. } = requests[open.request];
+        let use_number = call * settings.growth.rounds + open.rounds;
+        let stream = Stream::new(seed, Purpose::Growth, use_number);
+        drawn(&Region::Ball(open.ball.clone()), stream, count)
+    };
+    let starts: Vec<[f32; NX]> = balls.par_iter().flat_map_iter(draw).collect();
+    let tightening = Tightening::none(&settings.spec);
+    let task = ReachAvoidTask {
+        starts: Starts::Listed(&starts),
+        range: 0..starts.len() as u64,
+        spec: settings.spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let mut nearest: Vec<Option<f64>> = vec![None; balls.len()];
+    balls.iter_mut().for_each(|open| open.rounds += 1);
+    context.backend.reach_avoid(context.plant, &task, &mut |first, values| {
+        for (index, value) in (first..).zip(values) {
+            let (start, place) = (starts[index as usize], (index / count) as usize);
+            let mut value = f64::from(*value);
+            if value.abs() <= band {
+                value = measure(context.plant, start, &settings.spec, &tightening);
+                balls[place].f64_reruns += 1;
+            }
+            if value.is_nan() || value <= 0.0 {
+                let distance = balls[place].ball.distance(&start);
+                nearest[place] = Some(nearest[place].map_or(distance, |near| near.min(distance)));
+            }
+        }
+        context.watch.advance(values.len() as u64)
+    })?;
+    Ok(nearest)
+}
+
+/// The first `count` starts of `stream` in `region`.
+fn drawn<const NX: usize>(region: &Region<NX>, stream: Stream, count: u64) -> Vec<[f32; NX]> {
+    let mut starts = Vec::with_capacity(count as usize);
+    for first in (0..count).step_by(GROUP) {
+        let lanes = region.sample::<GROUP>(stream, first);
+        let live = GROUP.min((count - first) as usize);
+        starts.extend((0..live).map(|i| lanes.each_ref().map(|lane| lane.0[i])));
+    }
+    starts
+}
