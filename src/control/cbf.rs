@@ -12,7 +12,8 @@ use crate::system::{DroneRace, System};
 const TOLERANCE: f64 = 1e-11;
 
 /// How many steps ahead the barrier looks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum BarrierForm {
     /// One, as published. In the Euler plant no control moves the next position, so this filter
     /// returns the nominal control and all shortfall is slack.
@@ -31,7 +32,8 @@ impl BarrierForm {
 }
 
 /// What widens the radius kept around the opponent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Widening {
     /// The opponent's excess of upward velocity in m/s, a slip of the published code.
     Velocities,

@@ -1,0 +1,83 @@
+//! What the plans of all controllers share: planners from settings, problems, sampled paths.
+
+use super::settings::PlanSettings;
+use crate::control::mppi::Planner;
+use crate::cost::{RACE_CONTEXT, RaceCost, RaceReference};
+use crate::error::Result;
+use crate::rollout::{MppiProblem, Purpose, Stream};
+use crate::system::DroneRace;
+
+/// A problem of the race.
+pub(super) type RaceProblem = MppiProblem<12, 3, RACE_CONTEXT>;
+
+/// A planner and the speed that it keeps.
+pub(super) struct Plan<'a> {
+    /// The planner.
+    pub(super) planner: Planner<'a, RaceCost, 3>,
+    /// Speed toward the gate, m/s.
+    pub(super) speed: f32,
+}
+
+impl Plan<'_> {
+    /// The planner that the `settings` of `section` ask for.
+    pub(super) fn new(section: &str, settings: &PlanSettings, system: &DroneRace) -> Result<Self> {
+        let planner = Planner {
+            spec: settings.spec(section, system)?,
+            cost: settings.cost,
+            iterations: settings.iterations,
+            value: None,
+            disturbance: None,
+        };
+        Ok(Self { planner, speed: settings.speed })
+    }
+}
+
+/// The stream of the control noise of a race at one step.
+pub(super) fn stream(seed: u64, step: u32) -> Stream {
+    Stream::new(seed, Purpose::ControlNoise, step)
+}
+
+/// The problem at `start`, with the reference of each stage.
+pub(super) fn problem(
+    start: [f32; 12],
+    plan: Vec<[f32; 3]>,
+    stream: Stream,
+    reference: impl Fn(usize) -> RaceReference,
+) -> RaceProblem {
+    let last = plan.len() - 1;
+    let stage = |t: usize| RaceReference { last: t == last, ..reference(t) }.context();
+    let context = (0..plan.len()).map(stage).collect();
+    MppiProblem { start, plan, context, stream }
+}
+
+/// Whether sampled paths are wanted, for a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Paths {
+    /// None.
+    None,
+    /// The first samples of each plan.
+    Drawn,
+}
+
+/// Paths of a picture.
+const DRAWN: u32 = 24;
+
+/// The first samples of problem `number` around its improved plan: x and y of the ego.
+pub(super) fn fan(
+    plan: &Plan<'_>,
+    system: &DroneRace,
+    problems: &[RaceProblem],
+    number: usize,
+    paths: Paths,
+) -> Vec<Vec<[f32; 2]>> {
+    if paths == Paths::None {
+        return Vec::new();
+    }
+    let task = plan.planner.task(problems, 0);
+    let samples = DRAWN.min(plan.planner.spec.settings().samples);
+    let path = |sample| {
+        let states = task.states(system, number, sample);
+        states.into_iter().map(|x| [x[0], x[2]]).collect()
+    };
+    (0..samples).map(path).collect()
+}
