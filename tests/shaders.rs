@@ -271,16 +271,19 @@ fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
 }
 
 /// Layer of each top-level module; a file may name its own layer and those above it.
-const LAYERS: [(&str, u32); 14] = [
+const LAYERS: [(&str, u32); 17] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
     ("files", 1),
     ("system", 2),
     ("policy", 2),
+    ("cost", 2),
     ("rollout", 3),
     ("backend", 4),
     ("scenario", 5),
+    ("control", 5),
+    ("experiment", 7),
     ("report", 8),
     ("cli", 9),
     ("config", 9),
