@@ -35,7 +35,8 @@ pub(super) fn figure(record: &RaceRecord) -> Figure {
 
 fn caption(picture: &PictureRecord) -> String {
     let verdicts = picture.verdicts.iter().map(|(judge, verdict)| {
-        let verdict = verdict.map_or("won", words::class);
+        let verdict = verdict
+            .map_or_else(|| "won".to_owned(), |class| format!("lost ({})", words::class(class)));
         format!("{verdict} under the {} judge", words::judge(*judge))
     });
     let verdicts: Vec<_> = verdicts.collect();
@@ -86,7 +87,7 @@ fn legend(picture: &PictureRecord) -> Vec<(Swatch, String)> {
 
 fn drawing(record: &RaceRecord, picture: &PictureRecord) -> String {
     let words: String =
-        (0..picture.frames.len()).map(|index| moment::words(record, picture, index)).collect();
+        (0..picture.frames.len()).map(|index| moment::said(record, picture, index)).collect();
     format!(
         "<div class=\"screen\">{}{}</div><div class=\"moments\">{words}</div>",
         plot(picture),

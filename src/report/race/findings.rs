@@ -3,7 +3,7 @@
 use super::words::{self, counted, listed, percent, percents, points};
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
-use crate::report::text::{count, lower, upper};
+use crate::report::text::{count, upper};
 
 /// The outcome of the leading controller under a judge.
 pub(super) struct Headline {
@@ -32,8 +32,14 @@ pub(super) fn headlines(record: &RaceRecord) -> Vec<Headline> {
 }
 
 fn details(record: &RaceRecord, judged: &JudgedRecord) -> Vec<String> {
-    let seed = if judged.successes.len() > 1 { " (first seed)" } else { "" };
-    let mut details = vec![format!("95 % interval{seed}: {}.", percents(judged.interval))];
+    let interval = percents(judged.interval);
+    let mut details = match judged.successes.len() {
+        0 | 1 => vec![format!("95\u{a0}% interval: {interval}.")],
+        seeds => vec![
+            format!("Mean over {seeds} noise seeds."),
+            format!("95\u{a0}% interval, first seed: {interval}."),
+        ],
+    };
     if let Some(published) = &judged.published {
         let rate = percent(published.rate);
         details.push(format!("Published: {rate} ({}).", percents(published.interval)));
@@ -95,13 +101,12 @@ fn runner_up(record: &RaceRecord, judge: Judge) -> Option<String> {
     let others = words::verdicts(record, judge).filter(|(other, _)| other.name != lead.name);
     let (best, judged) = others.max_by(|(_, a), (_, b)| a.rate.total_cmp(&b.rate))?;
     let paired = judged.against_hybrid.as_ref().map_or_else(String::new, |paired| {
-        let [low, high] = paired.interval.map(|end| 100.0 * end);
         format!(
-            ", {} points against the hybrid on the same starts ({} to {}; p = {})",
+            ", {} points against the hybrid on the same starts ({}; \
+             p\u{a0}=\u{a0}{})",
             points(paired.difference),
-            lower(low),
-            upper(high),
-            upper(paired.p_value)
+            words::point_interval(paired.interval),
+            words::minus(&upper(paired.p_value))
         )
     });
     let rate = percent(judged.rate);
@@ -138,8 +143,8 @@ pub(super) fn limits(record: &RaceRecord) -> Vec<String> {
         limits.push(
             "The cone of the study judge grows with the height of the ego above the opponent, \
              that of the constraint with the height of the opponent above the ego: the opposite \
-             sign. A state that is certified can lose under the study judge, and the other way \
-             round."
+             sign. A certificate for the constraint says nothing about the cone of the study \
+             judge."
                 .to_owned(),
         );
     }
@@ -178,8 +183,8 @@ fn seeds(record: &RaceRecord) -> String {
                   known."
             .to_owned(),
         seeds => format!(
-            "All {} share the same {} starts: the spread between seeds is of the noise alone, and \
-             is smaller than that between draws of starts.",
+            "All {} share the same {} starts: the spread between seeds is of the noise alone and \
+             says nothing about other starts.",
             counted(seeds, "noise seed", "noise seeds"),
             count(record.starts.count)
         ),
@@ -193,7 +198,7 @@ fn beta(controller: &ControllerRecord) -> Option<String> {
     let (race, total) = (upper(tiers.beta_race), upper(tiers.beta_total));
     Some(if tiers.beta_total < 1.0 {
         format!(
-            "{name}: all certificates of the experiment hold together with confidence 1 − {total}, \
+            "{name}: all certificates of the experiment hold together with confidence at least 1 − {total}, \
              those of a single race with at least 1 − {race}."
         )
     } else {

@@ -1,9 +1,9 @@
 //! One moment of the race: what is drawn, and what is said.
 
-use super::words::counted;
+use super::words::{self, counted};
 use crate::experiment::record::{FrameRecord, PictureRecord, RaceRecord};
 use crate::report::plot::{Plot, coordinate};
-use crate::report::text::{escape, number, ordinary};
+use crate::report::text::{escape, lower, number, ordinary};
 
 /// The opponent.
 pub(super) const OPPONENT: &str =
@@ -85,7 +85,7 @@ fn drawn(class: &str, data: &str) -> String {
 
 fn fine(value: f64) -> i64 {
     // Far points stay outside the axes; a cast of what is not a number gives 0.
-    (FINE * value.clamp(-900.0, 900.0)).round() as i64
+    (FINE * value.clamp(-400.0, 550.0)).round() as i64
 }
 
 /// Edges halfway between ascending centres; `None` for fewer than two.
@@ -199,7 +199,7 @@ pub(super) fn title(record: &RaceRecord, picture: &PictureRecord, index: usize) 
 }
 
 /// What there is to say about a moment; of all, only the first is shown to begin with.
-pub(super) fn words(record: &RaceRecord, picture: &PictureRecord, index: usize) -> String {
+pub(super) fn said(record: &RaceRecord, picture: &PictureRecord, index: usize) -> String {
     let frame = &picture.frames[index];
     let shown = if index == 0 { " shown" } else { "" };
     let rows: String = rows(frame)
@@ -207,7 +207,8 @@ pub(super) fn words(record: &RaceRecord, picture: &PictureRecord, index: usize) 
         .map(|(name, value)| format!("<dt>{name}</dt><dd>{}</dd>", escape(&value)))
         .collect();
     format!(
-        "<div class=\"moment{shown}\" data-moment=\"{index}\"><h4>{}</h4><dl>{rows}</dl></div>",
+        "<div class=\"moment{shown}\" data-moment=\"{index}\" data-title=\"{}\">\
+         <dl>{rows}</dl></div>",
         escape(&title(record, picture, index))
     )
 }
@@ -215,7 +216,7 @@ pub(super) fn words(record: &RaceRecord, picture: &PictureRecord, index: usize) 
 /// Names and values; the same names at every moment, so that the eye finds its row again.
 fn rows(frame: &FrameRecord) -> Vec<(&'static str, String)> {
     let tier = match frame.tier {
-        Some(tier) => format!("{tier}, {}", super::words::tier(tier)),
+        Some(tier) => format!("{tier}, {}", words::tier(tier)),
         None => "–".to_owned(),
     };
     vec![
@@ -239,7 +240,7 @@ fn dash() -> String {
 fn check(frame: &FrameRecord) -> String {
     frame.check_margin.map_or_else(dash, |margin| {
         let meaning = if margin > 0.0 { "certified" } else { "not certified" };
-        format!("{}, {meaning}", number(margin.into()))
+        format!("{}, {meaning}", words::minus(&number(margin.into())))
     })
 }
 
@@ -255,8 +256,7 @@ fn ball(frame: &FrameRecord) -> String {
         let outcome = if ball.verified { "verified" } else { "not verified" };
         let rounds = counted(ball.rounds as usize, "round", "rounds");
         let radius = f64::from(ball.radius);
-        let radius =
-            if ball.verified { crate::report::text::lower(radius) } else { number(radius) };
+        let radius = if ball.verified { lower(radius) } else { number(radius) };
         format!("radius {radius} m, {outcome} after {rounds}")
     })
 }

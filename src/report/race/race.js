@@ -4,7 +4,7 @@
     ["moment", "play", "previous", "next", "now"].map(id => document.getElementById(id));
   if (!film || !slider) return;
   const moments = [...film.querySelectorAll("[data-moment]")];
-  const titles = [...film.querySelectorAll(".moments h4")].map(title => title.textContent);
+  const titles = [...film.querySelectorAll("[data-title]")].map(moment => moment.dataset.title);
   const last = titles.length - 1;
   let shown = 0;
   let timer = 0;

@@ -13,9 +13,11 @@ const LEFT: f64 = 8.0;
 const SCALE: f64 = 250.0;
 /// Characters of a controller's name beside its interval.
 const NAME: usize = 22;
-/// Height of a row without and with a published rate.
-const ROWS: [f64; 2] = [37.0, 49.0];
+/// Height of a row where no published rate is known, and where one is.
+const ROWS: [f64; 2] = [37.0, 53.0];
 const PUBLISHED: &str = "<path class=\"published\" d=\"M0-4.2L4.2 0L0 4.2L-4.2 0Z\"/>";
+const BAR: &str = "<path class=\"bar\" d=\"M-14-5.5H6V5.5H-14Z\"/>";
+const RATE: &str = "<circle class=\"mean\" r=\"2.9\"/>";
 const WHISKER: &str = "<path class=\"whisker\" d=\"M6 5V11M6 8H26M26 5V11\"/>";
 
 /// One panel per judge.
@@ -46,11 +48,10 @@ fn legend(record: &RaceRecord) -> Vec<(Swatch, String)> {
         _ => format!("mean success rate over {seeds} noise seeds"),
     };
     let mut legend = vec![
-        (Swatch::Area("bar"), rate),
+        (Swatch::Mark(format!("{BAR}<g transform=\"translate(6 0)\">{RATE}</g>")), rate),
         (Swatch::Mark(shifted(WHISKER)), "95 % interval of the first seed's run".to_owned()),
     ];
-    let mut judged = record.controllers.iter().flat_map(|controller| &controller.judged);
-    if judged.any(|judged| judged.published.is_some()) {
+    if any_published(record) {
         let name = "published rate with its 95 % interval".to_owned();
         legend.push((Swatch::Marked("published-line", PUBLISHED.to_owned()), name));
     }
@@ -59,6 +60,11 @@ fn legend(record: &RaceRecord) -> Vec<(Swatch, String)> {
         legend.push((Swatch::Mark("<path class=\"ceiling\" d=\"M0-8V8\"/>".to_owned()), name));
     }
     legend
+}
+
+fn any_published(record: &RaceRecord) -> bool {
+    let mut judged = record.controllers.iter().flat_map(|controller| &controller.judged);
+    judged.any(|judged| judged.published.is_some())
 }
 
 /// A drawing made for the corner of a swatch, around its middle.
@@ -79,6 +85,8 @@ fn caption(record: &RaceRecord, judges: &[Judge]) -> String {
 fn panel(record: &RaceRecord, judge: Judge) -> String {
     let mut sheet = Sheet::default();
     let ceiling = words::ceiling(record, judge).map(|(_, share)| share);
+    // One height for all judges, so that a controller's bars stand side by side.
+    let height = ROWS[usize::from(any_published(record))];
     let mut top = 4.0;
     if let Some(share) = ceiling {
         let text = format!("ceiling {}", percent(share));
@@ -86,12 +94,11 @@ fn panel(record: &RaceRecord, judge: Judge) -> String {
         top = 18.0;
     }
     for (controller, judged) in words::verdicts(record, judge) {
-        let lines = usize::from(judged.published.is_some());
         row(&mut sheet, top, controller, judged);
         if let Some(share) = ceiling {
-            sheet.upright("ceiling", across(share), [top + 17.0, top + ROWS[lines] - 6.0]);
+            sheet.upright("ceiling", across(share), [top + 16.0, top + bottom(judged) + 2.0]);
         }
-        top += ROWS[lines];
+        top += height;
     }
     scale(&mut sheet, top);
     let description = format!("Success rates under the {} judge", words::judge(judge));
@@ -103,19 +110,23 @@ fn across(share: f64) -> f64 {
     LEFT + SCALE * if ordinary(share) { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
+/// Lower end of a row's bars.
+fn bottom(judged: &JudgedRecord) -> f64 {
+    if judged.published.is_some() { 43.0 } else { 29.0 }
+}
+
 /// Name and interval, then the bar with its rate, then the published rate.
 fn row(sheet: &mut Sheet, top: f64, controller: &ControllerRecord, judged: &JudgedRecord) {
     let (bar, line) = ([top + 18.0, top + 29.0], top + 23.5);
     sheet.text("name", [LEFT, top + 12.0], Anchor::Start, &shorten(&controller.name, NAME));
     sheet.text("tick", [WIDTH - 4.0, top + 12.0], Anchor::End, &percents(judged.interval));
-    let bottom = bar[1] + if judged.published.is_some() { 12.0 } else { 0.0 };
-    sheet.area("track", [across(0.0), bar[0], across(1.0), bottom]);
+    sheet.area("track", [across(0.0), bar[0], across(1.0), top + bottom(judged)]);
     sheet.area("bar", [across(0.0), bar[0], across(judged.rate), bar[1]]);
-    sheet.whisker("whisker-halo", judged.interval.map(across), line);
     sheet.whisker("whisker", judged.interval.map(across), line);
+    sheet.mark([across(judged.rate), line], RATE);
     sheet.text("rate", [WIDTH - 4.0, line + 4.5], Anchor::End, &percent(judged.rate));
     if let Some(published) = &judged.published {
-        published_rate(sheet, line + 12.0, published);
+        published_rate(sheet, line + 14.5, published);
     }
 }
 

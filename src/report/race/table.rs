@@ -6,7 +6,7 @@ use crate::experiment::record::{
     ControllerRecord, FilterRecord, JudgedRecord, MetricsRecord, RaceRecord, TierRecord,
 };
 use crate::report::table::{pairs, table};
-use crate::report::text::{count, lower, number, or_dash, upper};
+use crate::report::text::{count, number, or_dash, upper};
 
 /// A table of more than three columns; nothing without a row.
 fn rows(title: &str, head: &[&str], body: Vec<Vec<String>>) -> String {
@@ -20,7 +20,7 @@ fn rows(title: &str, head: &[&str], body: Vec<Vec<String>>) -> String {
 /// The tables that need the width of the page.
 pub(super) fn wide(record: &RaceRecord) -> String {
     let judges = words::judges(record);
-    let success = judges.iter().map(|&judge| success(record, judge));
+    let success = judges.iter().map(|&judge| success(record, judge) + &compared(record, judge));
     let failures = judges.iter().map(|&judge| failures(record, judge));
     let metrics = judges.iter().map(|&judge| metrics(record, judge));
     let all: String = success.chain(failures).chain(metrics).collect();
@@ -41,11 +41,6 @@ fn success(record: &RaceRecord, judge: Judge) -> String {
         "spread of seeds, points",
         "published",
         "published interval",
-        "less hybrid, points",
-        "95 % interval of it",
-        "won alone",
-        "hybrid alone",
-        "p-value",
     ];
     let body = words::verdicts(record, judge)
         .map(|(controller, judged)| success_row(controller, judged))
@@ -53,10 +48,35 @@ fn success(record: &RaceRecord, judge: Judge) -> String {
     rows(&format!("Races won under the {} judge", words::judge(judge)), &head, body)
 }
 
+/// The paired comparisons with the hybrid on the same starts.
+fn compared(record: &RaceRecord, judge: Judge) -> String {
+    let head = [
+        "controller",
+        "difference of the mean rates, points",
+        "95 % interval of it",
+        "starts won by it alone, first seed",
+        "starts won by the hybrid alone, first seed",
+        "McNemar p-value",
+    ];
+    let row = |(controller, judged): (&ControllerRecord, &JudgedRecord)| {
+        let paired = judged.against_hybrid.as_ref()?;
+        Some(vec![
+            controller.name.clone(),
+            points(paired.difference),
+            words::point_interval(paired.interval),
+            count(paired.only_this),
+            count(paired.only_other),
+            words::minus(&upper(paired.p_value)),
+        ])
+    };
+    let body = words::verdicts(record, judge).filter_map(row).collect();
+    let title = format!("Compared with the hybrid under the {} judge", words::judge(judge));
+    rows(&title, &head, body)
+}
+
 fn success_row(controller: &ControllerRecord, judged: &JudgedRecord) -> Vec<String> {
     let seeds: Vec<_> = judged.successes.iter().map(|&won| count(won)).collect();
     let published = judged.published.as_ref();
-    let paired = judged.against_hybrid.as_ref();
     vec![
         controller.name.clone(),
         seeds.join(" · "),
@@ -65,14 +85,6 @@ fn success_row(controller: &ControllerRecord, judged: &JudgedRecord) -> Vec<Stri
         or_dash(judged.spread.map(|spread| number(100.0 * spread))),
         or_dash(published.map(|published| percent(published.rate))),
         or_dash(published.map(|published| percents(published.interval))),
-        or_dash(paired.map(|paired| points(paired.difference))),
-        or_dash(paired.map(|paired| {
-            let [low, high] = paired.interval.map(|end| 100.0 * end);
-            format!("{} to {}", lower(low), upper(high))
-        })),
-        or_dash(paired.map(|paired| count(paired.only_this))),
-        or_dash(paired.map(|paired| count(paired.only_other))),
-        or_dash(paired.map(|paired| upper(paired.p_value))),
     ]
 }
 

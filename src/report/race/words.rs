@@ -69,20 +69,30 @@ pub(super) fn tier(tier: u8) -> &'static str {
     }
 }
 
-/// A share in percent.
+/// A share in percent; the sign stays on the line of its number.
 pub(super) fn percent(share: f64) -> String {
-    format!("{} %", number(100.0 * share))
+    format!("{}\u{a0}%", number(100.0 * share))
 }
 
 /// An interval of shares in percent, rounded outwards.
 pub(super) fn percents(shares: [f64; 2]) -> String {
-    format!("{} %", interval(shares.map(|share| 100.0 * share)))
+    format!("{}\u{a0}%", interval(shares.map(|share| 100.0 * share)))
 }
 
 /// A difference of shares in points, with its sign.
 pub(super) fn points(difference: f64) -> String {
     let sign = if difference > 0.0 && ordinary(difference) { "+" } else { "" };
-    format!("{sign}{}", number(100.0 * difference))
+    format!("{sign}{}", minus(&number(100.0 * difference)))
+}
+
+/// An interval of differences in points, rounded outwards.
+pub(super) fn point_interval(ends: [f64; 2]) -> String {
+    minus(&interval(ends.map(|end| 100.0 * end)))
+}
+
+/// A number with true minus signs, after which no line breaks.
+pub(super) fn minus(number: &str) -> String {
+    number.replace('-', "−")
 }
 
 /// `noun` after its count, `nouns` unless there is one.
