@@ -14,8 +14,8 @@ use reachcast::experiment::record::RaceRecord;
 use reachcast::report::race_html;
 use serde_json::{Value, json};
 
-/// Phone and wide screen, in CSS pixels.
-const WIDTHS: [u32; 2] = [375, 1280];
+/// Phone, tablet and wide screen, in CSS pixels.
+const WIDTHS: [u32; 3] = [375, 768, 1280];
 /// Drawings of the full record: three judges twice, two controllers with tiers, one race.
 const DRAWINGS: usize = 9;
 

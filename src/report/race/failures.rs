@@ -43,7 +43,7 @@ pub(super) fn figure(record: &RaceRecord) -> Figure {
             false => Ok(panels(&drawn)),
         },
         legend: classes.collect(),
-        caption: "Shares of all races, over all noise seeds; the pale rest was won. A lost race \
+        caption: "Shares of all races, over all noise seeds; the empty rest was won. A lost race \
                   counts in one class."
             .to_owned(),
     }
