@@ -4,10 +4,16 @@
 mod page;
 mod records;
 
-use page::{assert_sound, attributes, cells, drawing, escaped, figure, tags};
+use page::{attributes, cells, drawing, escaped, figure, tags};
 use reachcast::report::html;
 use reachcast::scenario::record::{GrowthOutcome, Record};
 use serde_json::Value;
+
+/// A sound page with all five figures.
+fn assert_sound(page: &str, case: &str) {
+    page::assert_sound(page, case);
+    assert_eq!(page.matches("<figure ").count(), 5, "{case}");
+}
 
 /// Applies `change` to every string of a record that is a free text.
 fn change_strings(record: &Record, change: &mut impl FnMut(&str) -> String) -> Record {

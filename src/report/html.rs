@@ -9,9 +9,10 @@ use crate::rollout::PairControl;
 use crate::scenario::record::{GrowthOutcome, Record};
 use crate::scenario::settings::Joint;
 
-const STYLE: &str = include_str!("style.css");
+/// The style of every page.
+pub(super) const STYLE: &str = include_str!("style.css");
 /// The pattern of violated constraints, shared by all figures.
-const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+pub(super) const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
     <pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
     <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern></defs></svg>\n";
 

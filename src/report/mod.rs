@@ -1,4 +1,4 @@
-//! The report: one self-contained HTML page made from a stored certificate.
+//! The reports: one self-contained HTML page made from a stored certificate or race record.
 //!
 //! Figures are written as SVG here rather than with a plot library: `plotters` writes each colour
 //! and text size as a fixed value and its legend into the plot, so that the page could follow
@@ -10,6 +10,7 @@ mod figures;
 mod html;
 mod palette;
 mod plot;
+mod race;
 mod slice;
 mod span;
 mod table;
@@ -17,3 +18,4 @@ mod text;
 mod words;
 
 pub use html::html;
+pub use race::race_html;

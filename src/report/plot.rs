@@ -3,8 +3,8 @@
 use super::span::Span;
 use super::text::{escape, ordinary, shorten};
 
-/// Width of every plot in its own units; the page scales it. Narrow, so that labels stay legible
-/// on a phone.
+/// Width of a plot in its own units, if none is asked for; the page scales it. Narrow, so that
+/// labels stay legible on a phone.
 const WIDTH: f64 = 440.0;
 /// Room above and to the right of the axes.
 const MARGIN: f64 = 14.0;
@@ -41,6 +41,7 @@ pub(super) struct Plot {
     id: String,
     x: Span,
     y: Span,
+    outer: f64,
     left: f64,
     width: f64,
     height: f64,
@@ -53,13 +54,18 @@ pub(super) struct Plot {
 impl Plot {
     /// An empty plot; `id` names its clip path and is unique in the page.
     pub(super) fn new(id: &str, x: Span, y: Span, shape: Shape) -> Self {
+        Self::across_width(id, x, y, shape, WIDTH)
+    }
+
+    /// An empty plot that is `outer` wide with its labels.
+    pub(super) fn across_width(id: &str, x: Span, y: Span, shape: Shape, outer: f64) -> Self {
         let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
         let room = |y: Span, height: f64| {
             let (ticks, decimals) = y.ticks(height / 46.0);
             let longest = ticks.iter().map(|&tick| label(tick, decimals).chars().count());
             32.0 + CHARACTER * longest.max().unwrap_or(1) as f64
         };
-        let (mut width, mut height) = (WIDTH - MARGIN - room(y, 400.0), 0.0);
+        let (mut width, mut height) = (outer - MARGIN - room(y, 400.0), 0.0);
         match shape {
             Shape::Free(fixed) => height = fixed,
             Shape::Equal => {
@@ -71,11 +77,12 @@ impl Plot {
             }
         }
         let left = room(y, height);
-        let spare = WIDTH - MARGIN - left - width;
+        let spare = outer - MARGIN - left - width;
         Self {
             id: id.to_owned(),
             x,
             y,
+            outer,
             left: left + spare.max(0.0) / 2.0,
             width: width + spare.min(0.0),
             height,
@@ -134,6 +141,11 @@ impl Plot {
         }
     }
 
+    /// Draws a fragment in the units of the plot, inside the axes.
+    pub(super) fn fragment(&mut self, drawing: &str) {
+        self.clipped += drawing;
+    }
+
     /// Draws an ellipse with its half axes in plot units, inside the axes.
     pub(super) fn ellipse(&mut self, class: &str, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) {
         if ordinary(x) && ordinary(y) && ordinary(rx) && ordinary(ry) {
@@ -188,11 +200,12 @@ impl Plot {
         let id = &self.id;
         format!(
             "<svg class=\"plot\" role=\"img\" aria-label=\"{description}\" \
-             viewBox=\"0 0 {WIDTH} {total}\">\
+             viewBox=\"0 0 {outer} {total}\">\
              <clipPath id=\"{id}-clip\"><path d=\"M{left} {top}H{right}V{bottom}H{left}Z\"/></clipPath>\
              {axes}<g clip-path=\"url(#{id}-clip)\">{clipped}</g>\
              <rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\"/>\
              {marks}{foot}</svg>",
+            outer = coordinate(self.outer),
             description = escape(description),
             axes = self.axes(labels),
             clipped = self.clipped,

@@ -5,7 +5,7 @@ use super::words;
 use crate::scenario::record::{Claim, Record};
 
 /// A table in a box of its own that scrolls; the first row holds headings, cells are text.
-fn table(title: &str, rows: &[Vec<String>]) -> String {
+pub(super) fn table(title: &str, rows: &[Vec<String>]) -> String {
     let row = |cells: &Vec<String>, head: bool| {
         let cells = cells.iter().enumerate().map(|(index, cell)| {
             let cell = escape(cell);
@@ -31,7 +31,7 @@ fn table(title: &str, rows: &[Vec<String>]) -> String {
 }
 
 /// A table of names and values.
-fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
+pub(super) fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
     let head = vec!["quantity".to_owned(), "value".to_owned()];
     let rows = pairs.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]);
     table(title, &std::iter::once(head).chain(rows).collect::<Vec<_>>())

@@ -1,12 +1,13 @@
 //! Reading a report back: its tags, rows and drawings.
+#![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
 /// Tags that the page is made of.
 const TAGS: &str = "html head meta link title style body header main footer section div p span h1 \
-    h2 h3 ol ul li figure figcaption table thead tbody tr th td code pre details summary \
-    svg defs pattern clipPath g path rect circle ellipse text";
+    h2 h3 h4 ol ul dl dt dd li figure figcaption table thead tbody tr th td code pre details summary \
+    svg input button output noscript script defs pattern clipPath g path rect circle ellipse text";
 /// Tags without an end tag.
-const VOID: [&str; 2] = ["meta", "link"];
+const VOID: [&str; 3] = ["meta", "link", "input"];
 /// Attributes that hold coordinates.
 const DRAWN: [&str; 13] = [
     "d",
@@ -67,14 +68,13 @@ pub(crate) fn assert_sound(page: &str, case: &str) {
         }
     }
     assert!(open.is_empty(), "{case}: never closed: {open:?}");
-    assert_eq!(page.matches("<figure ").count(), 5, "{case}");
 }
 
 /// Numbers within what `coordinate` lets through, and nothing that stands for no number.
 fn assert_drawable(value: &str, place: &str) {
     for word in value.split(|c: char| !c.is_ascii_alphabetic()) {
-        let command = word.chars().all(|c| "MLHVZhvz".contains(c));
-        let known = ["translate", "rotate"].contains(&word);
+        let command = word.chars().all(|c| "MLHVZhvlz".contains(c));
+        let known = ["translate", "rotate", "scale"].contains(&word);
         assert!(command || known, "{word:?} in {place}");
     }
     let separated = value.replace('-', " -");

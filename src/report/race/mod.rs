@@ -1,0 +1,159 @@
+//! The page of a race experiment: rates, failures, tiers, one race in time, and every number.
+
+mod failures;
+mod film;
+mod findings;
+mod moment;
+mod sheet;
+mod success;
+mod table;
+mod tiers;
+mod words;
+
+use super::html::{HATCH, STYLE};
+use super::text::{count, escape};
+use crate::experiment::record::RaceRecord;
+use words::{counted, listed};
+
+const RACE_STYLE: &str = include_str!("race.css");
+/// Steps through the moments of the race that is shown.
+const SCRIPT: &str = include_str!("race.js");
+/// The patterns that tell classes and tiers apart without colour.
+const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+    <pattern id=\"rising\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern>\
+    <pattern id=\"falling\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M-1.5 4.5L1.5 7.5M0 0L6 6M4.5-1.5L7.5 1.5\"/></pattern>\
+    <pattern id=\"level\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M0 2.5H5\"/></pattern>\
+    <pattern id=\"upright\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M2.5 0V5\"/></pattern>\
+    <pattern id=\"dotted\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <circle cx=\"1.5\" cy=\"1.5\" r=\"1\"/><circle cx=\"4.5\" cy=\"4.5\" r=\"1\"/></pattern>\
+    </defs></svg>\n";
+
+/// The report of a race experiment as one HTML document that loads nothing from anywhere.
+///
+/// It depends on the record alone, so equal records give equal pages byte for byte. One inline
+/// script steps through the race that is shown; without it the page shows the first moment.
+pub fn race_html(record: &RaceRecord) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n{head}<body class=\"race\">\n{HATCH}{WEAVES}{header}\
+         <main>\n{statements}\
+         <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
+         <div class=\"gallery\">\n{success}{failures}{tiers}{film}</div></section>\n\
+         {numbers}</main>\n{footer}{script}</body>\n</html>\n",
+        head = head(),
+        header = header(record),
+        statements = statements(record),
+        success = success::figure(record).html(),
+        failures = failures::figure(record).html(),
+        tiers = tiers::figure(record).html(),
+        film = film::figure(record).html(),
+        numbers = numbers(record),
+        footer = footer(record),
+        script = script(record),
+    )
+}
+
+fn head() -> String {
+    format!(
+        "<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>Reachcast: race study</title>\n<style>\n{STYLE}{RACE_STYLE}</style>\n</head>\n"
+    )
+}
+
+fn header(record: &RaceRecord) -> String {
+    let cards: String = findings::headlines(record)
+        .iter()
+        .map(|headline| {
+            let details: String =
+                headline.details.iter().map(|text| format!("<p>{}</p>", escape(text))).collect();
+            format!(
+                "<section class=\"card claim\"><h2>{}</h2><p class=\"headline\">{}</p>{details}\
+                 </section>\n",
+                escape(&headline.title),
+                escape(&headline.rate)
+            )
+        })
+        .collect();
+    format!(
+        "<header>\n<p class=\"brand\">Reachcast race study</p>\n<h1>{}</h1>\n\
+         <p class=\"policy\">{}</p>\n<p class=\"policy\">Policy: {}</p>\n\
+         <div class=\"cards\">\n{cards}</div>\n</header>\n",
+        escape(&title(record)),
+        escape(&setting(record)),
+        escape(&record.provenance.policy),
+    )
+}
+
+fn title(record: &RaceRecord) -> String {
+    let controllers = counted(record.controllers.len(), "controller", "controllers");
+    format!("{controllers} on the same {} starts", count(record.starts.count))
+}
+
+fn setting(record: &RaceRecord) -> String {
+    let seeds: Vec<_> = record.noise_seeds.iter().map(u64::to_string).collect();
+    let seeds = match &seeds[..] {
+        [] => "no noise seed".to_owned(),
+        [only] => format!("noise seed {only}"),
+        _ => format!("noise seeds {}", listed(&seeds)),
+    };
+    format!("Starts: {}. Every controller flew all of them with {seeds}.", record.starts.source)
+}
+
+fn items(texts: &[String]) -> String {
+    texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()
+}
+
+fn statements(record: &RaceRecord) -> String {
+    let described = record.controllers.iter().map(|controller| {
+        let [name, description] = [&controller.name, &controller.description].map(|s| escape(s));
+        format!("<dt>{name}</dt><dd>{description}</dd>")
+    });
+    format!(
+        "<div class=\"words\"><div><section aria-labelledby=\"found\">\
+         <h2 id=\"found\">What was found</h2>\n<ol class=\"statements\">\n{}</ol></section>\n\
+         <section aria-labelledby=\"controllers\"><h2 id=\"controllers\">Controllers</h2>\n\
+         <dl class=\"described\">{}</dl></section></div>\n\
+         <section class=\"card limits\" aria-labelledby=\"limits\">\
+         <h2 id=\"limits\">What this does not say</h2>\n<ul>\n{}</ul></section></div>\n",
+        items(&findings::found(record)),
+        described.collect::<String>(),
+        items(&findings::limits(record))
+    )
+}
+
+fn numbers(record: &RaceRecord) -> String {
+    let config = serde_json::to_string_pretty(&record.provenance.config).unwrap_or_default();
+    format!(
+        "<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
+         <p class=\"hint\">Intervals are rounded outwards, betas and p-values up. Every digit is \
+         in <code>results.json</code>.</p>\n\
+         {}<div class=\"tables\">\n{}</div>\n\
+         <details><summary>Configuration with every default</summary>\n\
+         <pre tabindex=\"0\">{}</pre></details></section>\n",
+        table::wide(record),
+        table::narrow(record),
+        escape(&config)
+    )
+}
+
+fn footer(record: &RaceRecord) -> String {
+    format!(
+        "<footer>Written by reachcast {} from one record; compute times are stored apart.\
+         </footer>\n",
+        escape(&record.provenance.version)
+    )
+}
+
+/// The script, where there is a race to step through.
+fn script(record: &RaceRecord) -> String {
+    let frames = record.picture.as_ref().map_or(0, |picture| picture.frames.len());
+    if frames == 0 { String::new() } else { format!("<script>\n{SCRIPT}</script>\n") }
+}
