@@ -24,6 +24,7 @@ Examples:
   reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures measures.npy
   reachcast query reachcast-out --states configs/race_starts_500.csv
   reachcast check reachcast-out
+  reachcast race configs/race.toml
   reachcast scenarios --epsilon 0.1 --beta 1e-3
 
 Exit codes:
@@ -140,6 +141,21 @@ Example:
         /// Folder that `certify` wrote
         folder: PathBuf,
     },
+    /// Fly whole races under many controllers, judge and compare them
+    ///
+    /// Writes results.json, report.html, timing.json, and states, controls and logs of every race
+    /// as races/CONTROLLER-seedS-fromN.npz to the folder of --out (default: reachcast-race). Stopped
+    /// half-way, the same command goes on where it was; the results are the same.
+    #[command(after_help = "\
+Controllers: hybrid, hybrid-no-policy, mppi, mppi-soft, mppi-cbf, mppi-warmstart, policy, ppo-cbf
+(all of these: all), hybrid-no-global, hybrid-no-local, hybrid-no-recovery, hybrid-no-safety (the
+hybrid and what it is without each of its parts: ablations).
+
+Examples:
+  reachcast race configs/race.toml
+  reachcast race configs/race.toml --profile study --controllers hybrid,mppi --noise-seeds 5
+  reachcast race configs/race.toml --controllers ablations --starts 2000 --out ablations")]
+    Race(RaceArguments),
     /// Tell how many scenarios a claim needs
     #[command(after_help = "\
 Examples:
@@ -149,6 +165,22 @@ Examples:
     Scenarios(ScenarioArguments),
     /// List the devices that can run rollouts
     Devices,
+}
+
+/// What `race` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(super) struct RaceArguments {
+    /// Configuration (TOML)
+    pub(super) config: PathBuf,
+    /// Controllers, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "all")]
+    pub(super) controllers: Vec<String>,
+    /// Starts: how many to draw from race.start_box, or a file, .npy or .csv [default: race.starts]
+    #[arg(long, value_name = "N|FILE")]
+    pub(super) starts: Option<String>,
+    /// Runs of each controller, with the noise seeds SEED, SEED + 1, ...
+    #[arg(long, value_name = "M", default_value_t = 1)]
+    pub(super) noise_seeds: u64,
 }
 
 /// The claim that `scenarios` is asked about.

@@ -4,6 +4,7 @@ mod args;
 mod certify;
 mod devices;
 mod progress;
+mod race;
 mod rollout;
 mod scenarios;
 mod stored;
@@ -60,6 +61,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         }
         Command::Query { folder, states } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
+        Command::Race(asked) => race::run(global, asked),
         Command::Scenarios(asked) => scenarios::run(global, *asked),
         Command::Devices => devices::list(global),
     }

@@ -33,8 +33,20 @@ fn parse_value(text: &str) -> Value {
     .unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
-/// Lays `over` on `base`: tables key by key, everything else whole.
+/// Keys that say which other keys a table has, and the keys that one of their values brings.
+const TAGS: [(&str, &[&str]); 2] = [
+    ("family", &["position", "velocity", "lane", "speed", "control", "away", "wide", "last"]),
+    ("kind", &["time", "knots"]),
+];
+
+/// Lays `over` on `base`: tables key by key, everything else whole. A table that changes its kind
+/// starts afresh, but for the keys that both kinds have as tables.
 pub(super) fn overlay(base: &mut Table, over: Table) {
+    for (tag, keys) in TAGS {
+        if over.get(tag).is_some_and(|kind| base.contains_key(tag) && base.get(tag) != Some(kind)) {
+            base.retain(|key, _| !keys.iter().any(|known| *known == key));
+        }
+    }
     for (key, value) in over {
         match (base.get_mut(&key), value) {
             (Some(Value::Table(base)), Value::Table(over)) => overlay(base, over),
@@ -50,7 +62,20 @@ pub(super) fn with_optional(defaults: &Table) -> Table {
     let mut valid = defaults.clone();
     let policy = ["file", "formula"].map(|key| (key.to_owned(), Value::String(String::new())));
     valid.insert("policy".to_owned(), Value::Table(Table::from_iter(policy)));
+    with_tagged(&mut valid);
     valid
+}
+
+/// Adds to each table with a tag the keys that another value of the tag would bring.
+fn with_tagged(table: &mut Table) {
+    for (tag, keys) in TAGS {
+        if table.contains_key(tag) {
+            for key in keys {
+                table.entry(*key).or_insert(Value::Float(0.0));
+            }
+        }
+    }
+    table.iter_mut().filter_map(|(_, value)| value.as_table_mut()).for_each(with_tagged);
 }
 
 /// Refuses the first key of `given` that `valid` does not have.

@@ -3,6 +3,7 @@
 mod keys;
 mod plant;
 mod profile;
+mod race;
 mod section;
 mod settings;
 #[cfg(test)]

@@ -76,19 +76,9 @@ impl Config {
     pub fn with_plant<J: Job>(&self, policy: &PolicySource, job: J) -> Result<J::Output> {
         let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
         match self.system {
-            SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } => {
-                let system = DroneRace {
-                    ego_gain: number("ego_gain", ego_gain)?,
-                    opponent_gain: number("opponent_gain", opponent_gain)?,
-                    cone,
-                    speed_limit,
-                };
-                match policy {
-                    PolicySource::Formula(name) => Err(no_formula(&system, name, "none")),
-                    PolicySource::Network { path, network, .. } => {
-                        with_network(&system, path, network, job)
-                    }
-                }
+            SystemSection::DroneRace { .. } => {
+                let (system, policy) = self.race_plant(policy)?;
+                job.run(Plant { system: &system, policy })
             }
             SystemSection::DoubleIntegrator { target, corridor, acceleration } => {
                 let system = DoubleIntegrator {
@@ -107,6 +97,34 @@ impl Config {
                         with_network(&system, path, network, job)
                     }
                 }
+            }
+        }
+    }
+}
+
+impl Config {
+    /// The drone race and its policy, a network.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another system, a formula or a parameter out of range,
+    /// [`Error::File`] for a network of the wrong shape.
+    pub fn race_plant<'a>(&self, policy: &'a PolicySource) -> Result<(DroneRace, &'a Mlp)> {
+        let SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } = self.system
+        else {
+            return Err(Error::invalid("system.name", "only `drone-race` has races"));
+        };
+        let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
+        let system = DroneRace {
+            ego_gain: number("ego_gain", ego_gain)?,
+            opponent_gain: number("opponent_gain", opponent_gain)?,
+            cone,
+            speed_limit,
+        };
+        match policy {
+            PolicySource::Formula(name) => Err(no_formula(&system, name, "none")),
+            PolicySource::Network { path, network, .. } => {
+                check_network(&system, path, network)?;
+                Ok((system, network))
             }
         }
     }
@@ -132,8 +150,20 @@ fn with_network<J: Job, S, const NX: usize, const NU: usize>(
 where
     S: System<NX, NU>,
 {
+    check_network(system, path, network)?;
+    job.run(Plant { system, policy: network })
+}
+
+/// Refuses the network of `path` if it does not fit the system.
+fn check_network<S, const NX: usize, const NU: usize>(
+    system: &S,
+    path: &Path,
+    network: &Mlp,
+) -> Result<()>
+where
+    S: System<NX, NU>,
+{
     let states = system.states();
     let names = states.each_ref().map(|axis| axis.name.as_str());
-    network.check_fits(&names, NU).map_err(|problem| Error::file(path, problem))?;
-    job.run(Plant { system, policy: network })
+    network.check_fits(&names, NU).map_err(|problem| Error::file(path, problem))
 }

@@ -1,5 +1,6 @@
 //! Defaults: the numbers of each profile for each system, from the published study of the race.
 
+use super::race::race;
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection, SystemSection,
@@ -57,6 +58,7 @@ fn drone_race(profile: Profile) -> Config {
     let mut config = common(profile, system, &states, &RACE_STATE, slice);
     config.constants = ConstantsSection { target: given(10.0), constraint: given(20.0) };
     config.growth.heading = names(["ego_x", "ego_vx", "ego_y", "ego_vy"]);
+    config.race = Some(race(profile));
     if profile == Profile::Study {
         // The study scores the first 30 states of a rollout, 29 steps.
         config.rollout.horizon = 29;
@@ -132,6 +134,7 @@ fn common(
             },
             heading: Vec::new(),
         },
+        race: None,
     }
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
+use crate::experiment::settings::RaceSettings;
 use crate::rollout::PairControl;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::system::Cone;
@@ -42,6 +43,9 @@ pub struct Config {
     pub state: StateSection,
     /// Local growth.
     pub growth: GrowthSection,
+    /// The race experiment; the drone race alone has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub race: Option<RaceSettings>,
 }
 
 /// Which defaults fill in what a file leaves out.

@@ -53,6 +53,26 @@ impl Data {
         }
     }
 
+    /// The elements, if they are f32.
+    pub fn as_f32(&self) -> Option<&[f32]> {
+        if let Self::F32(values) = self { Some(values) } else { None }
+    }
+
+    /// The elements, if they are f64.
+    pub fn as_f64(&self) -> Option<&[f64]> {
+        if let Self::F64(values) = self { Some(values) } else { None }
+    }
+
+    /// The elements, if they are bytes.
+    pub fn as_u8(&self) -> Option<&[u8]> {
+        if let Self::U8(values) = self { Some(values) } else { None }
+    }
+
+    /// The elements, if they are u32.
+    pub fn as_u32(&self) -> Option<&[u32]> {
+        if let Self::U32(values) = self { Some(values) } else { None }
+    }
+
     /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0

@@ -39,6 +39,8 @@ pub enum Purpose {
     Picture,
     /// Control noise of MPPI.
     ControlNoise,
+    /// Starts of races.
+    RaceStart,
 }
 
 /// A sequence of random samples, addressed by index.

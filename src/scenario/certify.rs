@@ -243,7 +243,7 @@ fn spendings(ledger: &Ledger) -> Vec<Spending> {
 }
 
 /// Who computed what from which input.
-fn provenance<S, P, const NX: usize, const NU: usize>(
+pub(crate) fn provenance<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
     plant: Plant<'_, S, P>,
     seed: u64,

@@ -16,6 +16,7 @@ pub mod settings;
 pub(crate) mod tail;
 mod verify;
 
+pub(crate) use certify::provenance;
 pub use certify::{Tightened, certify, hashes, tightened};
 pub use verify::{CheckReport, Finding, QueryRow, check, query};
 

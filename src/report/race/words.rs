@@ -39,6 +39,7 @@ pub(super) fn rules(judge: Judge) -> &'static str {
 pub(super) fn class(class: FailureClass) -> &'static str {
     match class {
         FailureClass::UnsafeStart => "unsafe start",
+        FailureClass::NotFinite => "not finite",
         FailureClass::Collision => "collision",
         FailureClass::Fence => "fence",
         FailureClass::MissedGate => "missed gate",
@@ -51,6 +52,7 @@ pub(super) fn class(class: FailureClass) -> &'static str {
 pub(super) fn mark(class: FailureClass) -> (&'static str, &'static str) {
     match class {
         FailureClass::UnsafeStart => ("U", "unsafe"),
+        FailureClass::NotFinite => ("N", "infinite"),
         FailureClass::Collision => ("C", "collision"),
         FailureClass::Fence => ("F", "fence"),
         FailureClass::MissedGate => ("M", "missed"),

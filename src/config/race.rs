@@ -1,0 +1,139 @@
+//! Defaults of the race experiment: the numbers of each profile.
+
+use super::section::Profile;
+use crate::control::{BarrierFilter, BarrierForm, Widening};
+use crate::cost::{CenterlineCost, Fence, LaneCost, RaceCost, RecoveryCost, Safety, SafetyCone};
+use crate::experiment::judge::Judge;
+use crate::experiment::settings::{
+    FilterSettings, FirstPlan, HybridSettings, NetworkFiles, NoPolicySettings, PlanSettings,
+    RaceSettings, RecoveryPoint, SigmaSetting,
+};
+use crate::rollout::NoiseKind;
+
+/// The `[race]` section of `profile`. Where the paper gives no number, `paper` has the study's.
+pub(super) fn race(profile: Profile) -> RaceSettings {
+    let rigorous = profile == Profile::Rigorous;
+    RaceSettings {
+        steps: 80,
+        judge: match profile {
+            Profile::Paper => Judge::Paper,
+            Profile::Study => Judge::Study,
+            Profile::Rigorous => Judge::Rigorous,
+        },
+        // Room for eighty calls of local growth as published; ours spend less.
+        beta: if rigorous { 0.1 } else { 0.999 },
+        starts: "race_starts_500.csv".to_owned(),
+        start_box: start_box(),
+        networks: NetworkFiles {
+            value: "policies/race_value.safetensors".to_owned(),
+            ..NetworkFiles::default()
+        },
+        hybrid: if rigorous { rigorous_hybrid() } else { study_hybrid() },
+        no_policy: NoPolicySettings {
+            recovery: plan(20, 0.7, centerline(1.0, soft(10.0))),
+            fast: plan(20, 0.5, lane(0.5, soft(5.0))),
+        },
+        mppi: plan(25, 0.7, lane(2.0, Safety::NONE)),
+        soft: plan(25, 0.7, lane(2.0, soft(if rigorous { 1e6 } else { 10.0 }))),
+        cbf: plan(if rigorous { 25 } else { 20 }, 0.7, lane(2.0, Safety::NONE)),
+        warmstart: plan(25, 0.7, lane(2.0, Safety::NONE)),
+        warmstart_works: rigorous,
+        filter: filter(rigorous),
+    }
+}
+
+/// Where the study's starts were drawn from.
+fn start_box() -> Vec<[f64; 2]> {
+    let drone = |speed| [[-0.8, 0.8], [0.0, 0.0], [-2.5, -1.0], speed, [-0.1, 0.1], [-0.1, 0.1]];
+    [drone([0.5, 0.7]), drone([0.3, 0.5])].concat()
+}
+
+/// The filter: as published, or with authority over the plant.
+fn filter(rigorous: bool) -> FilterSettings {
+    let BarrierFilter { rate, slack_weight, radius, .. } = BarrierFilter::STUDY;
+    let (form, widening) = match rigorous {
+        true => (BarrierForm::TwoStep, Widening::Heights),
+        false => (BarrierForm::OneStep, Widening::Velocities),
+    };
+    FilterSettings { form, widening, rate, slack_weight, radius }
+}
+
+/// The hybrid as the published code has it.
+fn study_hybrid() -> HybridSettings {
+    HybridSettings {
+        global: true,
+        local: true,
+        recovery_tier: true,
+        latch: true,
+        near_gate: true,
+        near_gate_speed: 0.7,
+        first_plan: FirstPlan::Brake,
+        recovery_point: RecoveryPoint::Verified,
+        plan_gain: 2.0,
+        hold_opponent: true,
+        value_weight: 1e6,
+        value_threshold: -0.02,
+        recovery: plan(20, 0.7, recovery(soft(5.0), Fence::NONE)),
+        fast: plan(20, 0.5, lane(0.5, Safety::NONE)),
+    }
+}
+
+/// The hybrid with safety and fences in both plans, and plans that start from the plant's own
+/// model.
+fn rigorous_hybrid() -> HybridSettings {
+    let study = study_hybrid();
+    let safety = Safety { weight: 1e6, margin: 0.05, cone: SafetyCone::Either, ..Safety::NONE };
+    HybridSettings {
+        plan_gain: 0.5,
+        hold_opponent: false,
+        recovery: plan(20, 0.7, recovery(safety, Fence::NONE)),
+        fast: plan(20, 0.5, lane(0.5, safety)),
+        ..study
+    }
+}
+
+/// A safety term as published: from the cone on.
+fn soft(weight: f32) -> Safety {
+    Safety { weight, ..Safety::NONE }
+}
+
+/// The study's sampling: sigma 0.4, lambda 10, K = 500.
+fn plan(horizon: u32, speed: f32, cost: RaceCost) -> PlanSettings {
+    PlanSettings {
+        samples: 500,
+        horizon,
+        temperature: 10.0,
+        sigma: SigmaSetting::Same(0.4),
+        iterations: 1,
+        noise: NoiseKind::Independent,
+        antithetic: false,
+        noise_cost: false,
+        speed,
+        cost,
+    }
+}
+
+/// Family A.
+fn recovery(safety: Safety, fence: Fence) -> RaceCost {
+    RaceCost::Recovery(RecoveryCost { position: 5.0, velocity: 1.0, control: 0.1, safety, fence })
+}
+
+/// Family A'.
+fn centerline(speed: f32, safety: Safety) -> RaceCost {
+    let fence = Fence::NONE;
+    RaceCost::Centerline(CenterlineCost { lane: 25e3, speed, control: 0.01, safety, fence })
+}
+
+/// Family B.
+fn lane(speed: f32, safety: Safety) -> RaceCost {
+    RaceCost::Lane(LaneCost {
+        lane: 25e3,
+        speed,
+        control: 1e-3,
+        away: 5e4,
+        wide: 5e4,
+        last: 1e4,
+        safety,
+        fence: Fence::NONE,
+    })
+}

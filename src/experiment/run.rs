@@ -1,0 +1,268 @@
+//! A whole experiment: every controller with every noise seed, batch by batch, resumed where it
+//! stopped.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::controller::{Name, World};
+use super::judge::{Judge, safe_at_start};
+use super::log::{RaceLog, arrays, damaged, races};
+use super::picture::picture;
+use super::plan::Paths;
+use super::race::{STEP_SECONDS, fly, race_seed};
+use super::record::{AbsentRecord, CeilingRecord, RACE_SCHEMA, RaceRecord, StartsRecord};
+use super::roster::{absent, controller, settings};
+use super::summary::Summary;
+use crate::digest;
+use crate::error::{Error, Result};
+use crate::files::{Staged, npz_bytes, read_npz};
+use crate::policy::Mlp;
+use crate::rollout::Plant;
+use crate::scenario::{Watch, provenance};
+
+/// Races of a batch; what is lost when the program is stopped is at most one of them.
+const BATCH: usize = 512;
+/// Name of the file that says which experiment a folder holds.
+const MANIFEST: &str = "experiment.json";
+
+/// What is to be raced.
+#[derive(Clone, Debug)]
+pub struct Experiment<'a> {
+    /// What controllers are made of.
+    pub world: World<'a>,
+    /// The controllers.
+    pub names: Vec<Name>,
+    /// The starts.
+    pub starts: Vec<[f32; 12]>,
+    /// Where they come from, in words.
+    pub source: String,
+    /// The noise seeds.
+    pub noise_seeds: Vec<u64>,
+    /// The configuration, as it is stored.
+    pub config: serde_json::Value,
+    /// Where races are stored as they come.
+    pub folder: PathBuf,
+}
+
+/// Compute time of a controller.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimingRecord {
+    /// The controller.
+    pub name: String,
+    /// Control steps, over all races and seeds.
+    pub steps: u64,
+    /// Mean share of a race in the wall time of a step, s.
+    pub mean_seconds: f64,
+    /// The share that 99 % of the steps stay below, s.
+    pub p99_seconds: f64,
+    /// The largest share, s.
+    pub most_seconds: f64,
+}
+
+impl Experiment<'_> {
+    /// Runs what is not stored yet and makes the record of all.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] if the folder holds another experiment, [`Error::File`] if a stored race
+    /// is damaged, those of the controllers, and [`Error::Interrupted`].
+    pub fn run(&self, watch: &dyn Watch) -> Result<(RaceRecord, Vec<TimingRecord>)> {
+        self.claim_folder()?;
+        let reason = |name: &Name| absent(*name, &self.world).map(|reason| (*name, reason));
+        let absent: Vec<(Name, String)> = self.names.iter().filter_map(reason).collect();
+        let runs = |name: &Name| !absent.iter().any(|(missing, _)| missing == name);
+        let mut summaries = Vec::new();
+        for name in self.names.iter().copied().filter(runs) {
+            summaries.push((name, self.controller(name, watch)?));
+        }
+        let timing = summaries.iter().map(|(name, summary)| timing(*name, &summary.seconds));
+        let timing = timing.collect();
+        let record = self.record(&summaries, absent, watch)?;
+        Ok((record, timing))
+    }
+
+    /// All races of one controller.
+    fn controller(&self, name: Name, watch: &dyn Watch) -> Result<Summary> {
+        let race = settings(name, self.world.race);
+        let world = World { race: &race, ..self.world };
+        let growth = &self.world.certificates.growth;
+        let rounds = if growth.split_beta { 1.0 } else { f64::from(growth.rounds) };
+        let betas = match name {
+            Name::HybridNoPolicy => [0.0; 2],
+            _ => [self.world.certificates.deviation.beta, rounds * growth.beta],
+        };
+        let mut summary = Summary::new(name, race.judge, race.steps, betas);
+        for &noise_seed in &self.noise_seeds {
+            summary.next_seed();
+            let total = self.starts.len() as u64 * u64::from(race.steps);
+            watch.begin(&format!("{}, noise seed {noise_seed}", name.text()), total);
+            for first in (0..self.starts.len()).step_by(BATCH) {
+                summary.add(&self.batch(name, world, noise_seed, first, watch)?);
+            }
+        }
+        Ok(summary)
+    }
+
+    /// The races from `first` on: stored ones, or flown now and stored.
+    fn batch(
+        &self,
+        name: Name,
+        world: World<'_>,
+        noise_seed: u64,
+        first: usize,
+        watch: &dyn Watch,
+    ) -> Result<Vec<RaceLog>> {
+        let starts = &self.starts[first..self.starts.len().min(first + BATCH)];
+        let steps = world.race.steps;
+        let file = format!("{}-seed{noise_seed}-from{first}.npz", name.text());
+        let folder = self.folder.join("races");
+        let path = folder.join(&file);
+        if path.exists() {
+            let stored = races(&read_npz(&path)?).map_err(|problem| damaged(&path, &problem))?;
+            let same = stored.iter().map(|race| &race.states[0]).eq(starts);
+            watch.advance(starts.len() as u64 * u64::from(steps))?;
+            return if same { Ok(stored) } else { Err(damaged(&path, "its starts are others")) };
+        }
+        let seeds = self.seeds(noise_seed, first, starts.len());
+        let mut controller = controller(name, world, starts.len(), Paths::None)?;
+        let flights = fly(controller.as_mut(), world.system, starts, &seeds, steps, watch)?;
+        let logs: Vec<RaceLog> = flights.iter().map(RaceLog::from).collect();
+        let mut staged = Staged::new(&folder)?;
+        staged.add(&file, &npz_bytes(&arrays(&logs, steps as usize))?)?;
+        staged.publish()?;
+        Ok(logs)
+    }
+
+    /// The seeds of the races `first..first + count`.
+    fn seeds(&self, noise_seed: u64, first: usize, count: usize) -> Vec<u64> {
+        (first..first + count).map(|race| race_seed(noise_seed, race as u64)).collect()
+    }
+
+    /// The record of all that ran.
+    fn record(
+        &self,
+        summaries: &[(Name, Summary)],
+        absent: Vec<(Name, String)>,
+        watch: &dyn Watch,
+    ) -> Result<RaceRecord> {
+        let World { backend, system, policy, value, race, certificates, .. } = self.world;
+        let hybrid = summaries.iter().find(|(name, _)| *name == Name::Hybrid);
+        let hybrid = hybrid.map(|(_, summary)| summary);
+        let plant = Plant { system, policy };
+        let absent = absent
+            .into_iter()
+            .map(|(name, reason)| AbsentRecord { name: name.text().to_owned(), reason });
+        let controllers = summaries.iter().map(|(_, summary)| summary.record(hybrid));
+        let mut shown = None;
+        if let Some(&(name, _)) = summaries.iter().find(|(name, _)| *name == Name::Hybrid) {
+            shown = Some(self.picture(name, watch)?);
+        }
+        Ok(RaceRecord {
+            schema: RACE_SCHEMA,
+            provenance: provenance(backend, plant, certificates.seed, self.config.clone()),
+            value_sha256: value.map(Mlp::digest),
+            steps: race.steps,
+            step_seconds: STEP_SECONDS,
+            starts: StartsRecord {
+                source: self.source.clone(),
+                count: self.starts.len() as u64,
+                sha256: self.starts_sha256(),
+                ceilings: Judge::ALL.map(|judge| self.ceiling(judge)).to_vec(),
+            },
+            noise_seeds: self.noise_seeds.clone(),
+            controllers: controllers.collect(),
+            absent: absent.collect(),
+            picture: shown,
+        })
+    }
+
+    /// The race that is drawn: of the first batch with the first noise seed, the first of those
+    /// that saw the most tiers.
+    fn picture(&self, name: Name, watch: &dyn Watch) -> Result<super::record::PictureRecord> {
+        let race = settings(name, self.world.race);
+        let world = World { race: &race, ..self.world };
+        let noise_seed = self.noise_seeds[0];
+        let logs = self.batch(name, world, noise_seed, 0, watch)?;
+        let seen = |race: &RaceLog| {
+            let mut tiers: Vec<_> = race.steps.iter().map(|step| step.tier).collect();
+            tiers.sort_unstable();
+            tiers.dedup();
+            tiers.len()
+        };
+        let most = logs.iter().map(seen).max().unwrap_or(0);
+        let start = logs.iter().position(|race| seen(race) == most).unwrap_or(0);
+        let seed = race_seed(noise_seed, start as u64);
+        picture(name, world, (start, self.starts[start]), (noise_seed, seed), watch)
+    }
+
+    /// Starts that do not violate `judge` before anyone moves.
+    fn ceiling(&self, judge: Judge) -> CeilingRecord {
+        let safe = self.starts.iter().filter(|start| safe_at_start(judge, start)).count();
+        CeilingRecord { judge, safe: safe as u64 }
+    }
+
+    /// SHA-256 over the starts.
+    fn starts_sha256(&self) -> String {
+        digest::sha256([bytemuck::cast_slice(&self.starts)])
+    }
+
+    /// Makes sure that the folder is of this experiment, and says so in it.
+    fn claim_folder(&self) -> Result<()> {
+        let path = self.folder.join(MANIFEST);
+        let mine = self.manifest();
+        match std::fs::read_to_string(&path) {
+            Ok(text) if text == mine => Ok(()),
+            Ok(_) => Err(Error::Refused(format!(
+                "{} holds another experiment (other configuration, starts, networks, backend or \
+                 version, see {MANIFEST} there); give another --out, or remove that folder",
+                self.folder.display()
+            ))),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                let mut staged = Staged::new(&self.folder)?;
+                staged.add(MANIFEST, mine.as_bytes())?;
+                staged.publish().map(|_| ())
+            }
+            Err(error) => Err(Error::file(&path, error)),
+        }
+    }
+
+    /// Everything that the races depend on but their controller and noise seed.
+    fn manifest(&self) -> String {
+        let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
+            self.world;
+        let digest = |network: Option<&Mlp>| network.map(Mlp::digest);
+        let origin =
+            provenance(backend, Plant { system, policy }, certificates.seed, self.config.clone());
+        let manifest = serde_json::json!({
+            "schema": RACE_SCHEMA,
+            "provenance": origin,
+            "starts_sha256": self.starts_sha256(),
+            "value_sha256": digest(value),
+            "disturbance_sha256": digest(disturbance),
+            "ppo_sha256": digest(ppo),
+        });
+        format!("{manifest:#}\n")
+    }
+}
+
+/// Compute time from that of each step.
+fn timing(name: Name, seconds: &[f32]) -> TimingRecord {
+    let mut sorted: Vec<f64> = seconds.iter().map(|seconds| f64::from(*seconds)).collect();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        let place = (share * sorted.len() as f64) as usize;
+        sorted.get(place.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    };
+    TimingRecord {
+        name: name.text().to_owned(),
+        steps: sorted.len() as u64,
+        mean_seconds: sorted.iter().sum::<f64>() / sorted.len().max(1) as f64,
+        p99_seconds: at(0.99),
+        most_seconds: at(1.0),
+    }
+}
+
+/// Where an experiment goes unless `--out` says otherwise.
+pub fn default_folder() -> &'static Path {
+    Path::new("reachcast-race")
+}
