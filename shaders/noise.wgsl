@@ -34,7 +34,8 @@ fn open_source(problem: u32, sample: u32) {
 
 fn normal(number: u32) -> f32 {
     let block = number / BLOCK_NUMBERS;
-    if block != source.block {
+    // Once at most: some drivers compute both sides of an `if`, but leave a loop out.
+    while block != source.block {
         let counter = vec4<u32>(source.index, params.iteration, block, source.stream);
         let words = philox(counter, source.key);
         let even = normal_pair(1.0 - unit(words.x), unit(words.y));

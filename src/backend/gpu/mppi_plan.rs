@@ -140,13 +140,13 @@ fn rounds(samples: u32, problems: u32) -> u32 {
 }
 
 /// Loop iterations that drawing the noise of `steps` consecutive steps takes, the loop over the
-/// steps included: a block of Philox for every 4 numbers and one that the dispatch before used in
-/// part, an iteration per knot, and the correlated noise loaded and stored.
+/// steps included: an iteration per number, a block of Philox for every 4 of them and one that the
+/// dispatch before used in part, an iteration per knot, and the correlated noise loaded and stored.
 fn noise_trips(size: &Size<'_>, steps: u64) -> u64 {
     let controls = size.controls as u64;
     let draws = steps + WINDOW;
     let blocks = (draws * controls).div_ceil(4) + 1;
-    steps + draws + PHILOX_TRIPS * blocks + 2 * controls
+    steps + draws * (1 + controls) + (1 + PHILOX_TRIPS) * blocks + 2 * controls
 }
 
 /// Loop iterations of a thread of the update.
@@ -239,17 +239,17 @@ mod tests {
             for steps in [1, 2, 20, 512] {
                 let size = size(controls, 512, 64, 1);
                 let controls = controls as u64;
-                let steps_and_blocks = steps + 10 * touched_blocks(controls, steps);
+                let steps_and_blocks = steps * (1 + controls) + 11 * touched_blocks(controls, steps);
                 assert!(noise_trips(&size, steps) >= steps_and_blocks + 2 * controls);
                 // At most a knot per step after the first four.
                 let knots = steps + 3;
-                let spline = steps + knots + 10 * touched_blocks(controls, knots);
+                let spline = steps + knots * (1 + controls) + 11 * touched_blocks(controls, knots);
                 assert!(noise_trips(&size, steps) >= spline, "{controls} {steps}");
             }
         }
         // 512 steps of 3 controls: 52 tiles of 10 steps, each 64 terms and itself.
         let whole = size(3, 512, 64, 1);
-        let least = 52 * 65 + 512 + 10 * 384;
+        let least = 52 * 65 + 512 * 4 + 11 * 384;
         assert!((least..2 * least).contains(&update_trips(&whole, 1, 512)));
     }
 

@@ -22,6 +22,9 @@ const UPDATE: &str = include_str!("../../../../shaders/mppi_update.wgsl");
 /// Weighted controls that a workgroup of the update holds per thread, where a step has not more.
 const TILE_TERMS: usize = 32;
 
+/// Most controls whose normal numbers are drawn without a loop.
+const MOST_CALLS: usize = 4;
+
 /// Steps that the update sums up at a time for `controls` controls.
 pub(in super::super) fn tile_steps(controls: usize) -> usize {
     (TILE_TERMS / controls).max(1)
@@ -135,9 +138,15 @@ fn noise_text<const NU: usize>(spec: &MppiSpec<NU>) -> String {
     .join("\n")
 }
 
-/// `draw`: the normal numbers of a step or knot, in ascending order.
+/// `draw`: the normal numbers of a step or knot, in ascending order; many of them in a loop, since
+/// the text of the generator is compiled wherever it is called.
 fn draw(controls: usize) -> String {
     let mut text = String::from("fn draw(number: u32) -> Control {\n");
+    if controls > MOST_CALLS {
+        return text
+            + "    var z: Control;\n    for (var i = 0u; i < NU; i += 1u) {\n        \
+               z[i] = normal(number * NU + i);\n    }\n    return z;\n}\n";
+    }
     for i in 0..controls {
         text += &format!("    let z{i} = normal(number * NU + {i}u);\n");
     }
