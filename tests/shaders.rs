@@ -137,7 +137,7 @@ fn mppi_texts_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
             let costs = CostQuery::Summary;
             let problems = &[];
             let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
-            let name = format!("{} {noise:?} {} networks", system.name(), value.iter().count());
+            let name = format!("{} {noise:?}, value network: {}", system.name(), value.is_some());
             out.push((name, MppiText::new(system, cost, &task)));
         }
     }

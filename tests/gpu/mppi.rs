@@ -247,7 +247,7 @@ impl<const N: usize> Cost<N, N, 1> for Drift<N> {
     }
 }
 
-/// 512 steps of 24 controls need more loop iterations than a thread may spend: both kernels are
+/// 512 steps of 40 controls need more loop iterations than a thread may spend: both kernels are
 /// split, and the noise has to survive that.
 fn split<const N: usize>(noise: NoiseKind) {
     let system = Drift::<N>;
@@ -263,9 +263,9 @@ fn split<const N: usize>(noise: NoiseKind) {
 
 #[test]
 fn plans_split_over_dispatches() {
-    split::<52>(NoiseKind::Independent);
-    split::<52>(NoiseKind::Colored { time: 20.0 });
-    split::<52>(NoiseKind::Spline { knots: 500 });
+    split::<40>(NoiseKind::Independent);
+    split::<40>(NoiseKind::Colored { time: 20.0 });
+    split::<40>(NoiseKind::Spline { knots: 500 });
     split::<1>(NoiseKind::Independent);
 }
 
@@ -334,7 +334,7 @@ fn summaries_leave_the_costs_away() {
     assert!(backend.mppi(&system, &quadratic(), &none).expect("nothing to do").is_empty());
 }
 
-/// `weight exp`-like growth: infinite where the first control is above the context.
+/// Infinite where a control is above the context.
 struct Cliff;
 
 impl Cost<2, 1, 1> for Cliff {

@@ -136,8 +136,8 @@ pub(crate) fn differences<const NU: usize>(
     let samples = truth.effective_samples;
     within("effective samples", result.effective_samples, samples, relative * samples)?;
     for t in 0..truth.plan.len() {
-        for i in 0..NU {
-            let range = f64::from(bounds[i][1] - bounds[i][0]);
+        for (i, [low, high]) in bounds.into_iter().enumerate() {
+            let range = f64::from(high - low);
             let own = (f64::from(host.plan[t][i]) - truth.plan[t][i]).abs();
             let band = 8.0 * own + (1e-5 + 2.0 * band / f64::from(temperature)) * range;
             let what = format!("control {i} of step {t}");

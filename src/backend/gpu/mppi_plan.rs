@@ -239,7 +239,8 @@ mod tests {
             for steps in [1, 2, 20, 512] {
                 let size = size(controls, 512, 64, 1);
                 let controls = controls as u64;
-                let steps_and_blocks = steps * (1 + controls) + 11 * touched_blocks(controls, steps);
+                let steps_and_blocks =
+                    steps * (1 + controls) + 11 * touched_blocks(controls, steps);
                 assert!(noise_trips(&size, steps) >= steps_and_blocks + 2 * controls);
                 // At most a knot per step after the first four.
                 let knots = steps + 3;
