@@ -1,7 +1,5 @@
 // The reach-avoid measure, folded step by step. Twin: rollout/fold.rs.
 
-const EXPONENT: u32 = 0x7f800000u;
-
 struct Fold {
     // Smallest discounted constraint margin so far; -HUGE once something was not finite, which
     // no later margin can raise: the rollout is over.
@@ -12,11 +10,6 @@ struct Fold {
 
 fn empty_fold() -> Fold {
     return Fold(HUGE, -HUGE);
-}
-
-// Tests exponent bits: a driver may assume that there is no NaN and remove `x != x`.
-fn finite(value: f32) -> bool {
-    return (bitcast<u32>(value) & EXPONENT) != EXPONENT;
 }
 
 fn fold_add(fold: Fold, target_margin: f32, constraint_margin: f32, discount: f32) -> Fold {

@@ -25,7 +25,11 @@ struct Params {
     layer_inputs: u32,
     layer_outputs: u32,
     segment_start: u32,
-    pad: u32,
+    iteration: u32,
+    samples: u32,
+    width: u32,
+    rounds: u32,
+    temperature: f32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

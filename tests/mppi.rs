@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::cpu;
+use common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
 use reachcast::cost::{
@@ -126,7 +126,7 @@ fn distance(plan: &[[f32; 1]], truth: &DVector<f64>) -> f64 {
 /// The error of one update against its closed-form limit falls as one over the root of K.
 #[test]
 fn one_update_converges_to_its_closed_form_at_the_rate_of_monte_carlo() {
-    for backend in [cpu(2)] {
+    for backend in backends() {
         let truth = limit(&DVector::zeros(STEPS));
         let error = |samples: u32| {
             let square = |seed| {
@@ -170,7 +170,7 @@ fn iterated_updates_approach_the_optimum_of_the_regulator() {
 
 #[test]
 fn weights_sum_to_one_and_follow_the_temperature() {
-    for backend in [cpu(2)] {
+    for backend in backends() {
         let run = |temperature: f32| {
             let settings =
                 MppiSettings { temperature, bounds: [[-1.0, 1.5]], ..*linear_spec(500).settings() };
@@ -281,7 +281,7 @@ fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
         let settings = task.spec.settings();
         (settings.samples, f64::from(settings.temperature))
     };
-    for backend in [cpu(2)] {
+    for backend in backends() {
         let results = backend.mppi(system, cost, task).unwrap();
         assert_eq!(results.len(), task.problems.len());
         for (problem, result) in results.iter().enumerate() {
@@ -469,7 +469,7 @@ fn costs_that_are_not_finite_weigh_nothing() {
     let spec = linear_spec(100);
     let mut problems = [linear_problem(vec![[150.0]; STEPS], 1)];
     problems[0].start = [1e12, 0.0];
-    for backend in [cpu(2)] {
+    for backend in backends() {
         let result = backend.mppi(&Linear, &cost, &task(&spec, &problems)).unwrap().remove(0);
         assert_eq!((result.non_finite, result.effective_samples), (100, 0.0));
         assert!(

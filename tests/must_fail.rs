@@ -4,13 +4,18 @@
 //! reference to see it; the comparison itself passes on the kernels as they are.
 
 mod common;
+#[path = "oracle/mppi.rs"]
+mod oracle;
 
 use common::{adapter, race_policy};
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::Gpu;
+use reachcast::cost::Quadratic;
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::rollout::{
-    Ball, DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, Stream, Tightening, measure, pair_measures,
+    Ball, CostQuery, DeviationTask, Disturbance, MppiProblem, MppiSettings, MppiSpec, MppiTask,
+    NoiseKind, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region, RolloutSpec,
+    Sigma, Starts, Stream, Tightening, ValueTerm, measure, pair_measures,
 };
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
 
@@ -134,8 +139,80 @@ where
         })
 }
 
-/// Requires that parity fails once `old` is replaced by `new`, and that the text had `old`.
-fn caught(old: &'static str, new: &'static str) {
+/// A problem of the double integrator that differs from the others and from step to step.
+fn mppi_problem(number: u32) -> MppiProblem<2, 1, 3> {
+    let shift = 0.1 * number as f32;
+    let step = |t: u32| 0.7 * (t as f32 + shift).sin();
+    MppiProblem {
+        start: [0.8 - shift, shift - 0.3],
+        plan: (0..MPPI_HORIZON).map(|t| [step(t)]).collect(),
+        context: (0..MPPI_HORIZON).map(|t| [0.1 * step(t), shift, t as f32 / 9.0]).collect(),
+        stream: Stream::new(3, Purpose::ControlNoise, number),
+    }
+}
+
+/// Steps of a plan: not a whole number of tiles of the update.
+const MPPI_HORIZON: u32 = 37;
+
+/// A layer with weights of both signs.
+fn mppi_network() -> Mlp {
+    let layer = Layer { weight: vec![0.7, -0.9], bias: vec![0.2], inputs: 2, outputs: 1 };
+    Mlp::new(vec![layer], Activation::Tanh, OutputActivation::Tanh).expect("a network")
+}
+
+/// Whether the adapter agrees with f64 on plans of the double integrator under each kind of noise,
+/// with and without networks, clipped and antithetic.
+fn mppi_parity(gpu: Gpu) -> bool {
+    let backend = Backend::Gpu(gpu);
+    let network = mppi_network();
+    let value = ValueTerm { network: &network, weight: 3.0, threshold: 0.4 };
+    let disturbance = Disturbance { network: &network, entries: &[(1, 0.1)] };
+    let kinds =
+        [NoiseKind::Independent, NoiseKind::Colored { time: 3.0 }, NoiseKind::Spline { knots: 9 }];
+    let problems: Vec<_> = (0..2).map(mppi_problem).collect();
+    kinds.into_iter().enumerate().all(|(number, noise)| {
+        let networked = number > 0;
+        let spec = mppi_spec(noise, number == 0);
+        let task = MppiTask {
+            spec: &spec,
+            problems: &problems,
+            iteration: 5,
+            value: networked.then_some(value),
+            disturbance: networked.then_some(disturbance),
+            costs: CostQuery::Each,
+        };
+        plans_agree(&backend, &task)
+    })
+}
+
+/// Three workgroups of samples and some; the noise reaches far beyond the bounds.
+fn mppi_spec(noise: NoiseKind, antithetic: bool) -> MppiSpec<1> {
+    let settings = MppiSettings {
+        noise,
+        antithetic,
+        sigma: Sigma::PerControl([1.0]),
+        temperature: 20.0,
+        ..MppiSettings::new(&DoubleIntegrator::default(), 150, MPPI_HORIZON)
+    };
+    MppiSpec::new(settings).expect("settings")
+}
+
+fn plans_agree(backend: &Backend, task: &MppiTask<'_, 2, 1, 3>) -> bool {
+    let system = DoubleIntegrator::default();
+    let cost =
+        Quadratic::<2, 1> { state: [2.0, 0.5], control: [0.3], last: [9.0, 4.0], obstacle: None };
+    let host = common::cpu(1).mppi(&system, &cost, task).expect("the host runs");
+    let Ok(results) = backend.mppi(&system, &cost, task) else { return false };
+    let settings = task.spec.settings();
+    let scales = (settings.temperature, settings.bounds);
+    results.iter().zip(&host).enumerate().all(|(number, (result, host))| {
+        let truth = oracle::truth((&system, &cost), task, number);
+        oracle::differences(&truth, result, host, scales).is_ok()
+    })
+}
+
+/// Requires that `parity` fails once `old` is replaced by `new`, and that the text had `old`.
+fn caught(parity: fn(Gpu) -> bool, old: &'static str, new: &'static str) {
     let Some(gpu) = adapter() else { return };
     let seen = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let found = seen.clone();
@@ -152,20 +229,24 @@ fn kernels_as_they_are_agree() {
     if let Some(gpu) = adapter() {
         assert!(parity(gpu));
     }
+    if let Some(gpu) = adapter() {
+        assert!(mppi_parity(gpu));
+    }
 }
 
 macro_rules! mutants {
-    ($($name:ident: $old:expr => $new:expr;)*) => {
+    ($parity:ident: $($name:ident: $old:expr => $new:expr;)*) => {
         $(
             #[test]
             fn $name() {
-                caught($old, $new);
+                caught($parity, $old, $new);
             }
         )*
     };
 }
 
 mutants! {
+    parity:
     one_step_too_few: "if t < params.horizon {" => "if t + 1u < params.horizon {";
     one_state_too_many: "t < params.step + params.steps;" => "t <= params.step + params.steps;";
     last_state_not_judged: "t < params.step + params.steps;" => "t + 1u < params.step + params.steps;";
@@ -181,4 +262,28 @@ mutants! {
     perturbed_is_nominal: "perturbed = advance(perturbed, replayed);" => "perturbed = advance(nominal, replayed);";
     states_swapped: "let v1 = x[1];" => "let v1 = x[0];";
     branches_turned: " < v" => " > v";
+}
+
+mutants! {
+    mppi_parity:
+    controls_not_clipped: "recorded_control(nominal[0], z[0])" => "nominal[0] + z[0]";
+    antithetic_sign_lost: "select(1.0, -1.0, sample % 2u == 1u)" => "1.0";
+    antithetic_index_kept: "source.index = sample / 2u;" => "source.index = sample;";
+    plan_of_the_next_step: "plan_at(stage)" => "plan_at(stage + 1u)";
+    context_of_the_first_step: "context_at(stage)" => "context_at(problem * params.horizon)";
+    last_stage_not_charged: "t < params.step + params.steps;" => "t + 1u < params.step + params.steps;";
+    weights_without_the_minimum: "(least - cost)" => "(0.0 - cost)";
+    weighed_with_the_noise_of_another: "params.first_low + place + ahead);" => "params.first_low + place + ahead + 2u);";
+    rolled_with_the_noise_of_another: "open_source(problem, params.first_low + place);" => "open_source(problem, params.first_low + place + 2u);";
+    stream_of_the_first_problem: "streams[problem]" => "streams[0]";
+    iteration_ignored: "params.iteration, block" => "0u, block";
+    least_is_largest: "b.cost < a.cost ||" => "b.cost > a.cost ||";
+    squares_are_weights: "weight * weight, 0.0, 0.0" => "weight, 0.0, 0.0";
+    last_tile_not_summed: "first < end; first += TILE_STEPS" => "first + TILE_STEPS <= end; first += TILE_STEPS";
+    padding_weighed: "place + ahead < params.samples && counts(cost)" => "counts(cost)";
+    value_forgotten: "total = charge_value(column, total);" => "";
+    disturbance_forgotten: "x = disturb(column, x);" => "";
+    noise_not_correlated: "correlated = recurrence(correlated, fresh);" => "correlated = fresh;";
+    correlation_lost_between_dispatches: "if params.step > 0u {" => "if params.step > params.horizon {";
+    a_knot_too_far: "next_knot < row.first + SUPPORT" => "next_knot <= row.first + SUPPORT";
 }

@@ -7,11 +7,14 @@ use bytemuck::Zeroable;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
 use reachcast::backend::gpu::Params;
-use reachcast::backend::gpu::compose::{Access, Kernel, Shape, Slot, compose};
+use reachcast::backend::gpu::compose::{Access, Kernel, MppiText, Shape, Slot, compose};
 use reachcast::backend::physics;
+use reachcast::cost::{Cost, Fence, Quadratic, RaceCost, RecoveryCost, Safety};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
-use reachcast::rollout::Plant;
+use reachcast::rollout::{
+    CostQuery, Disturbance, MppiSettings, MppiSpec, MppiTask, NoiseKind, Plant, ValueTerm,
+};
 use reachcast::system::{Axis, BangBang, Cone, DoubleIntegrator, DroneRace, System};
 
 /// One state, one control: the recorded functions take and return plain numbers.
@@ -104,12 +107,82 @@ fn validated(name: &str, text: &str) -> (naga::Module, ModuleInfo) {
     (module, info)
 }
 
-fn each_kernel(mut see: impl FnMut(&str, Kernel, &Shape, &naga::Module, &ModuleInfo)) {
+type Bindings<'a> = (Kernel, &'a [(Slot, Access)]);
+
+/// Texts of MPPI for one system and cost: each kind of noise, with and without each network.
+fn mppi_texts_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    system: &S,
+    cost: &C,
+    out: &mut Vec<(String, MppiText)>,
+) where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let value = network(NX, 1, Activation::Tanh);
+    let push = network(NX, 1, Activation::Relu);
+    let term = ValueTerm { network: &value, weight: 1.0, threshold: 0.5 };
+    let pushed = Disturbance { network: &push, entries: &[(NX - 1, 0.5)] };
+    let kinds =
+        [NoiseKind::Independent, NoiseKind::Colored { time: 3.0 }, NoiseKind::Spline { knots: 5 }];
+    for (number, noise) in kinds.into_iter().enumerate() {
+        for (value, disturbance) in [(None, None), (Some(term), Some(pushed)), (Some(term), None)] {
+            let independent = noise == NoiseKind::Independent;
+            let settings = MppiSettings {
+                noise,
+                antithetic: number == 1,
+                noise_cost: independent && value.is_none(),
+                ..MppiSettings::new(system, 100, 9)
+            };
+            let spec = MppiSpec::new(settings).expect("settings");
+            let costs = CostQuery::Summary;
+            let problems = &[];
+            let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
+            let name = format!("{} {noise:?}, value network: {}", system.name(), value.is_some());
+            out.push((name, MppiText::new(system, cost, &task)));
+        }
+    }
+}
+
+/// The cost of [`Scalar`].
+impl Cost<1, 1, 1> for Scalar {
+    fn stage<R: Real>(&self, [x]: [R; 1], [u]: [R; 1], [goal]: [R; 1]) -> R {
+        (x - goal) * (x - goal) + u * u
+    }
+}
+
+fn mppi_texts() -> Vec<(String, MppiText)> {
+    let mut all = Vec::new();
+    mppi_texts_of(&Scalar, &Scalar, &mut all);
+    let quadratic =
+        Quadratic::<2, 1> { state: [1.0; 2], control: [0.1], last: [2.0; 2], obstacle: None };
+    mppi_texts_of::<_, _, 2, 1, 3>(&DoubleIntegrator::default(), &quadratic, &mut all);
+    let safety = Safety { weight: 1.0, ..Safety::NONE };
+    let fence = Fence { weight: 1.0, margin: 0.1 };
+    let cost = RaceCost::Recovery(RecoveryCost {
+        position: 1.0,
+        velocity: 1.0,
+        control: 0.1,
+        safety,
+        fence,
+    });
+    mppi_texts_of(&DroneRace::default(), &cost, &mut all);
+    all
+}
+
+fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInfo)) {
     for (plant, shape, physics) in all_plants() {
-        for kernel in Kernel::ALL {
+        for kernel in Kernel::ROLLOUT {
             let name = format!("{kernel:?} of {plant}");
             let (module, info) = validated(&name, &compose(kernel, &shape, &physics));
-            see(&name, kernel, &shape, &module, &info);
+            let bindings = kernel.bindings(shape.network.is_some());
+            see(&name, (kernel, &bindings), &module, &info);
+        }
+    }
+    for (plant, text) in mppi_texts() {
+        for kernel in Kernel::MPPI {
+            let name = format!("{kernel:?} of {plant}");
+            let (module, info) = validated(&name, &text.compose(kernel));
+            see(&name, (kernel, &text.bindings(kernel)), &module, &info);
         }
     }
 }
@@ -134,18 +207,28 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
         Slot::Weights => &["weights"],
         Slot::Source => &["source"],
         Slot::Sink => &["sink"],
+        Slot::Streams => &["streams"],
+        Slot::Plans => &["plans"],
+        Slot::Contexts => &["contexts"],
+        Slot::Starts => &["starts"],
+        Slot::Totals => &["totals"],
+        Slot::Spline => &["spline"],
+        Slot::Carry => &["carry"],
+        Slot::Value => &["value"],
+        Slot::Push => &["push"],
+        Slot::Partials => &["partials"],
     }
 }
 
 #[test]
 fn bindings_are_those_that_rust_lists() {
-    each_kernel(|name, kernel, shape, module, info| {
-        let listed = kernel.bindings(shape.network.is_some());
+    each_kernel(|name, (_, listed), module, info| {
         let entry = info.get_entry_point(0);
         let mut declared = 0;
         for (handle, variable) in module.global_variables.iter() {
             let Some(binding) = &variable.binding else {
-                assert_eq!(variable.space, AddressSpace::WorkGroup, "{name}");
+                let own = [AddressSpace::WorkGroup, AddressSpace::Private];
+                assert!(own.contains(&variable.space), "{name}");
                 continue;
             };
             declared += 1;
@@ -176,7 +259,7 @@ fn bindings_are_those_that_rust_lists() {
 
 #[test]
 fn entry_points_and_workgroups() {
-    each_kernel(|name, kernel, _, module, _| {
+    each_kernel(|name, (kernel, _), module, _| {
         let [entry] = module.entry_points.as_slice() else {
             panic!("{name} has not one entry point");
         };
@@ -187,16 +270,10 @@ fn entry_points_and_workgroups() {
 
 #[test]
 fn storage_fits_the_least_that_adapters_offer() {
-    for network in [false, true] {
-        for kernel in Kernel::ALL {
-            let storage = kernel
-                .bindings(network)
-                .iter()
-                .filter(|(_, access)| *access != Access::Uniform)
-                .count();
-            assert!(storage <= 8, "{kernel:?} binds {storage} storage buffers");
-        }
-    }
+    each_kernel(|name, (_, bindings), _, _| {
+        let storage = bindings.iter().filter(|(_, access)| *access != Access::Uniform).count();
+        assert!(storage <= 8, "{name} binds {storage} storage buffers");
+    });
 }
 
 #[test]
@@ -234,9 +311,13 @@ fn uniform_block_has_the_layout_of_params() {
         layer_inputs,
         layer_outputs,
         segment_start,
-        pad
+        iteration,
+        samples,
+        width,
+        rounds,
+        temperature
     );
-    each_kernel(|name, _, _, module, _| {
+    each_kernel(|name, _, module, _| {
         let (_, params) = module
             .types
             .iter()
@@ -252,7 +333,7 @@ fn uniform_block_has_the_layout_of_params() {
         assert_eq!(declared, expected, "{name}");
         assert_eq!(*span as usize, size_of::<Params>(), "{name}");
         for member in members {
-            let float = member.name.as_deref() == Some("pair_radius");
+            let float = matches!(member.name.as_deref(), Some("pair_radius" | "temperature"));
             let scalar = if float { naga::Scalar::F32 } else { naga::Scalar::U32 };
             let inner = &module.types[member.ty].inner;
             assert_eq!(*inner, TypeInner::Scalar(scalar), "{name}");

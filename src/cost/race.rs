@@ -122,7 +122,7 @@ pub enum SafetyCone {
 }
 
 /// `weight max(0, margin - f)^2` for the nearer fence of each axis, `f = 0.05 - y - |x|` and
-/// `f = 0.05 - y - |z|`.
+/// `f = 0.05 - y - |z|`, short of the gate's plane: past it there are no fences.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fence {
@@ -171,7 +171,8 @@ impl Fence {
         }
         let [ego_x, _, ego_y, _, ego_z, ..] = *x;
         let short = R::lit(self.margin - FENCE) + ego_y;
-        R::lit(self.weight) * (hinge(short + ego_x.abs()) + hinge(short + ego_z.abs()))
+        let cost = R::lit(self.weight) * (hinge(short + ego_x.abs()) + hinge(short + ego_z.abs()));
+        ego_y.if_lt(R::lit(0.0), cost, R::lit(0.0))
     }
 }
 

@@ -180,7 +180,12 @@ fn penalty<const NU: usize>(factor: &[[f32; NU]; NU], temperature: f32) -> Resul
         Error::invalid("noise_cost", "a control without noise has no noise cost; set its sigma")
     })?;
     let scaled = inverse * f64::from(temperature);
-    Ok(std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] as f32)))
+    let penalty: [[f32; NU]; NU] =
+        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] as f32));
+    if penalty.iter().flatten().all(|entry| entry.is_finite()) {
+        return Ok(penalty);
+    }
+    Err(Error::invalid("noise_cost", "sigma is so small that the noise cost overflows"))
 }
 
 /// One plan to improve.
@@ -283,7 +288,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> MppiTask<'_, NX, NU, NC>
     ///
     /// # Errors
     /// [`Error::Invalid`] for a plan or context that has not H steps, a start or plan that is not
-    /// finite, or a network of the wrong shape.
+    /// finite, a network of the wrong shape, or a weight, threshold or scale that is not finite.
     pub fn check(&self) -> Result<()> {
         let horizon = self.spec.settings.horizon as usize;
         for (number, problem) in self.problems.iter().enumerate() {
@@ -313,12 +318,20 @@ impl<const NX: usize, const NU: usize, const NC: usize> MppiTask<'_, NX, NU, NC>
         };
         if let Some(value) = &self.value {
             fits("value network", value.network, 1)?;
+            if !(value.weight.is_finite() && value.threshold.is_finite()) {
+                let text = "weight and threshold of the value term have to be finite";
+                return Err(Error::invalid("value network", text));
+            }
         }
         if let Some(disturbance) = &self.disturbance {
             let entries = disturbance.entries;
             fits("disturbance network", disturbance.network, entries.len())?;
             if entries.len() > NX || entries.iter().any(|(state, _)| *state >= NX) {
                 let text = format!("its outputs go to states below {NX}, at most one for each");
+                return Err(Error::invalid("disturbance network", text));
+            }
+            if !entries.iter().all(|(_, scale)| scale.is_finite()) {
+                let text = "the scale of each output has to be finite";
                 return Err(Error::invalid("disturbance network", text));
             }
         }

@@ -5,6 +5,9 @@
 mod edges;
 mod failures;
 mod measures;
+mod mppi;
+#[path = "../oracle/mppi.rs"]
+mod oracle;
 mod pairs;
 mod starts;
 mod systems;

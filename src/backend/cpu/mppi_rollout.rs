@@ -6,10 +6,11 @@ use super::dispatch::{Body, Unit};
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use super::mppi_update::Softmin;
+use super::tile::is_finite;
 use crate::backend::softmin::Partial;
 use crate::cost::Cost;
 use crate::real::{Lanes, Real};
-use crate::rollout::{MppiProblem, MppiSpec, MppiTask, Noise, Stream};
+use crate::rollout::{HUGE, MppiProblem, MppiSpec, MppiTask, Noise, Stream};
 use crate::system::System;
 
 /// Consecutive samples of a problem for one thread; twin: `shaders/mppi_rollout.wgsl`.
@@ -71,7 +72,7 @@ where
 /// The costs of a group, infinite where they are not finite.
 fn write<const N: usize>(cost: &Lanes<N>, out: &mut [f32]) {
     for (out, cost) in out.iter_mut().zip(cost.0) {
-        *out = if cost.is_finite() { cost } else { f32::INFINITY };
+        *out = if is_finite(cost) && cost < HUGE { cost } else { f32::INFINITY };
     }
 }
 

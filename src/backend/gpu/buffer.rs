@@ -36,7 +36,11 @@ pub struct Params {
     pub layer_inputs: u32,
     pub layer_outputs: u32,
     pub segment_start: u32,
-    pub pad: u32,
+    pub iteration: u32,
+    pub samples: u32,
+    pub width: u32,
+    pub rounds: u32,
+    pub temperature: f32,
 }
 
 impl Params {

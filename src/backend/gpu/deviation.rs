@@ -44,14 +44,14 @@ where
         let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
         job.upload_starts(&task.pairs.nominal, first, columns, &buffers.state);
         chunks.run(first, columns)?;
-        let found: Vec<[u32; 2]> = buffers.farthest.read(job.device, rows)?;
+        let found: Vec<[u32; 2]> = buffers.farthest.read(job.call.device, rows)?;
         for (farthest, [bits, column]) in farthest.iter_mut().zip(found) {
             *farthest = farthest.merge(Farthest {
                 distance: f32::from_bits(bits),
                 pair: first + u64::from(column),
             });
         }
-        let values: Vec<PairMeasure> = buffers.measures.read(job.device, columns as usize)?;
+        let values: Vec<PairMeasure> = buffers.measures.read(job.call.device, columns as usize)?;
         sink(first, &values)?;
         first += u64::from(columns);
     }
@@ -79,15 +79,15 @@ impl Buffers {
     ) -> Result<Self> {
         let (row, stride) = (u64::from(job.plan.row), u64::from(job.plan.stride));
         Ok(Self {
-            schedule: job.uploaded(&schedule(&task.spec, task.tightening)?),
-            region: job.uploaded(&region_vectors(&task.pairs.nominal)),
-            state: job.storage(16 * NX.div_ceil(4) as u64 * row),
-            folds: job.storage(8 * row),
-            origin: job.storage(4 * stride),
-            measures: job.storage(8 * stride),
-            distances: job.storage(4 * stride * u64::from(job.plan.segment)),
-            farthest: job.storage(8 * (u64::from(task.spec.horizon) + 1)),
-            network: network.map(|mlp| Network::new(job, mlp, job.plan.row)),
+            schedule: job.call.uploaded(&schedule(&task.spec, task.tightening)?),
+            region: job.call.uploaded(&region_vectors(&task.pairs.nominal)),
+            state: job.call.storage(16 * NX.div_ceil(4) as u64 * row),
+            folds: job.call.storage(8 * row),
+            origin: job.call.storage(4 * stride),
+            measures: job.call.storage(8 * stride),
+            distances: job.call.storage(4 * stride * u64::from(job.plan.segment)),
+            farthest: job.call.storage(8 * (u64::from(task.spec.horizon) + 1)),
+            network: network.map(|mlp| Network::new(&job.call, mlp, job.plan.row)),
         })
     }
 
@@ -101,14 +101,15 @@ impl Buffers {
             Slot::Origin => &self.origin,
             Slot::Distances => &self.distances,
             Slot::Farthest => &self.farthest,
-            Slot::Control => network.map_or(&self.measures, Network::control),
+            Slot::Control => network.map_or(&self.measures, Network::output),
             _ => &self.measures,
         };
         Ok(Kernels {
             sample: job.bind(Kernel::Sample, buffer)?,
             rollout: job.bind(Kernel::Deviation, buffer)?,
             reduce: job.bind(Kernel::Reduce, buffer)?,
-            layers: network.map_or(Ok(Vec::new()), |network| network.bind(job, &self.state))?,
+            layers: network
+                .map_or(Ok(Vec::new()), |network| network.bind(&job.call, &self.state))?,
         })
     }
 }
@@ -155,7 +156,7 @@ impl Chunks<'_> {
         while step <= params.horizon {
             let count = plan.segment.min(params.horizon + 1 - step);
             self.segment(&mut batch, params, step, count);
-            self.job.submit(&batch, None)?;
+            self.job.call.submit(&batch, None)?;
             batch = Batch::default();
             step += count;
         }

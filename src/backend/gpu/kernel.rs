@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::buffer::Params;
-use super::compose::{Access, Kernel, Shape, Slot, compose};
+use super::compose::{Access, Kernel, Slot};
 use super::device::Device;
 use crate::error::Result;
 
@@ -33,7 +33,7 @@ impl Pipelines {
         Self { edit: Some(edit), built: Mutex::default() }
     }
 
-    /// The pipeline of `kernel`, from the cache or built now.
+    /// The pipeline of `kernel` with the text `composed`, from the cache or built now.
     ///
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if the driver refuses the text.
@@ -41,10 +41,9 @@ impl Pipelines {
         &self,
         device: &Device,
         kernel: Kernel,
-        shape: &Shape,
-        physics: &str,
+        bindings: Vec<(Slot, Access)>,
+        composed: String,
     ) -> Result<Arc<Pipeline>> {
-        let composed = compose(kernel, shape, physics);
         let text = match &self.edit {
             Some(edit) => edit(&composed),
             None => composed,
@@ -54,7 +53,6 @@ impl Pipelines {
         if let Some(pipeline) = built.get(&key) {
             return Ok(Arc::clone(pipeline));
         }
-        let bindings = kernel.bindings(shape.network.is_some());
         let module = self.module(device, kernel, &key.1);
         let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module));
         device.check()?;
@@ -73,7 +71,8 @@ impl Pipelines {
         }
         #[allow(unsafe_code, reason = "unchecked modules compile two to five times faster")]
         // SAFETY: columns are tested against `columns` or padded to the stride, steps are bounded
-        // by the schedule's length, and `plan` sizes every buffer for that stride and length; the
+        // by the length of the schedule or of the plans of the problems, and `plan` and
+        // `mppi_plan` size every buffer for that stride, that length and those problems; the
         // recorded physics has neither loops nor indices that are not constant, and every loop of
         // the hand-written kernels ends.
         unsafe {

@@ -5,6 +5,8 @@ pub mod compose;
 mod deviation;
 mod device;
 mod kernel;
+mod mppi;
+mod mppi_plan;
 mod network;
 mod plan;
 mod reach_avoid;
@@ -102,15 +104,15 @@ impl Gpu {
     /// See [`super::Backend::mppi`].
     pub(super) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
         &self,
-        _system: &S,
-        _cost: &C,
-        _task: &MppiTask<'_, NX, NU, NC>,
+        system: &S,
+        cost: &C,
+        task: &MppiTask<'_, NX, NU, NC>,
     ) -> Result<Vec<MppiResult<NU>>>
     where
         S: System<NX, NU>,
         C: Cost<NX, NU, NC>,
     {
-        Err(crate::Error::Device("MPPI on an adapter is being written".to_owned()))
+        mppi::mppi(self, system, cost, task)
     }
 }
 

@@ -1,9 +1,9 @@
 //! The network's parameters as the layer kernel wants them, and its layers' dispatches.
 
 use super::buffer::{Buffer, Params, Use};
-use super::compose::{Kernel, MLP_LANES, Slot, TILE_COLUMNS, TILE_QUADS};
+use super::compose::{Kernel, MLP_LANES, Shape, Slot, TILE_COLUMNS, TILE_QUADS, compose};
 use super::kernel::Bound;
-use super::run::{Batch, Job};
+use super::run::{Batch, Call};
 use crate::error::Result;
 use crate::policy::{Layer, Mlp};
 
@@ -54,11 +54,12 @@ pub(super) struct Network {
     weights: Buffer,
     activations: [Buffer; 2],
     layers: Vec<[u32; 3]>,
+    shape: Shape,
 }
 
 impl Network {
     /// Uploads `mlp`; its activations have `row` columns.
-    pub(super) fn new(job: &Job<'_>, mlp: &Mlp, row: u32) -> Self {
+    pub(super) fn new(call: &Call<'_>, mlp: &Mlp, row: u32) -> Self {
         let mut packed = Vec::with_capacity(parameter_quads(mlp));
         let mut layers = Vec::new();
         for layer in mlp.layers() {
@@ -66,29 +67,31 @@ impl Network {
             layers.push(shape.map(|number| number as u32));
             pack(layer, &mut packed);
         }
-        let weights = job.storage(16 * packed.len() as u64);
-        weights.write(job.device, &packed);
+        let weights = call.storage(16 * packed.len() as u64);
+        weights.write(call.device, &packed);
         let widest = layers.iter().map(|[.., outputs]| *outputs).max().unwrap_or(0);
         let bytes = 16 * u64::from(widest) * u64::from(row);
         Self {
             weights,
-            activations: [(); 2].map(|()| job.pool.take(job.device, Use::Storage, bytes)),
+            activations: [(); 2].map(|()| call.pool.take(call.device, Use::Storage, bytes)),
             layers,
+            shape: Shape::new(mlp.widths()[0], mlp.widths()[mlp.layers().len()], Some(mlp)),
         }
     }
 
-    /// Where the last layer leaves the controls.
-    pub(super) fn control(&self) -> &Buffer {
+    /// Where the last layer leaves its outputs.
+    pub(super) fn output(&self) -> &Buffer {
         &self.activations[(self.layers.len() + 1) % 2]
     }
 
     /// The layers bound to `state` as their input.
-    pub(super) fn bind(&self, job: &Job<'_>, state: &Buffer) -> Result<Vec<Bound>> {
+    pub(super) fn bind(&self, call: &Call<'_>, state: &Buffer) -> Result<Vec<Bound>> {
         let bind = |i: usize| {
             let last = i + 1 == self.layers.len();
             let kernel = if last { Kernel::OutputLayer } else { Kernel::HiddenLayer };
             let source = if i == 0 { state } else { &self.activations[(i + 1) % 2] };
-            job.bind(kernel, |slot| match slot {
+            let text = compose(kernel, &self.shape, "");
+            call.bind(kernel, kernel.bindings(false), text, |slot| match slot {
                 Slot::Weights => &self.weights,
                 Slot::Source => source,
                 _ => &self.activations[i % 2],

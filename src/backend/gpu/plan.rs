@@ -13,13 +13,13 @@ use crate::policy::Mlp;
 pub(super) const MAX_TRIPS: u64 = 60_000;
 
 /// Columns are a multiple of this, so that the tiles of the network's layers are whole.
-const COLUMN_UNIT: u64 = (MLP_LANES * TILE_COLUMNS) as u64;
+pub(super) const COLUMN_UNIT: u64 = (MLP_LANES * TILE_COLUMNS) as u64;
 /// Most columns of a chunk under a formula: enough threads for any GPU.
-const FORMULA_COLUMNS: u64 = 1 << 18;
+pub(super) const FORMULA_COLUMNS: u64 = 1 << 18;
 /// Most columns of a chunk under a network, which has a thread per 8 neurons of 8 columns.
-const NETWORK_COLUMNS: u64 = 1 << 14;
+pub(super) const NETWORK_COLUMNS: u64 = 1 << 14;
 /// Most device memory of one call, bytes.
-const MEMORY_BYTES: u64 = 256 << 20;
+pub(super) const MEMORY_BYTES: u64 = 256 << 20;
 
 /// What is asked of the rollouts, as far as it decides the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

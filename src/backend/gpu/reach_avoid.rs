@@ -50,7 +50,7 @@ where
         let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
         job.upload_starts(&task.starts, first, columns, &buffers.sets[0].state);
         chunks.run(first, columns)?;
-        let values: Vec<f32> = buffers.measures.read(job.device, columns as usize)?;
+        let values: Vec<f32> = buffers.measures.read(job.call.device, columns as usize)?;
         sink(first, &values)?;
         first += u64::from(columns);
     }
@@ -74,12 +74,12 @@ impl Buffers {
         task: &ReachAvoidTask<'_, NX>,
     ) -> Result<Self> {
         Ok(Self {
-            schedule: job.uploaded(&schedule(&task.spec, task.tightening)?),
-            region: job.uploaded(&region_vectors(&task.starts)),
-            measures: job.storage(4 * u64::from(job.plan.stride)),
-            survivors: job.storage(4),
+            schedule: job.call.uploaded(&schedule(&task.spec, task.tightening)?),
+            region: job.call.uploaded(&region_vectors(&task.starts)),
+            measures: job.call.storage(4 * u64::from(job.plan.stride)),
+            survivors: job.call.storage(4),
             sets: [Columns::new(job, NX), Columns::new(job, NX)],
-            network: network.map(|mlp| Network::new(job, mlp, job.plan.row)),
+            network: network.map(|mlp| Network::new(&job.call, mlp, job.plan.row)),
         })
     }
 
@@ -97,14 +97,15 @@ impl Buffers {
             Slot::KeptFolds => &kept.folds,
             Slot::KeptOrigin => &kept.origin,
             Slot::Survivors => &self.survivors,
-            Slot::Control => network.map_or(&self.measures, Network::control),
+            Slot::Control => network.map_or(&self.measures, Network::output),
             _ => &self.measures,
         };
         Ok(Kernels {
             sample: job.bind(Kernel::Sample, buffer)?,
             rollout: job.bind(Kernel::ReachAvoid, buffer)?,
             compact: job.bind(Kernel::Compact, buffer)?,
-            layers: network.map_or(Ok(Vec::new()), |network| network.bind(job, &set.state))?,
+            layers: network
+                .map_or(Ok(Vec::new()), |network| network.bind(&job.call, &set.state))?,
         })
     }
 }
@@ -120,9 +121,9 @@ impl Columns {
     fn new(job: &Job<'_>, states: usize) -> Self {
         let stride = u64::from(job.plan.stride);
         Self {
-            state: job.storage(16 * states.div_ceil(4) as u64 * stride),
-            folds: job.storage(8 * stride),
-            origin: job.storage(4 * stride),
+            state: job.call.storage(16 * states.div_ceil(4) as u64 * stride),
+            folds: job.call.storage(8 * stride),
+            origin: job.call.storage(4 * stride),
         }
     }
 }
@@ -156,12 +157,12 @@ impl Chunks<'_> {
             self.segment(&mut batch, set, params, step..end);
             step = end;
             if params.sign_only == 0 || step > params.horizon {
-                self.job.submit(&batch, None)?;
+                self.job.call.submit(&batch, None)?;
             } else {
                 let compact = &self.kernels[set].compact;
                 batch.push_columns(Kernel::Compact, compact, &params);
-                self.job.submit(&batch, Some(&self.buffers.survivors))?;
-                params.columns = self.buffers.survivors.read::<u32>(self.job.device, 1)?[0];
+                self.job.call.submit(&batch, Some(&self.buffers.survivors))?;
+                params.columns = self.buffers.survivors.read::<u32>(self.job.call.device, 1)?[0];
                 set = 1 - set;
                 if params.columns == 0 {
                     break;

@@ -1,10 +1,10 @@
-//! What both tasks share: uploads, bound kernels, batches of dispatches and their submission.
+//! What the tasks share: uploads, bound kernels, batches of dispatches and their submission.
 
 use std::cell::Cell;
 
 use super::Gpu;
 use super::buffer::{Buffer, Params, Pool, Use};
-use super::compose::{Kernel, Shape, Slot};
+use super::compose::{Access, Kernel, Shape, Slot, compose};
 use super::device::Device;
 use super::kernel::{Bound, Pipelines};
 use super::plan::{Plan, Work};
@@ -18,46 +18,25 @@ use crate::system::System;
 const REGION_LISTED: u32 = 2;
 
 /// One call on the device.
-pub(super) struct Job<'a> {
+pub(super) struct Call<'a> {
     pub(super) device: &'a Device,
     pub(super) pool: &'a Pool,
-    pub(super) plan: Plan,
     pipelines: &'a Pipelines,
-    shape: Shape,
-    physics: String,
     uniform: Buffer,
     in_flight: Cell<Option<wgpu::SubmissionIndex>>,
 }
 
-impl<'a> Job<'a> {
-    /// The call for `count` starts or pairs under `plant`.
-    pub(super) fn new<S, P, const NX: usize, const NU: usize>(
-        gpu: &'a Gpu,
-        plant: Plant<'_, S, P>,
-        work: Work,
-        count: u64,
-    ) -> Result<Self>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let network = plant.policy.network();
-        check_network(network, NX, NU)?;
-        let plan = Plan::new(&gpu.device.adapter, work, NX, network, count)?;
-        // Per submission: the draw, compaction or reduction, and each step with its layers.
-        let layers = network.map_or(0, |mlp| mlp.layers().len() as u64);
-        let blocks = 2 + u64::from(plan.segment) * (layers + 1);
-        let bytes = blocks * Params::PITCH as u64;
-        Ok(Self {
+impl<'a> Call<'a> {
+    /// A call with at most `dispatches` dispatches per submission.
+    pub(super) fn new(gpu: &'a Gpu, dispatches: u64) -> Self {
+        let bytes = dispatches * Params::PITCH as u64;
+        Self {
             device: &gpu.device,
             pool: &gpu.pool,
-            plan,
             pipelines: &gpu.pipelines,
-            shape: Shape::new(NX, NU, network),
-            physics: physics(plant),
             uniform: gpu.pool.take(&gpu.device, Use::Uniform, bytes),
             in_flight: Cell::new(None),
-        })
+        }
     }
 
     /// A storage buffer.
@@ -72,15 +51,16 @@ impl<'a> Job<'a> {
         buffer
     }
 
-    /// `kernel` with its buffers.
+    /// `kernel` of the text `composed` with its buffers.
     pub(super) fn bind<'b>(
         &'b self,
         kernel: Kernel,
+        bindings: Vec<(Slot, Access)>,
+        composed: String,
         buffer: impl Fn(Slot) -> &'b Buffer,
     ) -> Result<Bound> {
-        let (device, shape) = (self.device, &self.shape);
-        let pipeline = self.pipelines.pipeline(device, kernel, shape, &self.physics)?;
-        Ok(pipeline.bind(device, |slot| match slot {
+        let pipeline = self.pipelines.pipeline(self.device, kernel, bindings, composed)?;
+        Ok(pipeline.bind(self.device, |slot| match slot {
             Slot::Params => self.uniform.first_block(),
             _ => buffer(slot).binding(),
         }))
@@ -104,6 +84,50 @@ impl<'a> Job<'a> {
             None => self.device.check(),
         }
     }
+}
+
+/// A call that rolls a plant out.
+pub(super) struct Job<'a> {
+    pub(super) call: Call<'a>,
+    pub(super) plan: Plan,
+    shape: Shape,
+    physics: String,
+}
+
+impl<'a> Job<'a> {
+    /// The call for `count` starts or pairs under `plant`.
+    pub(super) fn new<S, P, const NX: usize, const NU: usize>(
+        gpu: &'a Gpu,
+        plant: Plant<'_, S, P>,
+        work: Work,
+        count: u64,
+    ) -> Result<Self>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let network = plant.policy.network();
+        check_network(network, NX, NU)?;
+        let plan = Plan::new(&gpu.device.adapter, work, NX, network, count)?;
+        // Per submission: the draw, compaction or reduction, and each step with its layers.
+        let layers = network.map_or(0, |mlp| mlp.layers().len() as u64);
+        Ok(Self {
+            call: Call::new(gpu, 2 + u64::from(plan.segment) * (layers + 1)),
+            plan,
+            shape: Shape::new(NX, NU, network),
+            physics: physics(plant),
+        })
+    }
+
+    /// `kernel` with its buffers.
+    pub(super) fn bind<'b>(
+        &'b self,
+        kernel: Kernel,
+        buffer: impl Fn(Slot) -> &'b Buffer,
+    ) -> Result<Bound> {
+        let bindings = kernel.bindings(self.shape.network.is_some());
+        self.call.bind(kernel, bindings, compose(kernel, &self.shape, &self.physics), buffer)
+    }
 
     /// Writes the listed starts `first..first + columns` into `state`; nothing if they are drawn.
     pub(super) fn upload_starts<const NX: usize>(
@@ -124,7 +148,7 @@ impl<'a> Job<'a> {
                 packed[i / 4 * row + column][i % 4] = x;
             }
         }
-        state.write(self.device, &packed);
+        state.write(self.call.device, &packed);
     }
 }
 
@@ -141,6 +165,11 @@ impl<'a> Batch<'a> {
         self.calls.push((bound, self.blocks.len() as u32, groups));
         self.blocks.extend_from_slice(bytemuck::bytes_of(params));
         self.blocks.resize(self.blocks.len().next_multiple_of(Params::PITCH), 0);
+    }
+
+    /// Number of dispatches.
+    pub(super) fn len(&self) -> u64 {
+        self.calls.len() as u64
     }
 
     /// Adds a dispatch with a thread per column.

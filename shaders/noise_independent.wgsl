@@ -1,0 +1,11 @@
+// Noise that is independent at each step: step t takes draw t.
+
+fn resume_noise(column: u32) {
+}
+
+fn noise_at(t: u32) -> Control {
+    return draw(t);
+}
+
+fn suspend_noise(column: u32) {
+}

@@ -1,0 +1,97 @@
+//! Text that the kernels share: sizes, access to states and tables, calls of recorded functions.
+
+use super::{MLP_LANES, WORKGROUP};
+use crate::real::record::record;
+use crate::real::wgsl::{Product, function_with};
+use crate::rollout::{HUGE, NON_FINITE, normal_pair};
+
+pub(super) const PARAMS: &str = include_str!("../../../../shaders/params.wgsl");
+pub(super) const FINITE: &str = include_str!("../../../../shaders/finite.wgsl");
+pub(super) const RNG: &str = include_str!("../../../../shaders/rng.wgsl");
+
+/// Sizes and sentinels that the kernels share with Rust.
+pub(super) fn constants(states: usize, controls: usize) -> String {
+    format!(
+        "const NX: u32 = {}u;\n\
+         const NU: u32 = {}u;\n\
+         const STATE_QUADS: u32 = {}u;\n\
+         const WORKGROUP: u32 = {WORKGROUP}u;\n\
+         const MLP_LANES: u32 = {MLP_LANES}u;\n\
+         const HUGE: f32 = {HUGE:?}f;\n\
+         const NON_FINITE: f32 = {NON_FINITE:?}f;\n\
+         alias State = array<f32, {}>;\n\
+         alias Control = array<f32, {}>;\n",
+        states,
+        controls,
+        states.div_ceil(4),
+        states,
+        controls,
+    )
+}
+
+/// `load_state` and `store_state`, free of loops.
+pub(super) fn state_glue(states: usize) -> String {
+    let stride = "params.stride * (1u + params.paired)";
+    let quads = states.div_ceil(4);
+    let mut text = String::from("fn load_state(column: u32) -> State {\n");
+    text += &format!("    let stride = {stride};\n");
+    for quad in 0..quads {
+        text += &format!("    let v{quad} = state[{quad}u * stride + column];\n");
+    }
+    let all: Vec<String> = (0..states).map(component).collect();
+    text += &format!("    return State({});\n}}\n", all.join(", "));
+
+    text += "fn store_state(column: u32, x: State) {\n";
+    text += &format!("    let stride = {stride};\n");
+    for quad in 0..quads {
+        let entry = |i: usize| {
+            if i < states { format!("x[{i}]") } else { "0.0".to_owned() }
+        };
+        let entries: Vec<String> = (4 * quad..4 * quad + 4).map(entry).collect();
+        let entries = entries.join(", ");
+        text += &format!("    state[{quad}u * stride + column] = vec4<f32>({entries});\n");
+    }
+    text += "}\n";
+    text
+}
+
+/// `state_finite`, free of loops.
+pub(super) fn finite_glue(states: usize) -> String {
+    let tests: Vec<String> = (0..states).map(|i| format!("finite(x[{i}])")).collect();
+    format!("fn state_finite(x: State) -> bool {{\n    return {};\n}}\n", tests.join(" && "))
+}
+
+/// Entry `i` of vectors `v0`, `v1`, ...
+pub(super) fn component(i: usize) -> String {
+    format!("v{}.{}", i / 4, ["x", "y", "z", "w"][i % 4])
+}
+
+/// An argument of a function: name, type, length; an `f32` is a plain number.
+pub(super) type Argument<'a> = (&'a str, &'a str, usize);
+
+/// The function `name` that calls the recorded function `recorded`, whose single states, controls
+/// and the like are plain numbers.
+pub(super) fn call(
+    name: &str,
+    recorded: &str,
+    arguments: &[Argument<'_>],
+    (kind, length): (&str, usize),
+) -> String {
+    let declared: Vec<String> =
+        arguments.iter().map(|(name, kind, _)| format!("{name}: {kind}")).collect();
+    let passed = |(name, kind, length): &Argument<'_>| match (*kind, length) {
+        ("f32", _) | (_, 2..) => (*name).to_owned(),
+        _ => format!("{name}[0]"),
+    };
+    let passed: Vec<String> = arguments.iter().map(passed).collect();
+    let call = format!("{recorded}({})", passed.join(", "));
+    let value = if length == 1 && kind != "f32" { format!("{kind}({call})") } else { call };
+    format!("fn {name}({}) -> {kind} {{\n    return {value};\n}}\n", declared.join(", "))
+}
+
+/// `normal_pair`, its products kept apart from sums.
+pub(super) fn recorded_pair() -> String {
+    let pair = record(2, |u| normal_pair(u[0], u[1]).to_vec());
+    let arguments = [("magnitude", 1), ("turn", 1)];
+    function_with("normal_pair", &arguments, &pair, Product::Call("product"))
+}

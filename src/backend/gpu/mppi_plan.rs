@@ -1,0 +1,303 @@
+//! How MPPI problems are cut up: samples and problems per chunk, rounds of a workgroup, steps per
+//! dispatch.
+
+use super::compose::{PARTIAL_HEADER, WORKGROUP, tile_steps};
+use super::device::Adapter;
+use super::network::{input_quads, output_quads, parameter_quads};
+use super::plan::{COLUMN_UNIT, FORMULA_COLUMNS, MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS};
+use crate::error::{Error, Result};
+use crate::policy::Mlp;
+
+/// Workgroups that keep any GPU busy: beyond them a workgroup takes several rounds of samples, so
+/// that fewer partials are read back.
+const BUSY_GROUPS: u32 = 1024;
+/// Iterations of Philox.
+const PHILOX_TRIPS: u64 = 10;
+/// Knots of a spline that a dispatch draws before its first step.
+const WINDOW: u64 = 4;
+
+/// A batch of problems, as far as it decides the plan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size<'a> {
+    /// Number of states.
+    pub(super) states: usize,
+    /// Number of controls.
+    pub(super) controls: usize,
+    /// Numbers of context per stage.
+    pub(super) contexts: usize,
+    /// Steps of a plan.
+    pub(super) horizon: u32,
+    /// Samples of each problem.
+    pub(super) samples: u32,
+    /// Problems.
+    pub(super) problems: usize,
+    /// Value network and disturbance network.
+    pub(super) networks: [Option<&'a Mlp>; 2],
+}
+
+/// How the batch is cut up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct MppiPlan {
+    /// Problems of a chunk.
+    pub(super) problems: u32,
+    /// Samples of each problem in a chunk.
+    pub(super) samples: u32,
+    /// Columns of each problem: its samples and padding up to whole workgroups of the update.
+    pub(super) width: u32,
+    /// Columns that the buffers hold.
+    pub(super) stride: u32,
+    /// Samples of each thread of the update.
+    pub(super) rounds: u32,
+    /// Steps per dispatch of the rollout; 1 where there are networks, whose layers come between.
+    pub(super) rollout_steps: u32,
+    /// Steps per dispatch of the update.
+    pub(super) update_steps: u32,
+}
+
+impl MppiPlan {
+    /// The plan for a batch on `adapter`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if not even the smallest chunk fits, or a kernel needs more loop
+    /// iterations or threads than it may have.
+    pub(super) fn new(adapter: &Adapter, size: &Size<'_>) -> Result<Self> {
+        let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
+        let networks = || size.networks.into_iter().flatten();
+        let parameters = networks().map(|mlp| 16 * parameter_quads(mlp) as u64).max().unwrap_or(0);
+        let columns = most_columns(size, binding);
+        let problems = (binding / problem_row_bytes(size))
+            .min(MEMORY_BYTES / 4 / problem_bytes(size))
+            .min(size.problems.max(1) as u64);
+        if columns == 0 || problems == 0 || parameters > binding {
+            return Err(too_large(adapter, binding));
+        }
+        let unit = u64::from(WORKGROUP);
+        let samples = u64::from(size.samples).min(columns);
+        let problems = problems.min(columns / samples.next_multiple_of(unit)).max(1);
+        let rounds = rounds(samples as u32, problems as u32);
+        // The padding of whole rounds may not fit any more: one problem less, or single rounds.
+        let width = samples.next_multiple_of(unit * u64::from(rounds));
+        let (problems, width, rounds) = match columns / width {
+            0 => (1, samples.next_multiple_of(unit), 1),
+            fitting => (problems.min(fitting), width, rounds),
+        };
+        Ok(Self {
+            problems: problems as u32,
+            samples: samples as u32,
+            width: width as u32,
+            stride: (problems * width).next_multiple_of(COLUMN_UNIT) as u32,
+            rounds,
+            rollout_steps: rollout_steps(size)?,
+            update_steps: update_steps(size, rounds)?,
+        })
+    }
+}
+
+/// Most columns of a chunk: whole tiles of the networks' layers.
+fn most_columns(size: &Size<'_>, binding: u64) -> u64 {
+    let networked = size.networks.iter().any(Option::is_some);
+    let cap = if networked { NETWORK_COLUMNS } else { FORMULA_COLUMNS };
+    let parts = column_bytes(size);
+    let largest = parts.iter().copied().max().unwrap_or(1);
+    // A quarter of the memory is the problems'.
+    let fitting = (binding / largest).min(MEMORY_BYTES / 4 * 3 / parts.iter().sum::<u64>());
+    fitting.min(cap) / COLUMN_UNIT * COLUMN_UNIT
+}
+
+/// Bytes that each buffer holds per column: states, costs, correlated noise, partials of single
+/// rounds, and for each network both buffers of activations.
+fn column_bytes(size: &Size<'_>) -> Vec<u64> {
+    let controls = size.controls as u64;
+    let partial = 4 * (u64::from(PARTIAL_HEADER) + u64::from(size.horizon) * controls);
+    let state = 16 * input_quads(size.states) as u64;
+    let mut parts = vec![state, 4, 4 * controls, partial.div_ceil(u64::from(WORKGROUP))];
+    for mlp in size.networks.into_iter().flatten() {
+        let widths = mlp.layers().iter().map(|layer| output_quads(layer.outputs));
+        let widest = 16 * widths.max().unwrap_or(0) as u64;
+        parts.extend([widest, widest]);
+    }
+    parts
+}
+
+/// Bytes of a problem in its largest buffer.
+fn problem_row_bytes(size: &Size<'_>) -> u64 {
+    let stage = size.controls.max(size.contexts) as u64;
+    (4 * u64::from(size.horizon) * stage).max(4 * size.states as u64).max(16)
+}
+
+/// Bytes of a problem in all of them: stream, start, plan and contexts.
+fn problem_bytes(size: &Size<'_>) -> u64 {
+    let stage = (size.controls + size.contexts) as u64;
+    16 + 4 * size.states as u64 + 4 * u64::from(size.horizon) * stage
+}
+
+/// Samples of each thread of the update.
+fn rounds(samples: u32, problems: u32) -> u32 {
+    let groups = samples.div_ceil(WORKGROUP);
+    let most = (u64::from(groups) * u64::from(problems) / u64::from(BUSY_GROUPS)).max(1) as u32;
+    // As few as the same number of workgroups needs: padding is work.
+    groups.div_ceil(groups.div_ceil(most))
+}
+
+/// Loop iterations that drawing the noise of `steps` consecutive steps takes, the loop over the
+/// steps included: an iteration per number, a block of Philox for every 4 of them and one that the
+/// dispatch before used in part, an iteration per knot, and the correlated noise loaded and stored.
+fn noise_trips(size: &Size<'_>, steps: u64) -> u64 {
+    let controls = size.controls as u64;
+    let draws = steps + WINDOW;
+    let blocks = (draws * controls).div_ceil(4) + 1;
+    steps + draws * (1 + controls) + (1 + PHILOX_TRIPS) * blocks + 2 * controls
+}
+
+/// Loop iterations of a thread of the update.
+fn update_trips(size: &Size<'_>, rounds: u32, steps: u64) -> u64 {
+    let tiles = steps.div_ceil(tile_steps(size.controls) as u64);
+    let sums = tiles * (1 + u64::from(WORKGROUP));
+    // Two passes over the costs, and two reductions over the workgroup.
+    let reductions = 2 * (u64::from(rounds) + u64::from(WORKGROUP.ilog2()));
+    reductions + u64::from(rounds) * (1 + noise_trips(size, steps) + sums)
+}
+
+/// Most steps of a dispatch of the rollout.
+fn rollout_steps(size: &Size<'_>) -> Result<u32> {
+    let networked = size.networks.iter().any(Option::is_some);
+    let layers = size.networks.into_iter().flatten().flat_map(Mlp::layers);
+    let layer = layers.map(|layer| input_quads(layer.inputs) as u64).max().unwrap_or(0);
+    if layer > MAX_TRIPS {
+        return Err(too_long(layer));
+    }
+    let most = if networked { 1 } else { size.horizon };
+    most_steps(most, |steps| noise_trips(size, steps))
+}
+
+/// Most steps of a dispatch of the update.
+fn update_steps(size: &Size<'_>, rounds: u32) -> Result<u32> {
+    // A thread adds up the terms of one control of one step.
+    if size.controls > WORKGROUP as usize {
+        let problem = format!(
+            "{} controls are more than the {WORKGROUP} threads of the MPPI update; use the native \
+             CPU backend",
+            size.controls
+        );
+        return Err(Error::Device(problem));
+    }
+    most_steps(size.horizon, |steps| update_trips(size, rounds, steps))
+}
+
+/// The largest number of steps, up to `most`, whose iterations a thread may spend.
+fn most_steps(most: u32, trips: impl Fn(u64) -> u64) -> Result<u32> {
+    let fits = |steps: &u32| trips(u64::from(*steps)) <= MAX_TRIPS;
+    (1..=most).rev().find(fits).ok_or_else(|| too_long(trips(1)))
+}
+
+fn too_long(trips: u64) -> Error {
+    Error::Device(format!(
+        "a kernel would need {trips} loop iterations per thread for one step, and some drivers \
+         stop at {MAX_TRIPS} without notice; use the native CPU backend for this size"
+    ))
+}
+
+fn too_large(adapter: &Adapter, binding: u64) -> Error {
+    Error::Device(format!(
+        "{}: the networks, one problem or the smallest chunk of samples do not fit the adapter's \
+         limit of {binding} bytes per binding; use the native CPU backend",
+        adapter.name
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::gpu::AdapterKind;
+
+    fn adapter(max_binding_bytes: u64) -> Adapter {
+        Adapter {
+            name: "made up".to_owned(),
+            api: "none".to_owned(),
+            kind: AdapterKind::Unknown,
+            driver: String::new(),
+            max_buffer_bytes: 1 << 30,
+            max_binding_bytes,
+            max_workgroup_threads: 256,
+        }
+    }
+
+    fn size(controls: usize, horizon: u32, samples: u32, problems: usize) -> Size<'static> {
+        let networks = [None; 2];
+        Size { states: 12, controls, contexts: 8, horizon, samples, problems, networks }
+    }
+
+    /// Blocks of Philox that `steps` draws of `controls` numbers touch, from the worst place on.
+    fn touched_blocks(controls: u64, steps: u64) -> u64 {
+        let blocks = |first: u64| (first + steps * controls - 1) / 4 - first / 4 + 1;
+        (0..4).map(blocks).max().unwrap_or(0)
+    }
+
+    #[test]
+    fn trips_cover_what_the_kernels_count() {
+        for controls in [1, 2, 3, 5, 12] {
+            for steps in [1, 2, 20, 512] {
+                let size = size(controls, 512, 64, 1);
+                let controls = controls as u64;
+                let steps_and_blocks =
+                    steps * (1 + controls) + 11 * touched_blocks(controls, steps);
+                assert!(noise_trips(&size, steps) >= steps_and_blocks + 2 * controls);
+                // At most a knot per step after the first four.
+                let knots = steps + 3;
+                let spline = steps + knots * (1 + controls) + 11 * touched_blocks(controls, knots);
+                assert!(noise_trips(&size, steps) >= spline, "{controls} {steps}");
+            }
+        }
+        // 512 steps of 3 controls: 52 tiles of 10 steps, each 64 terms and itself.
+        let whole = size(3, 512, 64, 1);
+        let least = 52 * 65 + 512 * 4 + 11 * 384;
+        assert!((least..2 * least).contains(&update_trips(&whole, 1, 512)));
+    }
+
+    #[test]
+    fn chunks_stay_within_the_limits() {
+        for samples in [1, 64, 65, 500, 16_384, 1_000_000] {
+            for horizon in [1, 20, 512] {
+                for (controls, problems) in [(1, 1), (3, 1), (3, 500), (12, 100_000)] {
+                    let size = size(controls, horizon, samples, problems);
+                    let plan = MppiPlan::new(&adapter(1 << 27), &size).expect("a plan that fits");
+                    check(&size, &plan, 1 << 27);
+                }
+            }
+        }
+    }
+
+    fn check(size: &Size<'_>, plan: &MppiPlan, binding: u64) {
+        let stride = u64::from(plan.stride);
+        assert_eq!(plan.width % (WORKGROUP * plan.rounds), 0, "{plan:?}");
+        assert!(plan.width >= plan.samples && plan.problems * plan.width <= plan.stride);
+        assert!(plan.samples == size.samples || plan.problems == 1, "{plan:?}");
+        assert_eq!(stride % COLUMN_UNIT, 0);
+        let columns = column_bytes(size).into_iter().map(|bytes| bytes * stride);
+        let problems = problem_bytes(size) * u64::from(plan.problems);
+        assert!(columns.clone().all(|bytes| bytes <= binding), "{plan:?}");
+        assert!(columns.sum::<u64>() + problems <= MEMORY_BYTES, "{plan:?}");
+        assert!(noise_trips(size, u64::from(plan.rollout_steps)) <= MAX_TRIPS);
+        let update = update_trips(size, plan.rounds, u64::from(plan.update_steps));
+        assert!(update <= MAX_TRIPS, "{plan:?}");
+    }
+
+    #[test]
+    fn long_plans_are_split_over_dispatches() {
+        let long = MppiPlan::new(&adapter(1 << 27), &size(24, 512, 64, 1)).expect("a plan");
+        assert!((1..512).contains(&long.update_steps), "{long:?}");
+        let race = MppiPlan::new(&adapter(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
+        assert_eq!((race.rollout_steps, race.update_steps), (20, 20));
+        assert!(race.rounds > 1, "4000 workgroups keep a GPU busy twice: {race:?}");
+    }
+
+    #[test]
+    fn what_cannot_run_is_refused() {
+        let small = MppiPlan::new(&adapter(1 << 10), &size(3, 20, 500, 1));
+        assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
+        let wide = MppiPlan::new(&adapter(1 << 27), &size(65, 20, 500, 1));
+        assert!(wide.expect_err("too wide").to_string().contains("65 controls"));
+        let long = most_steps(4, |steps| steps * MAX_TRIPS * 2);
+        assert!(long.expect_err("too long").to_string().contains("loop iterations"));
+    }
+}

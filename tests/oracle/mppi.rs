@@ -1,0 +1,148 @@
+//! MPPI in f64, one sample after the other, and how far an adapter may lie from it.
+
+use nalgebra::DMatrix;
+use reachcast::cost::Cost;
+use reachcast::rollout::{MppiResult, MppiTask, Sigma};
+use reachcast::system::System;
+
+/// What a problem gives in f64; controls are those of `task.controls`, in f32.
+pub(crate) struct Truth<const NU: usize> {
+    pub(crate) costs: Vec<f64>,
+    pub(crate) plan: Vec<[f64; NU]>,
+    pub(crate) effective_samples: f64,
+    pub(crate) mean: f64,
+}
+
+/// `lambda Sigma^-1`, if noise costs.
+fn penalty<const NX: usize, const NU: usize, const NC: usize>(
+    task: &MppiTask<'_, NX, NU, NC>,
+) -> Option<DMatrix<f64>> {
+    let settings = task.spec.settings();
+    let sigma = match settings.sigma {
+        Sigma::PerControl(sigma) => {
+            DMatrix::from_fn(NU, NU, |i, j| if i == j { f64::from(sigma[i]).powi(2) } else { 0.0 })
+        }
+        Sigma::Covariance(rows) => DMatrix::from_fn(NU, NU, |i, j| f64::from(rows[i][j])),
+    };
+    let inverse = sigma.try_inverse()? * f64::from(settings.temperature);
+    settings.noise_cost.then_some(inverse)
+}
+
+/// The cost of a sample.
+fn cost_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    (system, cost): (&S, &C),
+    task: &MppiTask<'_, NX, NU, NC>,
+    number: usize,
+    controls: &[[f32; NU]],
+) -> f64
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let problem = &task.problems[number];
+    let penalty = penalty(task);
+    let mut x = problem.start.map(f64::from);
+    let mut total = 0.0;
+    for (t, u) in controls.iter().enumerate() {
+        let u = u.map(f64::from);
+        let value = task.value.map(|term| term.network.forward(&x)[0]);
+        let push = task.disturbance.map(|asked| asked.network.forward(&x));
+        total += cost.stage(x, u, problem.context[t].map(f64::from));
+        if let Some(penalty) = &penalty {
+            let nominal = problem.plan[t].map(f64::from);
+            for i in 0..NU {
+                for j in 0..NU {
+                    total += nominal[i] * penalty[(i, j)] * (u[j] - nominal[j]);
+                }
+            }
+        }
+        if let (Some(term), Some(value)) = (task.value, value) {
+            let short = f64::max(0.0, f64::from(term.threshold) - value);
+            total += f64::from(term.weight) * short * short;
+        }
+        x = system.step(x, u);
+        if let (Some(asked), Some(push)) = (task.disturbance, push) {
+            for ((state, scale), push) in asked.entries.iter().zip(push) {
+                x[*state] += f64::from(*scale) * push;
+            }
+        }
+    }
+    total
+}
+
+/// The result of problem `number`, all samples of which have finite costs.
+pub(crate) fn truth<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    plant: (&S, &C),
+    task: &MppiTask<'_, NX, NU, NC>,
+    number: usize,
+) -> Truth<NU>
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let settings = task.spec.settings();
+    let controls: Vec<_> = (0..settings.samples).map(|k| task.controls(number, k)).collect();
+    let costs: Vec<f64> = controls.iter().map(|u| cost_of(plant, task, number, u)).collect();
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let raw = |cost: &f64| (-(cost - least) / f64::from(settings.temperature)).exp();
+    let weights: Vec<f64> = costs.iter().map(raw).collect();
+    let sum: f64 = weights.iter().sum();
+    let mut plan = vec![[0.0; NU]; settings.horizon as usize];
+    for (weight, controls) in weights.iter().zip(&controls) {
+        for (mean, u) in plan.iter_mut().flatten().zip(controls.iter().flatten()) {
+            *mean += weight / sum * f64::from(*u);
+        }
+    }
+    let squares: f64 = weights.iter().map(|weight| weight * weight).sum();
+    let mean = costs.iter().sum::<f64>() / costs.len() as f64;
+    Truth { costs, plan, effective_samples: sum * sum / squares, mean }
+}
+
+/// What is wrong with `result`, whose f32 twin on the host is `host`.
+///
+/// A GPU may contract products and adds up in another order, each of which changes rounding by a
+/// small factor: it may lie 8 times as far from f64 as the host's worst sample does. The floors are
+/// those of f32 sums of these lengths: 1e-6 of the largest cost, 1e-5 of a control's range.
+pub(crate) fn differences<const NU: usize>(
+    truth: &Truth<NU>,
+    result: &MppiResult<NU>,
+    host: &MppiResult<NU>,
+    (temperature, bounds): (f32, [[f32; 2]; NU]),
+) -> Result<(), String> {
+    let apart = |a: &[f32]| -> f64 {
+        let gaps = a.iter().zip(&truth.costs).map(|(a, b)| (f64::from(*a) - b).abs());
+        gaps.fold(0.0, f64::max)
+    };
+    let largest = truth.costs.iter().fold(0.0, |most, cost| f64::max(most, cost.abs()));
+    let band = 8.0 * apart(&host.costs) + 1e-6 * largest;
+    let within = |what: &str, have: f64, want: f64, band: f64| match (have - want).abs() <= band {
+        true => Ok(()),
+        false => Err(format!("{what}: {have}, f64 {want}, band {band}")),
+    };
+    if result.costs.len() != truth.costs.len() || result.non_finite != 0 {
+        return Err(format!("{} costs, {} infinite", result.costs.len(), result.non_finite));
+    }
+    for (k, (cost, truth)) in result.costs.iter().zip(&truth.costs).enumerate() {
+        within(&format!("cost of {k}"), f64::from(*cost), *truth, band)?;
+    }
+    let least = result.costs.iter().copied().fold(f32::INFINITY, f32::min);
+    let first = result.costs.iter().position(|cost| *cost == least);
+    if result.least_cost != least || Some(result.best as usize) != first {
+        return Err(format!("best {} at {}, is {first:?}", result.least_cost, result.best));
+    }
+    within("mean", result.mean_cost, truth.mean, band)?;
+    // A relative error d of each weight changes the number by at most 4 d.
+    let relative = 8.0 * band / f64::from(temperature) + 1e-5;
+    let samples = truth.effective_samples;
+    within("effective samples", result.effective_samples, samples, relative * samples)?;
+    for t in 0..truth.plan.len() {
+        for (i, [low, high]) in bounds.into_iter().enumerate() {
+            let range = f64::from(high - low);
+            let own = (f64::from(host.plan[t][i]) - truth.plan[t][i]).abs();
+            let band = 8.0 * own + (1e-5 + 2.0 * band / f64::from(temperature)) * range;
+            let what = format!("control {i} of step {t}");
+            within(&what, f64::from(result.plan[t][i]), truth.plan[t][i], band)?;
+        }
+    }
+    Ok(())
+}
