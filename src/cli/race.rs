@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::args::{Global, RaceArguments};
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
-use crate::config::{Config, Job};
+use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::experiment::controller::{Name, World};
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};

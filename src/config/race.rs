@@ -78,17 +78,25 @@ fn study_hybrid() -> HybridSettings {
     }
 }
 
-/// The hybrid with safety and fences in both plans, and plans that start from the plant's own
-/// model.
+/// The hybrid with safety and fences in both plans, plans that start from the plant's own model
+/// and are improved several times, and a recovery that follows the policy: each of these is
+/// measured in the README.
 fn rigorous_hybrid() -> HybridSettings {
-    let study = study_hybrid();
     let safety = Safety { weight: 1e6, margin: 0.05, cone: SafetyCone::Either, ..Safety::NONE };
+    let fence = Fence { weight: 1e6, margin: 0.03 };
+    let follow = RecoveryCost { position: 20.0, velocity: 10.0, control: 1e-3, safety, fence };
+    let with_fence = |cost: RaceCost| match cost {
+        RaceCost::Lane(cost) => RaceCost::Lane(LaneCost { fence, ..cost }),
+        other => other,
+    };
     HybridSettings {
         plan_gain: 0.5,
         hold_opponent: false,
-        recovery: plan(20, 0.7, recovery(safety, Fence::NONE)),
-        fast: plan(20, 0.5, lane(0.5, safety)),
-        ..study
+        recovery_point: RecoveryPoint::Policy,
+        value_weight: 0.0,
+        recovery: PlanSettings { iterations: 4, ..plan(20, 0.7, RaceCost::Recovery(follow)) },
+        fast: PlanSettings { iterations: 3, ..plan(20, 0.5, with_fence(lane(0.5, safety))) },
+        ..study_hybrid()
     }
 }
 
