@@ -148,8 +148,10 @@ Example:
     /// half-way, the same command goes on where it was; the results are the same.
     #[command(after_help = "\
 Controllers: hybrid, hybrid-no-policy, mppi, mppi-soft, mppi-cbf, mppi-warmstart, policy, ppo-cbf
-(all of these: all), hybrid-no-global, hybrid-no-local, hybrid-no-recovery, hybrid-no-safety (the
-hybrid and what it is without each of its parts: ablations).
+(all of these: all). The hybrid without one of its parts: hybrid-no-global, hybrid-no-local,
+hybrid-no-recovery, hybrid-no-policy, hybrid-no-safety (with hybrid: ablations). The hybrid with one
+thing as in the study: hybrid-no-safety, hybrid-no-fences, hybrid-one-iteration, hybrid-study-start,
+hybrid-study-recovery, hybrid-value (with hybrid: improvements).
 
 Examples:
   reachcast race configs/race.toml

@@ -92,6 +92,7 @@ fn names(list: &[String]) -> Result<Vec<Name>> {
         let more = match text.as_str() {
             "all" => Name::STUDY.to_vec(),
             "ablations" => Name::ABLATIONS.to_vec(),
+            "improvements" => Name::IMPROVEMENTS.to_vec(),
             _ => vec![name(text)?],
         };
         let new: Vec<Name> = more.into_iter().filter(|name| !names.contains(name)).collect();
@@ -108,7 +109,7 @@ fn name(text: &str) -> Result<Name> {
         let distance = |name: &&&str| strsim::damerau_levenshtein(text, name);
         let nearest = names.iter().min_by_key(distance).copied().unwrap_or_default();
         let problem = format!(
-            "no controller `{text}`; the nearest is `{nearest}` of all, ablations, {}",
+            "no controller `{text}`; the nearest is `{nearest}` of all, ablations, improvements, {}",
             names.join(", ")
         );
         Error::invalid("--controllers", problem)

@@ -49,8 +49,18 @@ pub enum Name {
     HybridNoLocal,
     /// The hybrid without tier 3: the policy flies there.
     HybridNoRecovery,
-    /// The hybrid without safety and fence terms.
+    /// The hybrid without safety terms.
     HybridNoSafety,
+    /// The hybrid without fence terms.
+    HybridNoFences,
+    /// The hybrid with one improvement of a plan per control step.
+    HybridOneIteration,
+    /// The hybrid whose plans start from the study's rollouts.
+    HybridStudyStart,
+    /// The hybrid with the study's recovery point and weights.
+    HybridStudyRecovery,
+    /// The hybrid with the value term in recovery.
+    HybridValue,
 }
 
 impl Name {
@@ -64,6 +74,16 @@ impl Name {
         Self::MppiWarmstart,
         Self::Policy,
         Self::PpoCbf,
+    ];
+    /// The hybrid, and what it is where one thing is as in the study.
+    pub const IMPROVEMENTS: [Self; 7] = [
+        Self::Hybrid,
+        Self::HybridNoSafety,
+        Self::HybridNoFences,
+        Self::HybridOneIteration,
+        Self::HybridStudyStart,
+        Self::HybridStudyRecovery,
+        Self::HybridValue,
     ];
     /// The hybrid and what it is without each of its parts.
     pub const ABLATIONS: [Self; 6] = [
@@ -90,6 +110,11 @@ impl Name {
             Self::HybridNoLocal => "hybrid-no-local",
             Self::HybridNoRecovery => "hybrid-no-recovery",
             Self::HybridNoSafety => "hybrid-no-safety",
+            Self::HybridNoFences => "hybrid-no-fences",
+            Self::HybridOneIteration => "hybrid-one-iteration",
+            Self::HybridStudyStart => "hybrid-study-start",
+            Self::HybridStudyRecovery => "hybrid-study-recovery",
+            Self::HybridValue => "hybrid-value",
         }
     }
 
@@ -113,7 +138,15 @@ impl Name {
             Self::HybridNoGlobal => "The hybrid without tier 1, the certified set.",
             Self::HybridNoLocal => "The hybrid without tier 2, the locally verified ball.",
             Self::HybridNoRecovery => "The hybrid without tier 3: the policy flies there too.",
-            Self::HybridNoSafety => "The hybrid without safety and fence terms in its costs.",
+            Self::HybridNoSafety => "The hybrid without safety terms in its costs.",
+            Self::HybridNoFences => "The hybrid without fence terms in its costs.",
+            Self::HybridOneIteration => "The hybrid with one improvement of a plan per step.",
+            Self::HybridStudyStart => {
+                "The hybrid whose plans start from rollouts with the study's \
+                                       ego gain of 2.0 and an opponent that stays in place."
+            }
+            Self::HybridStudyRecovery => "The hybrid with the study's recovery point and weights.",
+            Self::HybridValue => "The hybrid with the study's value term in recovery.",
         }
     }
 }

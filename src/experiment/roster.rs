@@ -5,26 +5,47 @@ use super::controller::{Controller, Name, World};
 use super::hybrid::Hybrid;
 use super::no_policy::NoPolicy;
 use super::plan::Paths;
-use super::settings::RaceSettings;
+use super::settings::{HybridSettings, RaceSettings, RecoveryPoint};
 use crate::cost::{Fence, RaceCost, Safety};
 use crate::error::{Error, Result};
+
+/// Ego gain of the rollouts that the study's plans start from, m/s^2.
+const STUDY_GAIN: f32 = 2.0;
+/// The study's weights of recovery: position, velocity, control.
+const STUDY_RECOVERY: [f32; 3] = [5.0, 1.0, 0.1];
+/// The study's weight of the value term.
+const STUDY_VALUE_WEIGHT: f32 = 1e6;
 
 /// The settings of the race as the controller `name` has them.
 pub(super) fn settings(name: Name, race: &RaceSettings) -> RaceSettings {
     let mut race = race.clone();
+    let hybrid = &mut race.hybrid;
     match name {
-        Name::HybridNoGlobal => race.hybrid.global = false,
-        Name::HybridNoLocal => race.hybrid.local = false,
-        Name::HybridNoRecovery => race.hybrid.recovery_tier = false,
-        Name::HybridNoSafety => {
-            for plan in [&mut race.hybrid.recovery, &mut race.hybrid.fast] {
-                let (safety, fence) = terms(&mut plan.cost);
-                (*safety, *fence) = (Safety::NONE, Fence::NONE);
+        Name::HybridNoGlobal => hybrid.global = false,
+        Name::HybridNoLocal => hybrid.local = false,
+        Name::HybridNoRecovery => hybrid.recovery_tier = false,
+        Name::HybridNoSafety => each_plan(hybrid, |cost| *terms(cost).0 = Safety::NONE),
+        Name::HybridNoFences => each_plan(hybrid, |cost| *terms(cost).1 = Fence::NONE),
+        Name::HybridOneIteration => (hybrid.recovery.iterations, hybrid.fast.iterations) = (1, 1),
+        Name::HybridStudyStart => {
+            (hybrid.plan_gain, hybrid.hold_opponent) = (STUDY_GAIN, true);
+        }
+        Name::HybridStudyRecovery => {
+            hybrid.recovery_point = RecoveryPoint::Verified;
+            if let RaceCost::Recovery(cost) = &mut hybrid.recovery.cost {
+                [cost.position, cost.velocity, cost.control] = STUDY_RECOVERY;
             }
         }
+        Name::HybridValue => hybrid.value_weight = STUDY_VALUE_WEIGHT,
         _ => {}
     }
     race
+}
+
+/// Changes the cost of both plans.
+fn each_plan(hybrid: &mut HybridSettings, change: impl Fn(&mut RaceCost)) {
+    change(&mut hybrid.recovery.cost);
+    change(&mut hybrid.fast.cost);
 }
 
 /// Safety and fence terms of a cost.
@@ -52,11 +73,6 @@ pub(super) fn controller<'a>(
     let race = world.race;
     let mppi = |key: &str, settings| MppiController::new(world, (key, settings), races, paths);
     Ok(match name {
-        Name::Hybrid
-        | Name::HybridNoGlobal
-        | Name::HybridNoLocal
-        | Name::HybridNoRecovery
-        | Name::HybridNoSafety => Box::new(Hybrid::new(world, races, paths)?),
         Name::HybridNoPolicy => Box::new(NoPolicy::new(world, races, paths)?),
         Name::Mppi => Box::new(mppi("race.mppi", &race.mppi)?),
         Name::MppiSoft => Box::new(mppi("race.soft", &race.soft)?),
@@ -73,5 +89,7 @@ pub(super) fn controller<'a>(
                 return Err(Error::invalid("ppo-cbf", problem));
             }
         },
+        // The hybrid and what it is without one of its parts differ in their settings alone.
+        _ => Box::new(Hybrid::new(world, races, paths)?),
     })
 }
