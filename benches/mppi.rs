@@ -6,14 +6,19 @@ use std::path::Path;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
+use reachcast::config::{Config, Overrides, Profile};
 use reachcast::cost::{
     Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
 };
 use reachcast::policy::Mlp;
 use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Purpose, Sigma, Stream, ValueTerm,
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Plant, Purpose, Query, Sigma, Stream,
+    ValueTerm,
 };
-use reachcast::system::DroneRace;
+use reachcast::scenario::global::{check_margins, slice_through};
+use reachcast::scenario::growth_batch::{Request, grow_each};
+use reachcast::scenario::{Context, Unwatched, tightened};
+use reachcast::system::{DroneRace, System};
 
 /// Steps of a plan.
 const HORIZON: u32 = 20;
@@ -110,5 +115,46 @@ fn with_value(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, plain, with_value);
+/// The work of a control step of one race at its worst in the profile `study`: the slice of 468
+/// states, 5 rounds of 158 starts, and a plan with the value term.
+fn hybrid_step(criterion: &mut Criterion) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let overrides = Overrides { profile: Some(Profile::Study), ..Overrides::default() };
+    let config = Config::load(&root.join("configs/race.toml"), &overrides).expect("configuration");
+    let system = DroneRace::default();
+    let settings = config.settings(&system.states()).expect("settings");
+    let load = |file: &str| Mlp::load(&root.join("configs/policies").join(file)).expect("network");
+    let (policy, network) = (load("race_policy.safetensors"), load("race_value.safetensors"));
+    let backend = Backend::Cpu(Cpu::new(None).expect("threads"));
+    let plant = Plant { system: &system, policy: &policy };
+    let context = Context { backend: &backend, plant, watch: &Unwatched };
+    let losses = tightened(context, &settings).expect("deviation bound").losses;
+    // A centre that fails at any radius, so that all rounds are flown.
+    let mut center = settings.state;
+    (center[0], center[2], center[6], center[8]) = (0.0, -1.0, 0.1, -0.9);
+    let request = [Request { center, seed: 1, call: 0 }];
+    let (spec, problems) = (spec(500), problems(1));
+    let value = Some(ValueTerm { network: &network, weight: 1e6, threshold: -0.02 });
+    let (disturbance, costs) = (None, CostQuery::Summary);
+    let task =
+        MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
+    let cells = slice_through(&settings, &settings.state);
+    let slice = || {
+        check_margins(context, &settings.spec, &losses, &cells, Query::Sign, 0.0).expect("a slice")
+    };
+    let grow = || grow_each(context, &settings, &request, 0.0).expect("a ball");
+    assert_eq!(grow()[0].rounds, settings.growth.rounds, "all rounds are flown");
+    let mut group = criterion.benchmark_group("hybrid step");
+    group.bench_function("slice", |bencher| bencher.iter(|| black_box(slice())));
+    group.bench_function("growth", |bencher| bencher.iter(|| black_box(grow())));
+    group.bench_function("all", |bencher| {
+        bencher.iter(|| {
+            let plan = backend.mppi(&system, &recovery(), &task).expect("a plan");
+            black_box((slice(), grow(), plan))
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, plain, with_value, hybrid_step);
 criterion_main!(benches);

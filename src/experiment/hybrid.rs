@@ -64,11 +64,6 @@ impl<'a> Hybrid<'a> {
         Ok(Self { world, certifier, fast, recovery, paths, races: vec![memory; races] })
     }
 
-    /// Constants and deviation bound.
-    pub(super) fn certifier(&self) -> &Certifier<'a, DroneRace, Mlp, 12> {
-        &self.certifier
-    }
-
     fn settings(&self) -> &'a HybridSettings {
         &self.world.race.hybrid
     }

@@ -97,7 +97,7 @@ where
 }
 
 /// The cells of the slice through `state`, row by row.
-pub(crate) fn slice_through<const NX: usize>(
+pub fn slice_through<const NX: usize>(
     settings: &Settings<NX>,
     state: &[f32; NX],
 ) -> Vec<[f32; NX]> {
