@@ -4,6 +4,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod common;
+#[path = "oracle/mppi.rs"]
+#[allow(dead_code, reason = "each test file uses a part of it")]
+mod oracle;
 
 use common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
@@ -222,51 +225,6 @@ fn network(inputs: usize, outputs: usize, scale: f32) -> Mlp {
     Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap()
 }
 
-/// The f64 cost of each sample, by a plain loop over its controls.
-fn f64_costs<S, C, const NX: usize, const NU: usize, const NC: usize>(
-    system: &S,
-    cost: &C,
-    task: &MppiTask<'_, NX, NU, NC>,
-    problem: usize,
-) -> Vec<f64>
-where
-    S: System<NX, NU>,
-    C: Cost<NX, NU, NC>,
-{
-    let asked = &task.problems[problem];
-    let samples = task.spec.settings().samples;
-    let one = |sample: u32| {
-        let mut x = asked.start.map(f64::from);
-        let mut sum = 0.0;
-        for (t, v) in task.controls(problem, sample).iter().enumerate() {
-            let v = v.map(f64::from);
-            sum += cost.stage(x, v, asked.context[t].map(f64::from));
-            if let Some(penalty) = task.spec.penalty() {
-                for i in 0..NU {
-                    for j in 0..NU {
-                        sum += f64::from(asked.plan[t][j])
-                            * f64::from(penalty[j][i])
-                            * (v[i] - f64::from(asked.plan[t][i]));
-                    }
-                }
-            }
-            if let Some(value) = task.value {
-                let short = f64::from(value.threshold) - value.network.forward(&x)[0];
-                sum += f64::from(value.weight) * short.max(0.0).powi(2);
-            }
-            let push = task.disturbance.map(|d| (d.entries, d.network.forward(&x)));
-            x = system.step(x, v);
-            for (entries, push) in push {
-                for ((state, scale), push) in entries.iter().zip(push) {
-                    x[*state] += f64::from(*scale) * push;
-                }
-            }
-        }
-        sum
-    };
-    (0..samples).map(one).collect()
-}
-
 /// Compares a task with the f64 loop on every backend: the costs, and the plan that the f64 costs
 /// and the samples' controls make.
 fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
@@ -277,37 +235,21 @@ fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
-    let (samples, temperature) = {
-        let settings = task.spec.settings();
-        (settings.samples, f64::from(settings.temperature))
-    };
     for backend in backends() {
         let results = backend.mppi(system, cost, task).unwrap();
         assert_eq!(results.len(), task.problems.len());
         for (problem, result) in results.iter().enumerate() {
-            let truth = f64_costs(system, cost, task, problem);
+            let truth = oracle::truth((system, cost), task, problem);
             // Terms of either sign cancel, so rounding is relative to the largest cost.
-            let scale = truth.iter().fold(1.0_f64, |largest, cost| largest.max(cost.abs()));
+            let scale = truth.costs.iter().fold(1.0_f64, |largest, cost| largest.max(cost.abs()));
             let error = |(cost, truth): (&f32, &f64)| (f64::from(*cost) - truth).abs() / scale;
-            let mut errors: Vec<f64> = result.costs.iter().zip(&truth).map(error).collect();
+            let mut errors: Vec<f64> = result.costs.iter().zip(&truth.costs).map(error).collect();
             errors.sort_by(f64::total_cmp);
             // The lane cost jumps where a drone is 0.15 m off: one sample may sit on the edge.
             let worst = errors[errors.len().saturating_sub(2)];
             assert!(worst < 2e-5, "{}, problem {problem}: costs off by {worst}", backend.name());
             assert!(errors[errors.len() - 1] < 1e-2, "{}: {errors:?}", backend.name());
-            let least = truth.iter().copied().fold(f64::INFINITY, f64::min);
-            let weights: Vec<f64> =
-                truth.iter().map(|cost| (-(cost - least) / temperature).exp()).collect();
-            let sum: f64 = weights.iter().sum();
-            let mut mean = vec![[0.0_f64; NU]; result.plan.len()];
-            for sample in 0..samples {
-                for (mean, v) in mean.iter_mut().zip(task.controls(problem, sample)) {
-                    for i in 0..NU {
-                        mean[i] += weights[sample as usize] / sum * f64::from(v[i]);
-                    }
-                }
-            }
-            for (u, mean) in result.plan.iter().flatten().zip(mean.iter().flatten()) {
+            for (u, mean) in result.plan.iter().flatten().zip(truth.plan.iter().flatten()) {
                 assert!((f64::from(*u) - mean).abs() < 2e-3, "{}: {u} {mean}", backend.name());
             }
         }
@@ -505,8 +447,8 @@ fn the_noise_has_the_moments_that_were_asked_for() {
                 let mean =
                     samples.iter().map(|e| f64::from(e[t][i])).sum::<f64>() / f64::from(count);
                 assert!(mean.abs() < 5.0 * 0.45 / f64::from(count).sqrt(), "{kind:?} {mean}");
-                for j in 0..3 {
-                    let truth = f64::from(covariance[i][j]);
+                for (j, truth) in covariance[i].into_iter().enumerate() {
+                    let truth = f64::from(truth);
                     assert!((moment(t, t, i, j) - truth).abs() < slack, "{kind:?} {t} {i} {j}");
                 }
             }
@@ -574,7 +516,7 @@ fn what_cannot_be_is_refused_by_name() {
         let result = cpu(1).mppi(&DroneRace::default(), &race_costs()[0], &task(&spec, &problems));
         result.expect_err("refused").to_string()
     };
-    assert!(refused(&|problem| drop(problem.plan.pop())).contains("problem 1 has 4 steps"));
+    assert!(refused(&|problem| problem.plan.truncate(4)).contains("problem 1 has 4 steps"));
     assert!(refused(&|problem| problem.context.clear()).contains("problem 1 has 0 steps"));
     assert!(refused(&|problem| problem.start[3] = f32::NAN).contains("not finite"));
     let wrong = network(12, 2, 0.1);

@@ -44,7 +44,7 @@ const TAGS: [(&str, &[&str]); 2] = [
 pub(super) fn overlay(base: &mut Table, over: Table) {
     for (tag, keys) in TAGS {
         if over.get(tag).is_some_and(|kind| base.contains_key(tag) && base.get(tag) != Some(kind)) {
-            base.retain(|key, _| !keys.iter().any(|known| *known == key));
+            base.retain(|key, _| !keys.contains(&key));
         }
     }
     for (key, value) in over {

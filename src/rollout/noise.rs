@@ -177,9 +177,9 @@ impl<const NU: usize> Noise<NU> {
         let mut e = [Lanes([0.0; N]); NU];
         for i in 0..NU {
             e[i] = Lanes::lit(self.factor[i][i]) * z[i];
-            for j in 0..i {
-                if self.factor[i][j] != 0.0 {
-                    e[i] = e[i] + Lanes::lit(self.factor[i][j]) * z[j];
+            for (factor, z) in self.factor[i][..i].iter().zip(z) {
+                if *factor != 0.0 {
+                    e[i] = e[i] + Lanes::lit(*factor) * *z;
                 }
             }
         }

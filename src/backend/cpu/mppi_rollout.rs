@@ -245,8 +245,8 @@ where
             }
             self.controls[t] = u;
             let mut context = [Lanes([0.0; N]); NC];
-            for i in 0..NC {
-                context[i] = Lanes::lit(self.problem.context[t][i]);
+            for (lanes, number) in context.iter_mut().zip(&self.problem.context[t]) {
+                *lanes = Lanes::lit(*number);
             }
             total = total + self.cost.stage(x, u, context);
             if let Some(penalty) = self.spec.penalty() {
