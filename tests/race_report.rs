@@ -131,7 +131,7 @@ fn claims_follow_the_record() {
     assert!(page.contains("Published: 90.2 % (87.3 to 92.7 %)."));
     assert!(page.contains("Ceiling: 96 %; 480 of 500 starts are safe before anyone moves."));
     assert!(page.contains("mppi-soft, mppi-cbf and policy; below that of mppi-warm."));
-    assert!(page.contains("the betas of the experiment sum to 9.137."));
+    assert!(page.contains("the betas of all its races sum to 9.137."));
     assert!(page.contains("opposite sign"));
     record.controllers[0].judged[0].published.as_mut().unwrap().rate = 0.95;
     record.controllers[0].tiers.as_mut().unwrap().beta_total = 0.031_21;

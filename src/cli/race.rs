@@ -14,7 +14,7 @@ use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::experiment::controller::{Name, World};
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
-use crate::experiment::run::{Experiment, TimingRecord, default_folder};
+use crate::experiment::run::{Experiment, TimingRecord};
 use crate::experiment::settings::RaceSettings;
 use crate::files::{Staged, StateReader};
 use crate::policy::Mlp;
@@ -22,6 +22,8 @@ use crate::report::race_html;
 use crate::rollout::{Purpose, Region, Starts, Stream};
 use crate::system::{DroneRace, System};
 
+/// Where the results go unless `--out` says otherwise.
+const DEFAULT_OUT: &str = "reachcast-race";
 /// Most starts that can be drawn.
 const MOST_STARTS: u64 = 1_000_000;
 /// Most noise seeds.
@@ -50,7 +52,7 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     }
     let folder = folder_of(&asked.config);
     let policy = config.policy_source(folder)?;
-    let out = global.out.clone().unwrap_or_else(|| default_folder().to_owned());
+    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
     let networks = Networks::read(&race, folder)?;
     let (starts, source) = starts(&race, folder, asked.starts.as_deref(), config.seed)?;
     let progress = Progress::new(global);
@@ -109,7 +111,8 @@ fn name(text: &str) -> Result<Name> {
         let distance = |name: &&&str| strsim::damerau_levenshtein(text, name);
         let nearest = names.iter().min_by_key(distance).copied().unwrap_or_default();
         let problem = format!(
-            "no controller `{text}`; the nearest is `{nearest}` of all, ablations, improvements, {}",
+            "no controller `{text}`; did you mean `{nearest}`? There are all, ablations, improvements, \
+             {}",
             names.join(", ")
         );
         Error::invalid("--controllers", problem)
@@ -202,7 +205,8 @@ fn json(name: &str, value: &impl Serialize) -> Result<String> {
 /// The results as a page of text.
 fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
     let mut text = format!(
-        "{} races per controller and noise seed ({}), noise seeds {:?}\n\n",
+        "{} races per controller and noise seed ({}), noise seeds {:?}\n\
+         Mean rate over the seeds, and the 95 % interval of the first seed's run\n\n",
         record.starts.count, record.starts.source, record.noise_seeds
     );
     let mut line = |parts: std::fmt::Arguments<'_>| {
@@ -211,7 +215,7 @@ fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
     };
     line(format_args!(
         "{:20} {:>24} {:>9} {:>24} {:>24} {:>10}",
-        "controller", "study judge", "published", "paper judge", "rigorous judge", "ms a step"
+        "controller", "study judge", "published", "paper judge", "rigorous judge", "ms, share"
     ));
     for controller in &record.controllers {
         let [study, paper, rigorous] = [0, 1, 2].map(|i| rate(&controller.judged[i]));

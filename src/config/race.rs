@@ -1,6 +1,7 @@
 //! Defaults of the race experiment: the numbers of each profile.
 
 use super::section::Profile;
+use crate::control::tier::Domain;
 use crate::control::{BarrierFilter, BarrierForm, Widening};
 use crate::cost::{CenterlineCost, Fence, LaneCost, RaceCost, RecoveryCost, Safety, SafetyCone};
 use crate::experiment::judge::Judge;
@@ -9,6 +10,14 @@ use crate::experiment::settings::{
     RaceSettings, RecoveryPoint, SigmaSetting,
 };
 use crate::rollout::NoiseKind;
+
+/// Improvements of the fast plan, and of MPPI alone, at each control step in `rigorous`.
+const FAST_ITERATIONS: u32 = 3;
+/// The safety term of `rigorous`.
+const SAFETY: Safety =
+    Safety { weight: 1e6, margin: 0.05, cone: SafetyCone::Either, ..Safety::NONE };
+/// The fence term of `rigorous`.
+const FENCE: Fence = Fence { weight: 1e6, margin: 0.03 };
 
 /// The `[race]` section of `profile`. Where the paper gives no number, `paper` has the study's.
 pub(super) fn race(profile: Profile) -> RaceSettings {
@@ -29,17 +38,40 @@ pub(super) fn race(profile: Profile) -> RaceSettings {
             ..NetworkFiles::default()
         },
         hybrid: if rigorous { rigorous_hybrid() } else { study_hybrid() },
-        no_policy: NoPolicySettings {
-            recovery: plan(20, 0.7, centerline(1.0, soft(10.0))),
-            fast: plan(20, 0.5, lane(0.5, soft(5.0))),
-        },
-        mppi: plan(25, 0.7, lane(2.0, Safety::NONE)),
-        soft: plan(25, 0.7, lane(2.0, soft(if rigorous { 1e6 } else { 10.0 }))),
-        cbf: plan(if rigorous { 25 } else { 20 }, 0.7, lane(2.0, Safety::NONE)),
-        warmstart: plan(25, 0.7, lane(2.0, Safety::NONE)),
+        no_policy: if rigorous { rigorous_no_policy() } else { study_no_policy() },
+        mppi: alone(rigorous, 25, Safety::NONE),
+        soft: alone(rigorous, 25, soft(if rigorous { 1e6 } else { 10.0 })),
+        cbf: alone(rigorous, if rigorous { 25 } else { 20 }, Safety::NONE),
+        warmstart: alone(rigorous, 25, Safety::NONE),
         warmstart_works: rigorous,
         filter: filter(rigorous),
     }
+}
+
+/// MPPI alone: with as many improvements of a plan as the hybrid's in `rigorous`, one as published.
+fn alone(rigorous: bool, horizon: u32, safety: Safety) -> PlanSettings {
+    let iterations = if rigorous { FAST_ITERATIONS } else { 1 };
+    PlanSettings { iterations, ..plan(horizon, 0.7, lane(2.0, safety)) }
+}
+
+/// The ablation without the policy as published.
+fn study_no_policy() -> NoPolicySettings {
+    NoPolicySettings {
+        recovery: plan(20, 0.7, centerline(1.0, soft(10.0))),
+        fast: plan(20, 0.5, lane(0.5, soft(5.0))),
+    }
+}
+
+/// The same with the terms and the improvements of the hybrid, so that the policy and what needs
+/// it are all that is missing.
+fn rigorous_no_policy() -> NoPolicySettings {
+    let hybrid = rigorous_hybrid();
+    let outside = match centerline(1.0, SAFETY) {
+        RaceCost::Centerline(cost) => RaceCost::Centerline(CenterlineCost { fence: FENCE, ..cost }),
+        other => other,
+    };
+    let recovery = PlanSettings { cost: outside, ..hybrid.recovery };
+    NoPolicySettings { recovery, fast: hybrid.fast }
 }
 
 /// Where the study's starts were drawn from.
@@ -62,6 +94,7 @@ fn filter(rigorous: bool) -> FilterSettings {
 fn study_hybrid() -> HybridSettings {
     HybridSettings {
         global: true,
+        domain: Domain::Anywhere,
         local: true,
         recovery_tier: true,
         latch: true,
@@ -82,20 +115,23 @@ fn study_hybrid() -> HybridSettings {
 /// and are improved several times, and a recovery that follows the policy: each of these is
 /// measured in the README.
 fn rigorous_hybrid() -> HybridSettings {
-    let safety = Safety { weight: 1e6, margin: 0.05, cone: SafetyCone::Either, ..Safety::NONE };
-    let fence = Fence { weight: 1e6, margin: 0.03 };
+    let (safety, fence) = (SAFETY, FENCE);
     let follow = RecoveryCost { position: 20.0, velocity: 10.0, control: 1e-3, safety, fence };
     let with_fence = |cost: RaceCost| match cost {
         RaceCost::Lane(cost) => RaceCost::Lane(LaneCost { fence, ..cost }),
         other => other,
     };
     HybridSettings {
-        plan_gain: 0.5,
+        domain: Domain::Box,
+        plan_gain: 0.0,
         hold_opponent: false,
         recovery_point: RecoveryPoint::Policy,
         value_weight: 0.0,
         recovery: PlanSettings { iterations: 4, ..plan(20, 0.7, RaceCost::Recovery(follow)) },
-        fast: PlanSettings { iterations: 3, ..plan(20, 0.5, with_fence(lane(0.5, safety))) },
+        fast: PlanSettings {
+            iterations: FAST_ITERATIONS,
+            ..plan(20, 0.5, with_fence(lane(0.5, safety)))
+        },
         ..study_hybrid()
     }
 }

@@ -45,6 +45,9 @@ impl<C, const NU: usize> Planner<'_, C, NU> {
         C: Cost<NX, NU, NC>,
     {
         let mut results = Vec::new();
+        if problems.is_empty() {
+            return Ok(results);
+        }
         for iteration in 0..self.iterations {
             let task = self.task(problems, iteration);
             results = backend.mppi(system, &self.cost, &task)?;

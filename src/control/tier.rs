@@ -1,7 +1,7 @@
 //! The tier of many states at once: certificates that are made while the plant moves.
 
 use crate::backend::Backend;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::policy::Policy;
 use crate::rollout::{Ball, Plant, Query};
 use crate::scenario::boundary::on_slice;
@@ -41,6 +41,18 @@ pub struct Asked {
     pub global: bool,
     /// Tier 2: local growth.
     pub local: bool,
+    /// Where tier 1 may hold.
+    pub domain: Domain,
+}
+
+/// Where a state may count as certified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Domain {
+    /// In the box that the deviation bound was drawn from: outside it says nothing.
+    Box,
+    /// Anywhere, as in the study.
+    Anywhere,
 }
 
 /// What the certificates say of a state.
@@ -54,6 +66,8 @@ pub struct Standing<const NX: usize> {
     pub certified: Vec<bool>,
     /// The ball of local growth; none if there was nothing to grow from, or no beta left.
     pub growth: Option<LocalGrowth<NX>>,
+    /// Whether growth was not called because no beta was left.
+    pub refused: bool,
 }
 
 /// A ball grown for a state.
@@ -96,7 +110,7 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     /// Computes the constants, draws the deviation bound and measures the f32 error.
     ///
     /// # Errors
-    /// Those of [`tightened`].
+    /// Those of [`tightened`]; [`Error::Refused`] if a pair met a state that is not finite.
     pub fn new<const NU: usize>(
         backend: &'a Backend,
         plant: Plant<'a, S, P>,
@@ -109,6 +123,11 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     {
         let context = Context { backend, plant, watch: &Unwatched };
         let tightened = tightened(context, settings)?;
+        let lost = tightened.deviation.non_finite;
+        if lost > 0 {
+            let problem = format!("{lost} rollouts of the deviation bound are not finite");
+            return Err(Error::Refused(problem));
+        }
         let band = band(context, settings, &tightened.losses)?;
         Ok(Self { backend, plant, settings, tightened, band, asked })
     }
@@ -123,10 +142,9 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
         &self.tightened
     }
 
-    /// Beta of one call of local growth, all its rounds together.
-    pub fn call_beta(&self) -> f64 {
-        let growth = &self.settings.growth;
-        if growth.split_beta { growth.beta } else { growth.beta * f64::from(growth.rounds) }
+    /// Measures this close to zero are run again in f64.
+    pub fn band(&self) -> f64 {
+        self.band
     }
 
     /// The standing of each case, all in a few batches: V_check of all, then slice and growth of
@@ -144,16 +162,17 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     {
         let states: Vec<[f32; NX]> = cases.iter().map(|case| case.state).collect();
         let margins = self.margins(&states, Query::Measure)?;
-        let standing = |check_margin: f32| Standing {
-            tier: match self.asked.global && check_margin > 0.0 {
+        let standing = |(state, check_margin): (&[f32; NX], f32)| Standing {
+            tier: match self.asked.global && check_margin > 0.0 && self.covers(state) {
                 true => Tier::Global,
                 false => Tier::Recovery,
             },
             check_margin,
             certified: Vec::new(),
             growth: None,
+            refused: false,
         };
-        let mut standings: Vec<Standing<NX>> = margins.into_iter().map(standing).collect();
+        let mut standings: Vec<Standing<NX>> = states.iter().zip(margins).map(standing).collect();
         let open = |standing: &Standing<NX>| standing.tier == Tier::Recovery;
         let left: Vec<usize> = (0..cases.len()).filter(|&i| open(&standings[i])).collect();
         self.slices(&states, &left, &mut standings)?;
@@ -161,6 +180,13 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
             self.grow(cases, &left, &mut standings)?;
         }
         Ok(standings)
+    }
+
+    /// Whether the deviation bound speaks of `state`, as far as that is asked.
+    fn covers(&self, state: &[f32; NX]) -> bool {
+        let Settings { low, high, .. } = self.settings;
+        let inside = || (0..NX).all(|i| low[i] <= state[i] && state[i] <= high[i]);
+        self.asked.domain == Domain::Anywhere || inside()
     }
 
     /// `V_check` of each state, or its sign.
@@ -197,7 +223,8 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     }
 
     /// Grows a ball for each of the cases `left` whose slice has a boundary and whose ledger
-    /// allows it.
+    /// allows it. The centre is the boundary cell of the slice that the study's rule picks: the ray
+    /// search of a stored certificate costs a hundred times as many rollouts.
     fn grow<const NU: usize>(
         &self,
         cases: &mut [Case<'_, NX>],
@@ -219,13 +246,14 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
                 purpose: "tier 2".to_owned(),
                 call: u64::from(case.step),
                 round: 0,
-                beta: self.call_beta(),
+                beta: self.settings.growth.call_beta(),
             };
-            if let Spend::Granted { .. } = case.ledger.spend(entry) {
-                let center = boundary.point;
-                requests.push(Request { center, seed: case.seed, call: case.step });
-                asking.push(i);
+            if let Spend::Refused { .. } = case.ledger.spend(entry) {
+                standings[i].refused = true;
+                continue;
             }
+            requests.push(Request { center: boundary.point, seed: case.seed, call: case.step });
+            asking.push(i);
         }
         let context = Context { backend: self.backend, plant: self.plant, watch: &Unwatched };
         let grown = grow_each(context, self.settings, &requests, self.band)?;

@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use rayon::prelude::*;
+
 use super::controller::{Active, Controller, Decision, FilterLog, World};
 use super::plan::{Paths, Plan, fan, problem, stream};
 use super::settings::PlanSettings;
@@ -112,7 +114,7 @@ impl Controller for MppiController<'_> {
         let begin = |race: &Active| {
             problem(race.state, self.start_plan(race), stream(race.seed, step), |_| reference)
         };
-        let mut problems: Vec<_> = active.iter().map(begin).collect();
+        let mut problems: Vec<_> = active.par_iter().map(begin).collect();
         let World { backend, system, .. } = self.world;
         let results = self.plan.planner.improve(backend, system, &mut problems)?;
         let mut decisions = Vec::with_capacity(active.len());
@@ -120,6 +122,7 @@ impl Controller for MppiController<'_> {
             let mut decision = Decision {
                 control: result.plan[0],
                 effective_samples: Some(result.effective_samples),
+                non_finite: result.non_finite,
                 fan: fan(&self.plan, system, &problems, number, self.paths),
                 ..Decision::default()
             };

@@ -132,7 +132,10 @@ impl Name {
             Self::Mppi => "MPPI alone, without any term for safety.",
             Self::MppiSoft => "MPPI with a soft safety cost.",
             Self::MppiCbf => "MPPI whose control passes the barrier filter.",
-            Self::MppiWarmstart => "MPPI whose plan starts from a rollout of the policy.",
+            Self::MppiWarmstart => {
+                "MPPI whose plan starts from a rollout of the policy at each \
+                                    step; as published it is zeroed before its first use."
+            }
             Self::Policy => "The reachability policy alone.",
             Self::PpoCbf => "A policy trained by PPO, its control passed through the filter.",
             Self::HybridNoGlobal => "The hybrid without tier 1, the certified set.",
@@ -145,7 +148,10 @@ impl Name {
                 "The hybrid whose plans start from rollouts with the study's \
                                        ego gain of 2.0 and an opponent that stays in place."
             }
-            Self::HybridStudyRecovery => "The hybrid with the study's recovery point and weights.",
+            Self::HybridStudyRecovery => {
+                "The hybrid with both the study's recovery point and its \
+                                          weights."
+            }
             Self::HybridValue => "The hybrid with the study's value term in recovery.",
         }
     }
@@ -202,6 +208,10 @@ pub struct Decision {
     pub effective_samples: Option<f64>,
     /// Sampled paths of the ego in x and y, where they were asked for.
     pub fan: Vec<Vec<[f32; 2]>>,
+    /// Samples of the plan whose cost is not finite.
+    pub non_finite: u32,
+    /// Whether growth was not called because no beta was left.
+    pub refused: bool,
     /// What the filter did, where there is one.
     pub filter: Option<FilterLog>,
     /// Beta spent at this step.

@@ -50,7 +50,8 @@ impl<'a> Hybrid<'a> {
     /// The controller of `races` races.
     pub(super) fn new(world: World<'a>, races: usize, paths: Paths) -> Result<Self> {
         let asked = &world.race.hybrid;
-        let certificates = Asked { global: asked.global, local: asked.local };
+        let HybridSettings { global, local, domain, .. } = *asked;
+        let certificates = Asked { global, local, domain };
         let plant = crate::rollout::Plant { system: world.system, policy: world.policy };
         let certifier = Certifier::new(world.backend, plant, world.certificates, certificates)?;
         let fast = Plan::new("race.hybrid.fast", &asked.fast, world.system)?;
@@ -91,6 +92,7 @@ impl<'a> Hybrid<'a> {
                 control: result.plan[0],
                 tier: Some(Tier::Target),
                 effective_samples: Some(result.effective_samples),
+                non_finite: result.non_finite,
                 fan: fan(&self.fast, system, &problems, number, self.paths),
                 ..Decision::default()
             });
@@ -118,7 +120,9 @@ impl<'a> Hybrid<'a> {
     /// A rollout of the policy with the gain and the opponent that plans start from.
     fn policy_plan(&self, start: [f32; 12], horizon: usize) -> (Vec<[f32; 3]>, Vec<[f32; 12]>) {
         let asked = self.settings();
-        let system = DroneRace { ego_gain: asked.plan_gain, ..*self.world.system };
+        let plant = self.world.system;
+        let ego_gain = if asked.plan_gain > 0.0 { asked.plan_gain } else { plant.ego_gain };
+        let system = DroneRace { ego_gain, ..*plant };
         let held = asked.hold_opponent;
         policy_plan(&system, self.world.policy, start, horizon, |x| {
             if held {
@@ -175,6 +179,7 @@ impl<'a> Hybrid<'a> {
         let decide = |(number, result): (usize, crate::rollout::MppiResult<3>)| Decision {
             control: result.plan[0],
             effective_samples: Some(result.effective_samples),
+            non_finite: result.non_finite,
             fan: fan(&self.recovery, system, &problems, number, self.paths),
             ..Decision::default()
         };
@@ -260,6 +265,7 @@ impl Hybrid<'_> {
             decision.certified.clone_from(&standing.certified);
             decision.recovery = point;
             decision.beta = beta;
+            decision.refused = standing.refused;
             decisions.push(decision);
         }
         Ok(shared(decisions, begun))

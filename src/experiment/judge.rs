@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::system::{Cone, DroneRace, System};
 
 /// The rules by which a race is judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Judge {
     /// The published code's.
@@ -20,7 +20,7 @@ impl Judge {
     /// Every judge, in the order of tables.
     pub const ALL: [Self; 3] = [Self::Study, Self::Paper, Self::Rigorous];
 
-    /// The name in tables and on the command line.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Study => "study",

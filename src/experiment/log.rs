@@ -33,6 +33,10 @@ pub struct StepLog {
     pub ball: Option<BallLog>,
     /// Effective samples of the plan.
     pub effective_samples: Option<f32>,
+    /// Samples of the plan whose cost is not finite.
+    pub non_finite: u32,
+    /// Whether growth was not called because no beta was left.
+    pub refused: bool,
     /// Status of the filter, slack in m^2, whether it changed the control.
     pub filter: Option<(FilterStatus, f32, bool)>,
     /// Beta spent.
@@ -71,6 +75,8 @@ impl From<&Decision> for StepLog {
             check_margin: decision.check_margin,
             ball,
             effective_samples: decision.effective_samples.map(|samples| samples as f32),
+            non_finite: decision.non_finite,
+            refused: decision.refused,
             filter: decision.filter.map(|log| (log.status, log.slack as f32, log.active)),
             beta: decision.beta,
             seconds: decision.seconds as f32,
@@ -104,9 +110,8 @@ pub fn arrays(races: &[RaceLog], most: usize) -> Vec<(&'static str, Array)> {
         let each = per_step(races, most, |step| step.and_then(value).unwrap_or(NONE));
         Array { shape: vec![count, most], data: Data::U8(each) }
     };
-    let counts = |value: &dyn Fn(&BallLog) -> u32| {
-        let number = |step: &StepLog| step.ball.as_ref().map_or(0, value);
-        let each = per_step(races, most, |step| step.map_or(0, number));
+    let counts = |value: &dyn Fn(&StepLog) -> u32| {
+        let each = per_step(races, most, |step| step.map_or(0, value));
         Array { shape: vec![count, most], data: Data::U32(each) }
     };
     let spent = per_step(races, most, |step| step.map_or(0.0, |step| step.beta));
@@ -120,8 +125,10 @@ pub fn arrays(races: &[RaceLog], most: usize) -> Vec<(&'static str, Array)> {
         ("ball_y", floats(&|step| step.ball.map(|ball| ball.center[1]))),
         ("ball_radius", floats(&|step| step.ball.map(|ball| ball.radius))),
         ("ball_verified", bytes(&|step| step.ball.map(|ball| u8::from(ball.verified)))),
-        ("growth_rounds", counts(&|ball| ball.rounds)),
-        ("f64_reruns", counts(&|ball| ball.f64_reruns)),
+        ("growth_rounds", counts(&|step| step.ball.map_or(0, |ball| ball.rounds))),
+        ("growth_refused", bytes(&|step| Some(u8::from(step.refused)))),
+        ("f64_reruns", counts(&|step| step.ball.map_or(0, |ball| ball.f64_reruns))),
+        ("non_finite_samples", counts(&|step| step.non_finite)),
         ("effective_samples", floats(&|step| step.effective_samples)),
         ("filter_status", bytes(&|step| step.filter.map(|(status, ..)| code(status)))),
         ("filter_slack", floats(&|step| step.filter.map(|(_, slack, _)| slack))),
@@ -147,11 +154,12 @@ fn code(status: FilterStatus) -> u8 {
     }
 }
 
-/// The races that the arrays of a file hold; the error says what is wrong with them.
+/// The races that the arrays of a file hold, and the most steps of one; the error says what is
+/// wrong with them.
 ///
 /// # Errors
 /// A sentence that names the array.
-pub fn races(arrays: &BTreeMap<String, Array>) -> Result<Vec<RaceLog>, String> {
+pub fn races(arrays: &BTreeMap<String, Array>) -> Result<(Vec<RaceLog>, usize), String> {
     let steps = numbers(arrays, "steps", Data::as_u32)?;
     let tiers = numbers(arrays, "tier", Data::as_u8)?;
     let count = steps.len();
@@ -182,6 +190,10 @@ pub fn races(arrays: &BTreeMap<String, Array>) -> Result<Vec<RaceLog>, String> {
     let (ball_x, ball_y) = (float("ball_x")?, float("ball_y")?);
     let (verified, rounds) = (byte("ball_verified")?, whole("growth_rounds")?);
     let (reruns, effective) = (whole("f64_reruns")?, float("effective_samples")?);
+    let (non_finite, refused) = (whole("non_finite_samples")?, byte("growth_refused")?);
+    if let Some(tier) = tiers.iter().find(|tier| **tier > 3 && **tier != NONE) {
+        return Err(format!("`tier` has the number {tier}"));
+    }
     let (status, slack) = (byte("filter_status")?, float("filter_slack")?);
     let (active, seconds) = (byte("filter_active")?, float("seconds")?);
     let some = |value: f32| Some(value).filter(|value| !value.is_nan());
@@ -197,6 +209,8 @@ pub fn races(arrays: &BTreeMap<String, Array>) -> Result<Vec<RaceLog>, String> {
             f64_reruns: reruns[at],
         }),
         effective_samples: some(effective[at]),
+        non_finite: non_finite[at],
+        refused: refused[at] == 1,
         filter: decoded(status[at]).map(|status| (status, slack[at], active[at] == 1)),
         beta: beta[at],
         seconds: seconds[at],
@@ -213,7 +227,8 @@ pub fn races(arrays: &BTreeMap<String, Array>) -> Result<Vec<RaceLog>, String> {
         let decided = (number * most..number * most + steps).map(step).collect();
         Ok(RaceLog { states: (0..=steps).map(state).collect(), steps: decided })
     };
-    steps.iter().enumerate().map(race).collect()
+    let races = steps.iter().enumerate().map(race).collect::<Result<_, String>>()?;
+    Ok((races, most))
 }
 
 /// The status of a number in files.

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::judge::{FailureClass, Judge};
-use crate::scenario::record::Provenance;
+use crate::scenario::record::{ConstantsRecord, DeviationRecord, Provenance};
 
 /// Version of the record's form.
 pub const RACE_SCHEMA: u32 = 1;
@@ -20,6 +20,12 @@ pub struct RaceRecord {
     pub provenance: Provenance,
     /// SHA-256 of the value network, where one is used.
     pub value_sha256: Option<String>,
+    /// SHA-256 of the disturbance network, where one is used.
+    pub disturbance_sha256: Option<String>,
+    /// SHA-256 of the policy of `ppo-cbf`, where it ran.
+    pub ppo_sha256: Option<String>,
+    /// What V_check was computed with, where a controller asked for certificates.
+    pub bounds: Option<BoundsRecord>,
     /// Longest race, control steps.
     pub steps: u32,
     /// Duration of a control step, s.
@@ -34,6 +40,17 @@ pub struct RaceRecord {
     pub absent: Vec<AbsentRecord>,
     /// One race step by step, for the picture.
     pub picture: Option<PictureRecord>,
+}
+
+/// What V_check was computed with; the same for all controllers and races.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoundsRecord {
+    /// Lipschitz constants of the margins.
+    pub constants: ConstantsRecord,
+    /// The deviation bound and its claim.
+    pub deviation: DeviationRecord,
+    /// Measures this close to zero were run again in f64.
+    pub band: f64,
 }
 
 /// Where the starts come from.
@@ -82,6 +99,8 @@ pub struct ControllerRecord {
     pub tiers: Option<TierRecord>,
     /// For the controllers with a filter.
     pub filter: Option<FilterRecord>,
+    /// Samples of all plans whose cost was not finite: their weight was 0.
+    pub non_finite_samples: u64,
 }
 
 /// The verdicts of one judge on one controller.
@@ -170,18 +189,21 @@ pub struct TierRecord {
     pub growth_calls: u64,
     /// Calls that ended with a verified ball.
     pub growth_verified: u64,
+    /// Control steps at which the ledger allowed no call.
+    pub growth_refused: u64,
     /// Rounds of growth, over all calls.
     pub growth_rounds: u64,
     /// Starts rolled out by growth that were run again in f64.
     pub f64_reruns: u64,
-    /// Beta spent on the deviation bound, once per experiment.
+    /// Beta spent on the deviation bound, once for all races; for each step where the steps were
+    /// bounded separately.
     pub beta_deviation: f64,
-    /// Beta of one call of growth.
+    /// Beta of one call of growth; 0 where none is made.
     pub beta_call: f64,
     /// Most that a single race spent, the deviation bound included.
     pub beta_race: f64,
-    /// Sum over all races and calls, the deviation bound once: by the union bound, all claims of
-    /// the experiment hold together with at least one minus this; above 1 it says nothing.
+    /// Sum over all races and calls of this controller, the deviation bound once: by the union bound
+    /// all its claims hold together with at least one minus this; above 1 it says nothing.
     pub beta_total: f64,
 }
 

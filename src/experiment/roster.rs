@@ -59,8 +59,37 @@ fn terms(cost: &mut RaceCost) -> (&mut Safety, &mut Fence) {
 
 /// Why `name` cannot run with what there is; none if it can.
 pub(super) fn absent(name: Name, world: &World<'_>) -> Option<String> {
-    let reason = "it needs a policy trained by PPO, and `race.networks.ppo` names no file";
-    (name == Name::PpoCbf && world.ppo.is_none()).then(|| reason.to_owned())
+    if name == Name::PpoCbf && world.ppo.is_none() {
+        let reason = "it needs a policy trained by PPO, and `race.networks.ppo` names no file";
+        Some(reason.to_owned())
+    } else if values(name, world.race) && world.value.is_none() {
+        let reason = "its recovery has a value term, and `race.networks.value` names no file; name \
+                      one, or set `race.hybrid.value_weight` to 0";
+        Some(reason.to_owned())
+    } else {
+        None
+    }
+}
+
+/// The controllers that use neither certificates nor the value network.
+const ALONE: [Name; 7] = [
+    Name::HybridNoPolicy,
+    Name::Mppi,
+    Name::MppiSoft,
+    Name::MppiCbf,
+    Name::MppiWarmstart,
+    Name::Policy,
+    Name::PpoCbf,
+];
+
+/// Whether `name` asks for certificates.
+pub(super) fn certifies(name: Name) -> bool {
+    !ALONE.contains(&name)
+}
+
+/// Whether `name` uses the value network.
+pub(super) fn values(name: Name, race: &RaceSettings) -> bool {
+    certifies(name) && settings(name, race).hybrid.value_weight > 0.0
 }
 
 /// The controller `name` of `races` races; `world` has the settings of [`settings`].

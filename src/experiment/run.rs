@@ -11,18 +11,25 @@ use super::log::{RaceLog, arrays, damaged, races};
 use super::picture::picture;
 use super::plan::Paths;
 use super::race::{STEP_SECONDS, fly, race_seed};
-use super::record::{AbsentRecord, CeilingRecord, RACE_SCHEMA, RaceRecord, StartsRecord};
-use super::roster::{absent, controller, settings};
+use super::record::{
+    AbsentRecord, BoundsRecord, CeilingRecord, PictureRecord, RACE_SCHEMA, RaceRecord, StartsRecord,
+};
+use super::roster::{absent, certifies, controller, settings, values};
+use super::settings::RaceSettings;
 use super::summary::Summary;
+use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::files::{Staged, npz_bytes, read_npz};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
-use crate::scenario::{Watch, provenance};
+use crate::scenario::settings::Joint;
+use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
 /// Races of a batch; what is lost when the program is stopped is at most one of them.
 const BATCH: usize = 512;
+/// Random streams of one purpose that a race has.
+const MOST_STREAMS: u64 = 1 << 24;
 /// Name of the file that says which experiment a folder holds.
 const MANIFEST: &str = "experiment.json";
 
@@ -45,7 +52,8 @@ pub struct Experiment<'a> {
     pub folder: PathBuf,
 }
 
-/// Compute time of a controller.
+/// Compute time of a controller: the races of a batch step together, so a time is that of the batch
+/// divided by the races under way, not the latency of a step.
 #[derive(Clone, Debug, Serialize)]
 pub struct TimingRecord {
     /// The controller.
@@ -67,30 +75,54 @@ impl Experiment<'_> {
     /// [`Error::Refused`] if the folder holds another experiment, [`Error::File`] if a stored race
     /// is damaged, those of the controllers, and [`Error::Interrupted`].
     pub fn run(&self, watch: &dyn Watch) -> Result<(RaceRecord, Vec<TimingRecord>)> {
-        self.claim_folder()?;
         let reason = |name: &Name| absent(*name, &self.world).map(|reason| (*name, reason));
         let absent: Vec<(Name, String)> = self.names.iter().filter_map(reason).collect();
         let runs = |name: &Name| !absent.iter().any(|(missing, _)| missing == name);
-        let mut summaries = Vec::new();
-        for name in self.names.iter().copied().filter(runs) {
-            summaries.push((name, self.controller(name, watch)?));
+        let names: Vec<Name> = self.names.iter().copied().filter(runs).collect();
+        self.check(&names)?;
+        self.claim_folder()?;
+        let (mut summaries, mut timings) = (Vec::new(), Vec::new());
+        for name in names {
+            let mut summary = self.controller(name, watch)?;
+            timings.push(timing(name, std::mem::take(&mut summary.seconds)));
+            summaries.push((name, summary));
         }
-        let timing = summaries.iter().map(|(name, summary)| timing(*name, &summary.seconds));
-        let timing = timing.collect();
         let record = self.record(&summaries, absent, watch)?;
-        Ok((record, timing))
+        Ok((record, timings))
+    }
+
+    /// Refuses what would fail later: nothing to race, numbers out of range, and settings that a
+    /// controller does not take.
+    fn check(&self, names: &[Name]) -> Result<()> {
+        for (place, empty) in
+            [("starts", self.starts.is_empty()), ("noise seeds", self.noise_seeds.is_empty())]
+        {
+            if empty {
+                return Err(Error::invalid(place, "none; give at least one"));
+            }
+        }
+        let race = self.world.race;
+        race.check()?;
+        let calls = u64::from(race.steps) * u64::from(self.world.certificates.growth.rounds);
+        if calls >= MOST_STREAMS {
+            let problem = format!(
+                "{calls} rounds in one race; race.steps times growth.rounds has to stay below \
+                 {MOST_STREAMS}, the random streams that there are"
+            );
+            return Err(Error::invalid("race.steps", problem));
+        }
+        for &name in names {
+            let race = settings(name, race);
+            controller(name, World { race: &race, ..self.world }, 1, Paths::None)?;
+        }
+        Ok(())
     }
 
     /// All races of one controller.
     fn controller(&self, name: Name, watch: &dyn Watch) -> Result<Summary> {
         let race = settings(name, self.world.race);
         let world = World { race: &race, ..self.world };
-        let growth = &self.world.certificates.growth;
-        let rounds = if growth.split_beta { 1.0 } else { f64::from(growth.rounds) };
-        let betas = match name {
-            Name::HybridNoPolicy => [0.0; 2],
-            _ => [self.world.certificates.deviation.beta, rounds * growth.beta],
-        };
+        let betas = self.betas(name, &race);
         let mut summary = Summary::new(name, race.judge, race.steps, betas);
         for &noise_seed in &self.noise_seeds {
             summary.next_seed();
@@ -101,6 +133,22 @@ impl Experiment<'_> {
             }
         }
         Ok(summary)
+    }
+
+    /// What the deviation bound and one call of growth of the controller `name` spend.
+    fn betas(&self, name: Name, race: &RaceSettings) -> [f64; 2] {
+        let certificates = self.world.certificates;
+        if !certifies(name) {
+            return [0.0; 2];
+        }
+        let deviation = &certificates.deviation;
+        // Bounds of each step on its own hold together at the sum of their betas.
+        let steps = match deviation.joint {
+            Joint::Separate => f64::from(certificates.spec.horizon),
+            _ => 1.0,
+        };
+        let call = if race.hybrid.local { certificates.growth.call_beta() } else { 0.0 };
+        [steps * deviation.beta, call]
     }
 
     /// The races from `first` on: stored ones, or flown now and stored.
@@ -118,10 +166,8 @@ impl Experiment<'_> {
         let folder = self.folder.join("races");
         let path = folder.join(&file);
         if path.exists() {
-            let stored = races(&read_npz(&path)?).map_err(|problem| damaged(&path, &problem))?;
-            let same = stored.iter().map(|race| &race.states[0]).eq(starts);
             watch.advance(starts.len() as u64 * u64::from(steps))?;
-            return if same { Ok(stored) } else { Err(damaged(&path, "its starts are others")) };
+            return stored(&path, starts, steps);
         }
         let seeds = self.seeds(noise_seed, first, starts.len());
         let mut controller = controller(name, world, starts.len(), Paths::None)?;
@@ -145,7 +191,8 @@ impl Experiment<'_> {
         absent: Vec<(Name, String)>,
         watch: &dyn Watch,
     ) -> Result<RaceRecord> {
-        let World { backend, system, policy, value, race, certificates, .. } = self.world;
+        let World { backend, system, policy, value, disturbance, ppo, race, certificates } =
+            self.world;
         let hybrid = summaries.iter().find(|(name, _)| *name == Name::Hybrid);
         let hybrid = hybrid.map(|(_, summary)| summary);
         let plant = Plant { system, policy };
@@ -153,14 +200,22 @@ impl Experiment<'_> {
             .into_iter()
             .map(|(name, reason)| AbsentRecord { name: name.text().to_owned(), reason });
         let controllers = summaries.iter().map(|(_, summary)| summary.record(hybrid));
-        let mut shown = None;
-        if let Some(&(name, _)) = summaries.iter().find(|(name, _)| *name == Name::Hybrid) {
-            shown = Some(self.picture(name, watch)?);
-        }
+        let shown = match hybrid {
+            Some(_) => self.picture(Name::Hybrid, watch)?,
+            None => None,
+        };
+        let ran: Vec<Name> = summaries.iter().map(|(name, _)| *name).collect();
+        let value = value.filter(|_| ran.iter().any(|name| values(*name, race)));
+        let tiered = ran.iter().any(|name| certifies(*name));
+        let ppo = ppo.filter(|_| ran.contains(&Name::PpoCbf));
+        let disturbance = disturbance.filter(|_| tiered);
         Ok(RaceRecord {
             schema: RACE_SCHEMA,
             provenance: provenance(backend, plant, certificates.seed, self.config.clone()),
             value_sha256: value.map(Mlp::digest),
+            disturbance_sha256: disturbance.map(Mlp::digest),
+            ppo_sha256: ppo.map(Mlp::digest),
+            bounds: if tiered { Some(self.bounds()?) } else { None },
             steps: race.steps,
             step_seconds: STEP_SECONDS,
             starts: StartsRecord {
@@ -176,13 +231,23 @@ impl Experiment<'_> {
         })
     }
 
+    /// What V_check is computed with.
+    fn bounds(&self) -> Result<BoundsRecord> {
+        let World { backend, system, policy, certificates, .. } = self.world;
+        let asked = Asked { global: true, local: false, domain: Domain::Anywhere };
+        let certifier = Certifier::new(backend, Plant { system, policy }, certificates, asked)?;
+        let Tightened { constants, deviation, .. } = certifier.tightened().clone();
+        Ok(BoundsRecord { constants, deviation, band: certifier.band() })
+    }
+
     /// The race that is drawn: of the first batch with the first noise seed, the first of those
-    /// that saw the most tiers.
-    fn picture(&self, name: Name, watch: &dyn Watch) -> Result<super::record::PictureRecord> {
+    /// that saw the most tiers. None if it did not come out as it is stored, which says that the
+    /// device does not give the same bits twice.
+    fn picture(&self, name: Name, watch: &dyn Watch) -> Result<Option<PictureRecord>> {
         let race = settings(name, self.world.race);
         let world = World { race: &race, ..self.world };
         let noise_seed = self.noise_seeds[0];
-        let logs = self.batch(name, world, noise_seed, 0, watch)?;
+        let logs = self.batch(name, world, noise_seed, 0, &Unwatched)?;
         let seen = |race: &RaceLog| {
             let mut tiers: Vec<_> = race.steps.iter().map(|step| step.tier).collect();
             tiers.sort_unstable();
@@ -192,7 +257,10 @@ impl Experiment<'_> {
         let most = logs.iter().map(seen).max().unwrap_or(0);
         let start = logs.iter().position(|race| seen(race) == most).unwrap_or(0);
         let seed = race_seed(noise_seed, start as u64);
-        picture(name, world, (start, self.starts[start]), (noise_seed, seed), watch)
+        let shown = picture(name, world, (start, self.starts[start]), (noise_seed, seed), watch)?;
+        let flown = shown.frames.iter().map(|frame| frame.x.as_slice());
+        let same = flown.eq(logs[start].states.iter().map(|x| x.as_slice()));
+        Ok(same.then_some(shown))
     }
 
     /// Starts that do not violate `judge` before anyone moves.
@@ -214,7 +282,7 @@ impl Experiment<'_> {
             Ok(text) if text == mine => Ok(()),
             Ok(_) => Err(Error::Refused(format!(
                 "{} holds another experiment (other configuration, starts, networks, backend or \
-                 version, see {MANIFEST} there); give another --out, or remove that folder",
+                 program, see {MANIFEST} there); give another --out, or remove that folder",
                 self.folder.display()
             ))),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -226,15 +294,19 @@ impl Experiment<'_> {
         }
     }
 
-    /// Everything that the races depend on but their controller and noise seed.
+    /// Everything that the races depend on but their controller and noise seed, the program included.
     fn manifest(&self) -> String {
         let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
             self.world;
         let digest = |network: Option<&Mlp>| network.map(Mlp::digest);
         let origin =
             provenance(backend, Plant { system, policy }, certificates.seed, self.config.clone());
+        let program = std::env::current_exe().and_then(std::fs::read);
+        let program =
+            program.map_or_else(|_| "unknown".to_owned(), |bytes| digest::sha256([&bytes[..]]));
         let manifest = serde_json::json!({
             "schema": RACE_SCHEMA,
+            "program_sha256": program,
             "provenance": origin,
             "starts_sha256": self.starts_sha256(),
             "value_sha256": digest(value),
@@ -245,24 +317,31 @@ impl Experiment<'_> {
     }
 }
 
+/// The races that the file at `path` holds, if they are those from `starts` and of that length.
+fn stored(path: &Path, starts: &[[f32; 12]], steps: u32) -> Result<Vec<RaceLog>> {
+    let (stored, most) = races(&read_npz(path)?).map_err(|problem| damaged(path, &problem))?;
+    if most != steps as usize {
+        return Err(damaged(path, &format!("it holds races of {most} steps, not of {steps}")));
+    }
+    match stored.iter().map(|race| &race.states[0]).eq(starts) {
+        true => Ok(stored),
+        false => Err(damaged(path, "its starts are others")),
+    }
+}
+
 /// Compute time from that of each step.
-fn timing(name: Name, seconds: &[f32]) -> TimingRecord {
-    let mut sorted: Vec<f64> = seconds.iter().map(|seconds| f64::from(*seconds)).collect();
-    sorted.sort_by(f64::total_cmp);
+fn timing(name: Name, mut sorted: Vec<f32>) -> TimingRecord {
+    sorted.sort_by(f32::total_cmp);
     let at = |share: f64| {
         let place = (share * sorted.len() as f64) as usize;
-        sorted.get(place.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
+        sorted.get(place.min(sorted.len().saturating_sub(1))).map_or(0.0, |s| f64::from(*s))
     };
     TimingRecord {
         name: name.text().to_owned(),
         steps: sorted.len() as u64,
-        mean_seconds: sorted.iter().sum::<f64>() / sorted.len().max(1) as f64,
+        mean_seconds: sorted.iter().map(|s| f64::from(*s)).sum::<f64>()
+            / sorted.len().max(1) as f64,
         p99_seconds: at(0.99),
         most_seconds: at(1.0),
     }
-}
-
-/// Where an experiment goes unless `--out` says otherwise.
-pub fn default_folder() -> &'static Path {
-    Path::new("reachcast-race")
 }

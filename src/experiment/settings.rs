@@ -3,11 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::judge::Judge;
+use crate::control::tier::Domain;
 use crate::control::{BarrierFilter, BarrierForm, Widening};
 use crate::cost::RaceCost;
 use crate::error::{Error, Result};
 use crate::rollout::{MppiSettings, MppiSpec, NoiseKind, Sigma};
 use crate::system::{DroneRace, System};
+
+/// Most control steps of a race: each has random streams of its own.
+const MOST_STEPS: u32 = 10_000;
 
 /// Everything about a race but the plant, the policy and the certificates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,6 +65,8 @@ pub struct NetworkFiles {
 pub struct HybridSettings {
     /// Whether tier 1, the certified set, is used.
     pub global: bool,
+    /// Where tier 1 may hold.
+    pub domain: Domain,
     /// Whether tier 2, the locally verified ball, is used.
     pub local: bool,
     /// Whether tier 3, recovery, is used; without it the policy flies there too.
@@ -75,8 +81,8 @@ pub struct HybridSettings {
     pub first_plan: FirstPlan,
     /// Where recovery steers to.
     pub recovery_point: RecoveryPoint,
-    /// Ego gain of the policy's rollouts that plans start from, m/s^2; 2.0 in the study, against
-    /// 0.5 of the plant.
+    /// Ego gain of the policy's rollouts that plans start from, m/s^2: 2.0 in the study, against
+    /// 0.5 of its plant; 0 for the plant's own.
     pub plan_gain: f32,
     /// Whether the opponent stays where it is in these rollouts, as in the study.
     pub hold_opponent: bool,
@@ -177,6 +183,44 @@ pub struct FilterSettings {
     pub slack_weight: f64,
     /// Distance kept to the opponent, m.
     pub radius: f64,
+}
+
+impl RaceSettings {
+    /// Refuses numbers that are out of range, naming the key.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for no step, a number that is not finite, or a gain below 0.
+    pub fn check(&self) -> Result<()> {
+        if !(1..=MOST_STEPS).contains(&self.steps) {
+            let problem = format!("{} is not within 1..={MOST_STEPS}", self.steps);
+            return Err(Error::invalid("race.steps", problem));
+        }
+        let value =
+            serde_json::to_value(self).map_err(|e| Error::invalid("race", e.to_string()))?;
+        if let Some(key) = not_finite("race", &value) {
+            return Err(Error::invalid(key, "not a finite number"));
+        }
+        let gain = self.hybrid.plan_gain;
+        if gain < 0.0 {
+            let problem = format!("{gain} is below 0; 0 takes the plant's own gain");
+            return Err(Error::invalid("race.hybrid.plan_gain", problem));
+        }
+        Ok(())
+    }
+}
+
+/// The first key whose value JSON cannot hold: all of them are there, so it is a number that is
+/// not finite.
+fn not_finite(key: &str, value: &serde_json::Value) -> Option<String> {
+    use serde_json::Value;
+    match value {
+        Value::Null => Some(key.to_owned()),
+        Value::Object(entries) => {
+            entries.iter().find_map(|(name, value)| not_finite(&format!("{key}.{name}"), value))
+        }
+        Value::Array(values) => values.iter().find_map(|value| not_finite(key, value)),
+        _ => None,
+    }
 }
 
 impl PlanSettings {

@@ -23,6 +23,7 @@ pub struct Summary {
     tiers: TierRecord,
     tiered: bool,
     filter: FilterRecord,
+    non_finite_samples: u64,
     /// Compute time of each control step of each race, s.
     pub seconds: Vec<f32>,
 }
@@ -36,6 +37,7 @@ impl Summary {
             shares: [0.0; 4],
             growth_calls: 0,
             growth_verified: 0,
+            growth_refused: 0,
             growth_rounds: 0,
             f64_reruns: 0,
             beta_deviation: betas[0],
@@ -51,6 +53,7 @@ impl Summary {
             tiers,
             tiered: false,
             filter: FilterRecord::default(),
+            non_finite_samples: 0,
             seconds: Vec::new(),
         }
     }
@@ -87,6 +90,8 @@ impl Summary {
         for step in &race.steps {
             self.tiered |= step.tier.is_some();
             self.seconds.push(step.seconds);
+            self.non_finite_samples += u64::from(step.non_finite);
+            self.tiers.growth_refused += u64::from(step.refused);
             spent += step.beta;
             self.tiers.beta_total += step.beta;
             if let Some(ball) = step.ball {
@@ -122,6 +127,7 @@ impl Summary {
             metrics: mean_metrics(self.judge, &self.metrics),
             tiers: self.tiered.then(|| self.tier_record()),
             filter: (self.filter.calls > 0).then_some(self.filter),
+            non_finite_samples: self.non_finite_samples,
         }
     }
 
@@ -133,11 +139,5 @@ impl Summary {
         let all = counts.iter().sum::<u64>().max(1);
         tiers.shares = counts.map(|count| count as f64 / all as f64);
         tiers
-    }
-
-    /// The judge's verdicts with the first noise seed.
-    pub fn first_verdicts(&self, judge: Judge) -> &[Option<FailureClass>] {
-        let place = Judge::ALL.iter().position(|known| *known == judge).unwrap_or(0);
-        self.verdicts[place].first().map_or(&[], Vec::as_slice)
     }
 }

@@ -36,6 +36,11 @@ impl<const NX: usize> GrowthSettings<NX> {
     pub(super) fn round_beta(&self) -> f64 {
         if self.split_beta { self.beta / f64::from(self.rounds) } else { self.beta }
     }
+
+    /// Beta of one call, all its rounds together.
+    pub fn call_beta(&self) -> f64 {
+        if self.split_beta { self.beta } else { self.beta * f64::from(self.rounds) }
+    }
 }
 
 /// What one round showed.

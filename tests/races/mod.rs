@@ -16,14 +16,7 @@ const STEPS: u32 = 80;
 pub(crate) const FRAMES: usize = 80;
 const JUDGES: [(Judge, u64); 3] =
     [(Judge::Study, 480), (Judge::Paper, 403), (Judge::Rigorous, 479)];
-const CLASSES: [FailureClass; 6] = [
-    FailureClass::UnsafeStart,
-    FailureClass::Collision,
-    FailureClass::Fence,
-    FailureClass::MissedGate,
-    FailureClass::Overtaken,
-    FailureClass::Timeout,
-];
+const CLASSES: [FailureClass; 7] = FailureClass::ALL;
 
 /// Name, description, published rate with interval, and successes of the first seed per judge.
 type Contender = (&'static str, &'static str, [f64; 3], [u64; 3]);
@@ -70,6 +63,9 @@ pub(crate) fn full() -> RaceRecord {
         schema: RACE_SCHEMA,
         provenance: provenance(),
         value_sha256: Some("5a1e".repeat(16)),
+        disturbance_sha256: None,
+        ppo_sha256: None,
+        bounds: None,
         steps: STEPS,
         step_seconds: 0.1,
         starts: StartsRecord {
@@ -122,6 +118,7 @@ fn controller(contender: &Contender) -> ControllerRecord {
             inaccurate: 16,
             failed: 9,
         }),
+        non_finite_samples: 0,
     }
 }
 
@@ -196,6 +193,7 @@ fn tiers(policy: bool) -> TierRecord {
         growth_calls: 45_678,
         growth_verified: 34_567,
         growth_rounds: 101_112,
+        growth_refused: 17,
         f64_reruns: 1_314,
         beta_deviation: 0.001,
         beta_call: 0.0002,

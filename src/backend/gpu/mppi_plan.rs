@@ -74,7 +74,7 @@ impl MppiPlan {
         let unit = u64::from(WORKGROUP);
         let samples = u64::from(size.samples).min(columns);
         let problems = problems.min(columns / samples.next_multiple_of(unit)).max(1);
-        let rounds = rounds(samples as u32, problems as u32);
+        let rounds = rounds(samples as u32);
         // The padding of whole rounds may not fit any more: one problem less, or single rounds.
         let width = samples.next_multiple_of(unit * u64::from(rounds));
         let (problems, width, rounds) = match columns / width {
@@ -131,10 +131,11 @@ fn problem_bytes(size: &Size<'_>) -> u64 {
     16 + 4 * size.states as u64 + 4 * u64::from(size.horizon) * stage
 }
 
-/// Samples of each thread of the update.
-fn rounds(samples: u32, problems: u32) -> u32 {
+/// Samples of each thread of the update: a function of the samples alone, so that a plan does not
+/// depend on the problems beside it.
+fn rounds(samples: u32) -> u32 {
     let groups = samples.div_ceil(WORKGROUP);
-    let most = (u64::from(groups) * u64::from(problems) / u64::from(BUSY_GROUPS)).max(1) as u32;
+    let most = (groups / BUSY_GROUPS).max(1);
     // As few as the same number of workgroups needs: padding is work.
     groups.div_ceil(groups.div_ceil(most))
 }

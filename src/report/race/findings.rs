@@ -134,6 +134,11 @@ fn growth(controller: &ControllerRecord) -> Option<String> {
 pub(super) fn limits(record: &RaceRecord) -> Vec<String> {
     let mut limits = vec![runs(record), seeds(record)];
     limits.push(
+        "All controllers fly with the same control noise from the same starts, which the paired \
+         comparisons rely on."
+            .to_owned(),
+    );
+    limits.push(
         "A certificate guarantees what its statement says about the measure that it was drawn \
          from. It is not a success rate, and the success rates are not certified."
             .to_owned(),
@@ -193,17 +198,17 @@ fn seeds(record: &RaceRecord) -> String {
 
 /// What the beta of a controller's experiment allows to say.
 fn beta(controller: &ControllerRecord) -> Option<String> {
-    let tiers = controller.tiers.as_ref()?;
+    let tiers = controller.tiers.as_ref().filter(|tiers| tiers.beta_total > 0.0)?;
     let name = &controller.name;
     let (race, total) = (upper(tiers.beta_race), upper(tiers.beta_total));
     Some(if tiers.beta_total < 1.0 {
         format!(
-            "{name}: all certificates of the experiment hold together with confidence at least 1 − {total}, \
-             those of a single race with at least 1 − {race}."
+            "{name}: the certificates of all its races hold together with confidence at least \
+             1 − {total}, those of a single race with at least 1 − {race}."
         )
     } else {
         format!(
-            "{name}: the betas of the experiment sum to {total}. At 1 and above the union bound \
+            "{name}: the betas of all its races sum to {total}. At 1 and above the union bound \
              says nothing about all its certificates together; a single race spent at most {race}."
         )
     })

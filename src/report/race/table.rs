@@ -3,10 +3,12 @@
 use super::words::{self, CLASSES, percent, percents, points};
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{
-    ControllerRecord, FilterRecord, JudgedRecord, MetricsRecord, RaceRecord, TierRecord,
+    BoundsRecord, ControllerRecord, FilterRecord, JudgedRecord, MetricsRecord, RaceRecord,
+    TierRecord,
 };
 use crate::report::table::{pairs, table};
 use crate::report::text::{count, number, or_dash, upper};
+use crate::scenario::record::ConstantRecord;
 
 /// A table of more than three columns; nothing without a row.
 fn rows(title: &str, head: &[&str], body: Vec<Vec<String>>) -> String {
@@ -29,7 +31,7 @@ pub(super) fn wide(record: &RaceRecord) -> String {
 
 /// The tables of two columns.
 pub(super) fn narrow(record: &RaceRecord) -> String {
-    starts(record) + &absent(record) + &provenance(record)
+    starts(record) + &absent(record) + &bounds(record) + &provenance(record)
 }
 
 fn success(record: &RaceRecord, judge: Judge) -> String {
@@ -160,11 +162,12 @@ fn tiers(record: &RaceRecord) -> String {
         row("calls of local growth", &|tiers| count(tiers.growth_calls)),
         row("calls that ended with a verified ball", &|tiers| count(tiers.growth_verified)),
         row("rounds of growth", &|tiers| count(tiers.growth_rounds)),
-        row("f64 re-runs", &|tiers| count(tiers.f64_reruns)),
-        row("beta of the deviation bound", &|tiers| number(tiers.beta_deviation)),
-        row("beta of one call of growth", &|tiers| number(tiers.beta_call)),
+        row("calls that the ledger refused", &|tiers| count(tiers.growth_refused)),
+        row("f64 re-runs of growth", &|tiers| count(tiers.f64_reruns)),
+        row("beta of the deviation bound", &|tiers| upper(tiers.beta_deviation)),
+        row("beta of one call of growth", &|tiers| upper(tiers.beta_call)),
         row("largest beta of a race", &|tiers| upper(tiers.beta_race)),
-        row("beta of the whole experiment", &|tiers| upper(tiers.beta_total)),
+        row("beta of all races", &|tiers| upper(tiers.beta_total)),
     ];
     rows("Tiers, growth and beta", &head, body)
 }
@@ -212,6 +215,27 @@ fn absent(record: &RaceRecord) -> String {
     rows("Controllers that did not run", &["controller", "reason"], body)
 }
 
+/// What V_check was computed with, and the deviation bound's own statement.
+fn bounds(record: &RaceRecord) -> String {
+    let Some(BoundsRecord { constants, deviation, band }) = &record.bounds else {
+        return String::new();
+    };
+    let constant =
+        |constant: &ConstantRecord| format!("{} ({})", upper(constant.used), constant.source);
+    let claim = &deviation.claim;
+    pairs(
+        "What V_check was computed with",
+        &[
+            ("deviation bound", claim.statement.clone()),
+            ("measure", claim.measure.clone()),
+            ("pairs", format!("{}, none allowed to exceed the bound", count(claim.scenarios))),
+            ("Lipschitz constant of the target margin", constant(&constants.target)),
+            ("Lipschitz constant of the constraint margin", constant(&constants.constraint)),
+            ("run again in f64 within", upper(*band)),
+        ],
+    )
+}
+
 fn provenance(record: &RaceRecord) -> String {
     let provenance = &record.provenance;
     pairs(
@@ -226,6 +250,8 @@ fn provenance(record: &RaceRecord) -> String {
             ("policy", provenance.policy.clone()),
             ("policy SHA-256", provenance.policy_sha256.clone()),
             ("value network SHA-256", or_dash(record.value_sha256.as_ref())),
+            ("disturbance network SHA-256", or_dash(record.disturbance_sha256.as_ref())),
+            ("PPO policy SHA-256", or_dash(record.ppo_sha256.as_ref())),
             ("physics SHA-256", provenance.physics_sha256.clone()),
         ],
     )

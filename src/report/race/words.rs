@@ -8,14 +8,7 @@ use crate::report::text::{interval, number, ordinary};
 const HYBRID: &str = "hybrid";
 
 /// Every class in the order of figures and tables.
-pub(super) const CLASSES: [FailureClass; 6] = [
-    FailureClass::UnsafeStart,
-    FailureClass::Collision,
-    FailureClass::Fence,
-    FailureClass::MissedGate,
-    FailureClass::Overtaken,
-    FailureClass::Timeout,
-];
+pub(super) const CLASSES: [FailureClass; 7] = FailureClass::ALL;
 
 /// Name of a judge.
 pub(super) fn judge(judge: Judge) -> &'static str {
@@ -30,8 +23,10 @@ pub(super) fn judge(judge: Judge) -> &'static str {
 pub(super) fn rules(judge: Judge) -> &'static str {
     match judge {
         Judge::Study => "the rules of the published code",
-        Judge::Paper => "the rules as printed in the paper",
-        Judge::Rigorous => "the printed rules with the cone in its distance form",
+        Judge::Paper => {
+            "the rules as printed in the paper, the gate in place of the fences where it is crossed"
+        }
+        Judge::Rigorous => "the same with the cone in its distance form",
     }
 }
 
@@ -64,10 +59,10 @@ pub(super) fn mark(class: FailureClass) -> (&'static str, &'static str) {
 /// What is flown in a tier.
 pub(super) fn tier(tier: u8) -> &'static str {
     match tier {
-        0 => "in the target set: fast MPPI through the gate",
+        0 => "in the target, once in it, or at the gate: fast MPPI",
         1 => "V_check is positive: the policy",
         2 => "in the verified ball: the policy",
-        _ => "none of these: recovery MPPI",
+        _ => "none of these: recovery",
     }
 }
 
