@@ -289,7 +289,17 @@ mod tests {
         assert!((1..512).contains(&long.update_steps), "{long:?}");
         let race = MppiPlan::new(&adapter(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
         assert_eq!((race.rollout_steps, race.update_steps), (20, 20));
-        assert!(race.rounds > 1, "4000 workgroups keep a GPU busy twice: {race:?}");
+    }
+
+    /// A plan must not depend on the problems beside it, nor its bits on how partials are cut.
+    #[test]
+    fn rounds_depend_on_the_samples_alone() {
+        for (samples, rounds) in [(500, 1), (65_536, 1), (200_000, 3), (1_000_000, 4)] {
+            for problems in [1, 500] {
+                let plan = MppiPlan::new(&adapter(1 << 27), &size(3, 20, samples, problems));
+                assert_eq!(plan.expect("a plan").rounds, rounds, "{samples} x {problems}");
+            }
+        }
     }
 
     #[test]
