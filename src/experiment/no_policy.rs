@@ -51,7 +51,9 @@ impl<'a> NoPolicy<'a> {
         let reference = RaceReference { speed: plan.speed, ..RaceReference::default() };
         let begin = |race: &Active| {
             let before = self.races[race.place].1.as_deref();
-            let start = before.map_or_else(|| vec![[0.0; 3]; horizon], shifted);
+            let mut start = before.map_or_else(Vec::new, shifted);
+            // The plan may be one of the other horizon.
+            start.resize(horizon, [0.0; 3]);
             problem(race.state, start, stream(race.seed, step), |_| reference)
         };
         let mut problems: Vec<RaceProblem> = races.iter().map(begin).collect();
