@@ -23,6 +23,8 @@ use crate::scenario::{Watch, provenance};
 
 /// Races of a batch; what is lost when the program is stopped is at most one of them.
 const BATCH: usize = 512;
+/// Random streams of a race for local growth, one per round.
+const STREAMS: u64 = 1 << 24;
 /// Name of the file that says which experiment a folder holds.
 const MANIFEST: &str = "experiment.json";
 
@@ -64,21 +66,44 @@ impl Experiment<'_> {
     /// Runs what is not stored yet and makes the record of all.
     ///
     /// # Errors
-    /// [`Error::Refused`] if the folder holds another experiment, [`Error::File`] if a stored race
-    /// is damaged, those of the controllers, and [`Error::Interrupted`].
+    /// Those of [`RaceSettings::check`](super::settings::RaceSettings::check) and of the
+    /// controllers, before any race; [`Error::File`] if the folder holds another experiment or a
+    /// stored race is damaged; [`Error::Interrupted`].
     pub fn run(&self, watch: &dyn Watch) -> Result<(RaceRecord, Vec<TimingRecord>)> {
-        self.claim_folder()?;
         let reason = |name: &Name| absent(*name, &self.world).map(|reason| (*name, reason));
         let absent: Vec<(Name, String)> = self.names.iter().filter_map(reason).collect();
         let runs = |name: &Name| !absent.iter().any(|(missing, _)| missing == name);
+        let names: Vec<Name> = self.names.iter().copied().filter(runs).collect();
+        self.check(&names)?;
+        self.claim_folder()?;
         let mut summaries = Vec::new();
-        for name in self.names.iter().copied().filter(runs) {
+        for name in names {
             summaries.push((name, self.controller(name, watch)?));
         }
         let timing = summaries.iter().map(|(name, summary)| timing(*name, &summary.seconds));
         let timing = timing.collect();
         let record = self.record(&summaries, absent, watch)?;
         Ok((record, timing))
+    }
+
+    /// Refuses settings that a controller cannot race with before the first of them races: each
+    /// is made once.
+    fn check(&self, names: &[Name]) -> Result<()> {
+        let World { race, system, certificates, .. } = self.world;
+        race.check(system)?;
+        let (calls, rounds) = (u64::from(race.steps), u64::from(certificates.growth.rounds));
+        if calls * rounds > STREAMS {
+            let problem = format!(
+                "{rounds} rounds at each of {calls} steps (race.steps) take more than the \
+                 {STREAMS} random streams that there are"
+            );
+            return Err(Error::invalid("growth.rounds", problem));
+        }
+        for name in names {
+            let race = settings(*name, race);
+            controller(*name, World { race: &race, ..self.world }, 1, Paths::None)?;
+        }
+        Ok(())
     }
 
     /// All races of one controller.
@@ -118,7 +143,11 @@ impl Experiment<'_> {
         let folder = self.folder.join("races");
         let path = folder.join(&file);
         if path.exists() {
-            let stored = races(&read_npz(&path)?).map_err(|problem| damaged(&path, &problem))?;
+            let stored = read_npz(&path).map_err(|error| match error {
+                Error::File { problem, .. } => damaged(&path, &problem),
+                other => other,
+            })?;
+            let stored = races(&stored).map_err(|problem| damaged(&path, &problem))?;
             let same = stored.iter().map(|race| &race.states[0]).eq(starts);
             watch.advance(starts.len() as u64 * u64::from(steps))?;
             return if same { Ok(stored) } else { Err(damaged(&path, "its starts are others")) };
@@ -212,11 +241,12 @@ impl Experiment<'_> {
         let mine = self.manifest();
         match std::fs::read_to_string(&path) {
             Ok(text) if text == mine => Ok(()),
-            Ok(_) => Err(Error::Refused(format!(
-                "{} holds another experiment (other configuration, starts, networks, backend or \
-                 version, see {MANIFEST} there); give another --out, or remove that folder",
-                self.folder.display()
-            ))),
+            Ok(_) => {
+                let problem = "another experiment is stored here (other configuration, starts, \
+                               networks, backend or version); give another --out, or remove \
+                               this folder";
+                Err(Error::file(&path, problem))
+            }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 let mut staged = Staged::new(&self.folder)?;
                 staged.add(MANIFEST, mine.as_bytes())?;

@@ -9,6 +9,9 @@ use crate::error::{Error, Result};
 use crate::rollout::{MppiSettings, MppiSpec, NoiseKind, Sigma};
 use crate::system::{DroneRace, System};
 
+/// Longest race that can be asked for, control steps.
+const MOST_STEPS: u32 = 10_000;
+
 /// Everything about a race but the plant, the policy and the certificates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -153,7 +156,7 @@ pub struct PlanSettings {
 
 /// Standard deviation of the noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, three numbers or a 3 x 3 matrix")]
 pub enum SigmaSetting {
     /// The same for each control.
     Same(f32),
@@ -177,6 +180,43 @@ pub struct FilterSettings {
     pub slack_weight: f64,
     /// Distance kept to the opponent, m.
     pub radius: f64,
+}
+
+impl RaceSettings {
+    /// Refuses what some controller could not race with, whether it is asked for or not.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for steps or a beta out of range, and those of [`PlanSettings::spec`]
+    /// and [`FilterSettings::filter`].
+    pub fn check(&self, system: &DroneRace) -> Result<()> {
+        let Self { steps, beta, .. } = *self;
+        if !(1..=MOST_STEPS).contains(&steps) {
+            let problem = format!("{steps} is not within 1..={MOST_STEPS}");
+            return Err(Error::invalid("race.steps", problem));
+        }
+        if !(beta > 0.0 && beta < 1.0) {
+            let problem = format!("{beta} is not strictly between 0 and 1");
+            return Err(Error::invalid("race.beta", problem));
+        }
+        for (section, plan) in self.plans() {
+            plan.spec(section, system)?;
+        }
+        self.filter.filter().map(|_| ())
+    }
+
+    /// The plans of all controllers by their sections.
+    fn plans(&self) -> [(&'static str, &PlanSettings); 8] {
+        [
+            ("race.hybrid.recovery", &self.hybrid.recovery),
+            ("race.hybrid.fast", &self.hybrid.fast),
+            ("race.no_policy.recovery", &self.no_policy.recovery),
+            ("race.no_policy.fast", &self.no_policy.fast),
+            ("race.mppi", &self.mppi),
+            ("race.soft", &self.soft),
+            ("race.cbf", &self.cbf),
+            ("race.warmstart", &self.warmstart),
+        ]
+    }
 }
 
 impl PlanSettings {
