@@ -64,11 +64,6 @@ impl<'a> Hybrid<'a> {
         Ok(Self { world, certifier, fast, recovery, paths, races: vec![memory; races] })
     }
 
-    /// Constants and deviation bound.
-    pub(super) fn certifier(&self) -> &Certifier<'a, DroneRace, Mlp, 12> {
-        &self.certifier
-    }
-
     fn settings(&self) -> &'a HybridSettings {
         &self.world.race.hybrid
     }
@@ -307,3 +302,6 @@ fn nearest_cell(cells: &[[f32; 2]], x: &[f32; 12]) -> Option<[f32; 2]> {
     let distance = |cell: &[f32; 2]| (cell[0] - x[0]).hypot(cell[1] - x[2]);
     cells.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
+
+#[cfg(test)]
+mod tests;
