@@ -236,7 +236,7 @@ fn threads_and_repetition_change_nothing() {
     // Once more in the same folder, with other threads: nothing is flown.
     let (before, text) = (snapshot(&two.join("races")), results(&two));
     run("two", &["--threads", "1"]);
-    assert_eq!((snapshot(&two.join("races")), results(&two)), (before, text));
+    assert!(snapshot(&two.join("races")) == before && results(&two) == text);
     let other = run("other", &["--seed", "2"]);
     assert_ne!(record(&other).controllers, record(&one).controllers);
 }
@@ -245,7 +245,7 @@ fn threads_and_repetition_change_nothing() {
 fn a_killed_run_is_taken_up_where_it_stopped() {
     let folder = Folder::new();
     let starts = folder.starts("starts.csv", 0, 6);
-    let controllers = "policy,mppi,hybrid,hybrid-no-global,hybrid-no-safety,mppi-soft";
+    let controllers = "hybrid,mppi,hybrid-no-global,hybrid-no-safety,hybrid-no-local,policy";
     let (whole, out) = (folder.path("whole"), folder.path("killed"));
     done(controllers, &starts, &whole, &[]);
     let mut child =
@@ -290,7 +290,7 @@ fn an_experiment_grows_by_controllers_and_seeds() {
     assert_eq!(results(&out), results(&fresh));
     // And less is a part of it.
     done("mppi", &starts, &out, &[]);
-    assert_eq!(snapshot(&out.join("races")), second);
+    assert!(snapshot(&out.join("races")) == second);
     assert_eq!(record(&out).noise_seeds, [1]);
 }
 
@@ -314,7 +314,7 @@ fn another_experiment_is_not_mixed_in() {
     refuse(&starts, &[]);
     folder.file("out/experiment.json", &before[0][0].1);
     // Written again by this test, it has another time.
-    assert_eq!(snapshot(&out)[1..], before[0][1..]);
+    assert!(snapshot(&out)[1..] == before[0][1..]);
     assert!(snapshot(&out.join("races")) == before[1]);
 }
 

@@ -42,8 +42,10 @@ fn race(config: &str, arguments: &[&str]) -> Run {
 
 /// Expects exit code 2 before anything is written, and `words` in the message.
 fn refused_by(config: &str, arguments: &[&str], words: &[&str]) {
-    let Run { out, code, printed, message, .. } = race(config, arguments);
-    assert_eq!(code, Some(2), "{arguments:?}: {message}");
+    // Bound whole: its folder stays until the end.
+    let run = race(config, arguments);
+    let Run { out, code, printed, message, .. } = &run;
+    assert_eq!(*code, Some(2), "{arguments:?}: {message}");
     assert_eq!(printed, "", "{arguments:?}");
     assert!(!out.exists(), "{arguments:?}");
     for word in words {
@@ -294,4 +296,19 @@ fn plans_of_two_lengths_are_handed_over() {
     let tiers = record("hybrid-no-policy", &keys).controllers[0].tiers.clone().unwrap();
     // Both plans flew.
     assert!(tiers.shares[0] > 0.0 && tiers.shares[3] > 0.0, "{:?}", tiers.shares);
+}
+
+#[test]
+fn every_profile_races() {
+    // Beta of a call: without a split each of five rounds spends its own.
+    for (profile, beta_call) in [("study", 5e-3), ("paper", 5e-3), ("rigorous", 1e-3)] {
+        let few = "race.hybrid.recovery.samples=16";
+        let run =
+            race(CONFIG, &["--profile", profile, "--controllers", "hybrid,mppi-cbf", "--set", few]);
+        assert_eq!(run.code, Some(0), "{profile}: {}", run.message);
+        let record: RaceRecord = serde_json::from_str(&run.printed).unwrap();
+        assert_eq!(record.provenance.config["profile"], profile);
+        let tiers = record.controllers[0].tiers.as_ref().unwrap();
+        assert!((tiers.beta_call - beta_call).abs() < 1e-15, "{profile}: {}", tiers.beta_call);
+    }
 }
