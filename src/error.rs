@@ -62,7 +62,7 @@ pub enum Error {
     #[error("stored certificate refused: {0}")]
     Refused(String),
     /// Stopped by Ctrl-C or a termination signal; nothing half-written is left.
-    #[error("interrupted; no result was written")]
+    #[error("interrupted; no result was written (batches of `race` that are done are kept)")]
     Interrupted,
 }
 

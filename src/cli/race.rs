@@ -74,7 +74,7 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
         names,
         starts,
         source,
-        noise_seeds: (config.seed..).take(asked.noise_seeds as usize).collect(),
+        noise_seeds: (0..asked.noise_seeds).map(|i| config.seed.wrapping_add(i)).collect(),
         config: config.to_json()?,
         folder: out.clone(),
     };

@@ -119,6 +119,22 @@ fn check_level(
     Ok(())
 }
 
+/// Refuses a number at or below the key `path` that is not finite as f32.
+pub(super) fn check_finite(path: &str, value: &Value) -> Result<()> {
+    match value {
+        Value::Float(number) if !(*number as f32).is_finite() => {
+            Err(Error::invalid(path, format!("{number} is not a finite number")))
+        }
+        Value::Array(list) => list.iter().try_for_each(|inner| check_finite(path, inner)),
+        Value::Table(table) => {
+            let below =
+                |(key, inner): (&String, &Value)| check_finite(&format!("{path}.{key}"), inner);
+            table.iter().try_for_each(below)
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Whether `value` can stand where `default` stands; a whole number is a float too.
 fn same_kind(default: &Value, value: &Value) -> bool {
     default.same_type(value) || (default.is_float() && value.is_integer())

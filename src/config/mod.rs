@@ -41,7 +41,8 @@ impl Config {
     ///
     /// # Errors
     /// [`Error::File`] if the file is missing or no TOML, [`Error::Invalid`] naming the key that
-    /// is unknown, with the nearest valid one, or that has a value of the wrong kind.
+    /// is unknown, with the nearest valid one, or that has a value of the wrong kind, or in the
+    /// section `race` a number that is not finite.
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
@@ -69,6 +70,7 @@ impl Config {
             keys::check_known(&valid, layer, origin)?;
         }
         keys::overlay(&mut merged, given);
+        merged.get("race").map_or(Ok(()), |race| keys::check_finite("race", race))?;
         // Without a source text, the message ends with a line that names the key.
         let wrong_kind = |e: toml::de::Error| {
             Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))

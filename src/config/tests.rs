@@ -1,6 +1,12 @@
 //! Tests of the configuration: profiles, layers, unknown keys, and values out of range.
 
 use super::*;
+use crate::control::{BarrierForm, Widening};
+use crate::cost::{CenterlineCost, LaneCost, RaceCost, RecoveryCost};
+use crate::experiment::judge::Judge;
+use crate::experiment::settings::{
+    FirstPlan, PlanSettings, RaceSettings, RecoveryPoint, SigmaSetting,
+};
 use crate::scenario::settings::{BoundarySearch, Joint, Settings};
 use crate::system::{Cone, DoubleIntegrator, DroneRace, System};
 
@@ -74,6 +80,57 @@ fn study_and_paper_are_the_published_experiments() {
     };
     assert_eq!(system("profile=paper"), race(Cone::Squared, 1.0, false));
     assert_eq!(system("profile=study"), race(Cone::Distance, 0.5, true));
+}
+
+/// The numbers of sections 4 and 5 of the study, and what `rigorous` mends of them.
+#[test]
+fn races_of_the_profiles() {
+    let race = |profile: &str| {
+        let race = load(RACE, &[&format!("profile={profile}")]).unwrap().race.unwrap();
+        race.check(&DroneRace::default()).unwrap();
+        race
+    };
+    let study = race("study");
+    assert_eq!((study.steps, study.judge), (80, Judge::Study));
+    let hybrid = &study.hybrid;
+    assert!(hybrid.global && hybrid.local && hybrid.recovery_tier);
+    assert!(hybrid.latch && hybrid.near_gate && hybrid.hold_opponent);
+    let rules = (hybrid.first_plan, hybrid.recovery_point);
+    assert_eq!(rules, (FirstPlan::Brake, RecoveryPoint::Verified));
+    assert_eq!((hybrid.near_gate_speed, hybrid.plan_gain), (0.7, 2.0));
+    assert_eq!((hybrid.value_weight, hybrid.value_threshold), (1e6, -0.02));
+    // Horizon, reference speed, weight of the safety term.
+    let expected = [
+        (&hybrid.recovery, 20, 0.7, 5.0),
+        (&hybrid.fast, 20, 0.5, 0.0),
+        (&study.no_policy.recovery, 20, 0.7, 10.0),
+        (&study.no_policy.fast, 20, 0.5, 5.0),
+        (&study.mppi, 25, 0.7, 0.0),
+        (&study.soft, 25, 0.7, 10.0),
+        (&study.cbf, 20, 0.7, 0.0),
+        (&study.warmstart, 25, 0.7, 0.0),
+    ];
+    for (number, (plan, horizon, speed, weight)) in expected.into_iter().enumerate() {
+        assert_eq!((plan.samples, plan.temperature, plan.iterations), (500, 10.0, 1), "{number}");
+        assert_eq!((plan.horizon, plan.speed), (horizon, speed), "{number}");
+        let (RaceCost::Lane(LaneCost { safety, .. })
+        | RaceCost::Centerline(CenterlineCost { safety, .. })
+        | RaceCost::Recovery(RecoveryCost { safety, .. })) = plan.cost;
+        assert_eq!((safety.weight, safety.radius), (weight, 0.2), "{number}");
+        assert_eq!(plan.sigma, SigmaSetting::Same(0.4), "{number}");
+    }
+    assert!(!study.warmstart_works);
+    let forms = |race: &RaceSettings| (race.filter.form, race.filter.widening);
+    assert_eq!(forms(&study), (BarrierForm::OneStep, Widening::Velocities));
+
+    assert_eq!(RaceSettings { judge: Judge::Study, ..race("paper") }, study);
+    let rigorous = race("rigorous");
+    assert!(rigorous.warmstart_works);
+    assert_eq!(forms(&rigorous), (BarrierForm::TwoStep, Widening::Heights));
+    // The baselines differ only in what they are named for.
+    assert_eq!(rigorous.cbf, rigorous.mppi);
+    assert_eq!(rigorous.warmstart, rigorous.mppi);
+    assert_eq!(PlanSettings { cost: rigorous.mppi.cost, ..rigorous.soft }, rigorous.mppi);
 }
 
 #[test]

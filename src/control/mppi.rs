@@ -105,3 +105,64 @@ where
     }
     (plan, states)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::real::Real;
+    use crate::rollout::{Plant, trajectory};
+    use crate::system::DoubleIntegrator;
+
+    /// Twice what the controls allow where the position is above a line, else a third of it.
+    struct Steep;
+
+    impl Policy<2, 1> for Steep {
+        fn name(&self) -> String {
+            "steep".to_owned()
+        }
+        fn control<R: Real>(&self, [position, velocity]: [R; 2]) -> [R; 1] {
+            let slow = R::lit(-0.33) * velocity;
+            [R::lit(0.7).if_lt(position, R::lit(-2.0), slow)]
+        }
+    }
+
+    #[test]
+    fn a_shifted_plan_ends_in_zero() {
+        assert_eq!(
+            shifted(&[[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+            [[3.0, 4.0], [5.0, 6.0], [0.0; 2]]
+        );
+        assert_eq!(shifted(&[[1.0]]), [[0.0]]);
+        assert_eq!(shifted::<1>(&[]), [[0.0_f32; 1]; 0]);
+    }
+
+    #[test]
+    fn a_plan_of_the_policy_is_its_rollout() {
+        let system = DoubleIntegrator::default();
+        let start = [0.6, 0.5];
+        let (plan, states) = policy_plan(&system, &Steep, start, 12, |_| {});
+        assert_eq!((plan.len(), states.len()), (12, 12));
+        let plant = Plant { system: &system, policy: &Steep };
+        assert_eq!(states, trajectory::<f32, _, _, 2, 1>(plant, start, 11));
+        // The system clips by itself; the plan has to be within the bounds all the same.
+        assert!(plan[0] != [-1.0] && plan[11] == [-1.0], "{plan:?}");
+        for (u, x) in plan.iter().zip(&states) {
+            let [wanted] = Steep.control(*x);
+            assert_eq!(*u, [wanted.clamp(-1.0, 1.0)]);
+        }
+    }
+
+    #[test]
+    fn what_is_held_stays() {
+        let system = DoubleIntegrator::default();
+        let hold = |x: &mut [f32; 2]| x[1] = 0.5;
+        let (plan, states) = policy_plan(&system, &Steep, [0.8, 0.5], 8, hold);
+        assert!(states.iter().all(|x| x[1] == 0.5));
+        // Position moves on with the held velocity; the control stays at its bound above the line.
+        let mut position = 0.8;
+        for (x, u) in states.iter().zip(plan) {
+            assert_eq!((x[0], u), (position, [-1.0]));
+            position = system.step([position, 0.5], u)[0];
+        }
+    }
+}

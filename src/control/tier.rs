@@ -6,7 +6,7 @@ use crate::policy::Policy;
 use crate::rollout::{Ball, Plant, Query};
 use crate::scenario::boundary::on_slice;
 use crate::scenario::global::{band, check_margins, slice_through};
-use crate::scenario::growth::Growth;
+use crate::scenario::growth::{Growth, check_scenarios};
 use crate::scenario::growth_batch::{Request, grow_each};
 use crate::scenario::ledger::{Entry, Ledger, Spend};
 use crate::scenario::settings::Settings;
@@ -110,7 +110,8 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     /// Computes the constants, draws the deviation bound and measures the f32 error.
     ///
     /// # Errors
-    /// Those of [`tightened`]; [`Error::Refused`] if a pair met a state that is not finite.
+    /// [`Error::TooFewScenarios`] for local growth, those of [`tightened`], and [`Error::Refused`] if a
+    /// pair met a state that is not finite.
     pub fn new<const NU: usize>(
         backend: &'a Backend,
         plant: Plant<'a, S, P>,
@@ -121,6 +122,9 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
+        if asked.local {
+            check_scenarios(&settings.growth)?;
+        }
         let context = Context { backend, plant, watch: &Unwatched };
         let tightened = tightened(context, settings)?;
         let lost = tightened.deviation.non_finite;

@@ -308,3 +308,6 @@ fn nearest_cell(cells: &[[f32; 2]], x: &[f32; 12]) -> Option<[f32; 2]> {
     let distance = |cell: &[f32; 2]| (cell[0] - x[0]).hypot(cell[1] - x[2]);
     cells.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
+
+#[cfg(test)]
+mod tests;

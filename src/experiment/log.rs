@@ -257,3 +257,6 @@ pub(super) fn damaged(path: &std::path::Path, problem: &str) -> Error {
     let text = format!("{problem}; remove the file, and the races are flown again");
     Error::file(path, text)
 }
+
+#[cfg(test)]
+mod tests;

@@ -16,3 +16,5 @@ pub mod run;
 pub mod settings;
 pub mod statistics;
 pub mod summary;
+#[cfg(test)]
+mod tests;

@@ -72,8 +72,9 @@ impl Experiment<'_> {
     /// Runs what is not stored yet and makes the record of all.
     ///
     /// # Errors
-    /// [`Error::Refused`] if the folder holds another experiment, [`Error::File`] if a stored race
-    /// is damaged, those of the controllers, and [`Error::Interrupted`].
+    /// Those of [`RaceSettings::check`] and of the
+    /// controllers, before any race; [`Error::File`] if the folder holds another experiment or a
+    /// stored race is damaged; [`Error::Interrupted`].
     pub fn run(&self, watch: &dyn Watch) -> Result<(RaceRecord, Vec<TimingRecord>)> {
         let reason = |name: &Name| absent(*name, &self.world).map(|reason| (*name, reason));
         let absent: Vec<(Name, String)> = self.names.iter().filter_map(reason).collect();
@@ -102,14 +103,15 @@ impl Experiment<'_> {
             }
         }
         let race = self.world.race;
-        race.check()?;
-        let calls = u64::from(race.steps) * u64::from(self.world.certificates.growth.rounds);
-        if calls >= MOST_STREAMS {
+        race.check(self.world.system)?;
+        let growth = &self.world.certificates.growth;
+        let (calls, rounds) = (u64::from(race.steps), u64::from(growth.rounds));
+        if calls * rounds >= MOST_STREAMS {
             let problem = format!(
-                "{calls} rounds in one race; race.steps times growth.rounds has to stay below \
-                 {MOST_STREAMS}, the random streams that there are"
+                "{rounds} rounds at each of {calls} steps (race.steps) take more than the \
+                 {MOST_STREAMS} random streams that there are"
             );
-            return Err(Error::invalid("race.steps", problem));
+            return Err(Error::invalid("growth.rounds", problem));
         }
         for &name in names {
             let race = settings(name, race);
@@ -280,11 +282,12 @@ impl Experiment<'_> {
         let mine = self.manifest();
         match std::fs::read_to_string(&path) {
             Ok(text) if text == mine => Ok(()),
-            Ok(_) => Err(Error::Refused(format!(
-                "{} holds another experiment (other configuration, starts, networks, backend or \
-                 program, see {MANIFEST} there); give another --out, or remove that folder",
-                self.folder.display()
-            ))),
+            Ok(_) => {
+                let problem = "another experiment is stored here (other configuration, starts, \
+                               networks, backend or program); give another --out, or remove \
+                               this folder";
+                Err(Error::file(&path, problem))
+            }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 let mut staged = Staged::new(&self.folder)?;
                 staged.add(MANIFEST, mine.as_bytes())?;
@@ -319,7 +322,11 @@ impl Experiment<'_> {
 
 /// The races that the file at `path` holds, if they are those from `starts` and of that length.
 fn stored(path: &Path, starts: &[[f32; 12]], steps: u32) -> Result<Vec<RaceLog>> {
-    let (stored, most) = races(&read_npz(path)?).map_err(|problem| damaged(path, &problem))?;
+    let arrays = read_npz(path).map_err(|error| match error {
+        Error::File { problem, .. } => damaged(path, &problem),
+        other => other,
+    })?;
+    let (stored, most) = races(&arrays).map_err(|problem| damaged(path, &problem))?;
     if most != steps as usize {
         return Err(damaged(path, &format!("it holds races of {most} steps, not of {steps}")));
     }

@@ -159,7 +159,7 @@ pub struct PlanSettings {
 
 /// Standard deviation of the noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, three numbers or a 3 x 3 matrix")]
 pub enum SigmaSetting {
     /// The same for each control.
     Same(f32),
@@ -186,40 +186,44 @@ pub struct FilterSettings {
 }
 
 impl RaceSettings {
-    /// Refuses numbers that are out of range, naming the key.
+    /// Refuses what some controller could not race with, whether it is asked for or not.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for no step, a number that is not finite, or a gain below 0.
-    pub fn check(&self) -> Result<()> {
-        if !(1..=MOST_STEPS).contains(&self.steps) {
-            let problem = format!("{} is not within 1..={MOST_STEPS}", self.steps);
+    /// [`Error::Invalid`] for steps, a beta or a gain out of range, and those of [`PlanSettings::spec`]
+    /// and [`FilterSettings::filter`].
+    pub fn check(&self, system: &DroneRace) -> Result<()> {
+        let Self { steps, beta, .. } = *self;
+        if !(1..=MOST_STEPS).contains(&steps) {
+            let problem = format!("{steps} is not within 1..={MOST_STEPS}");
             return Err(Error::invalid("race.steps", problem));
         }
-        let value =
-            serde_json::to_value(self).map_err(|e| Error::invalid("race", e.to_string()))?;
-        if let Some(key) = not_finite("race", &value) {
-            return Err(Error::invalid(key, "not a finite number"));
+        if !(beta > 0.0 && beta < 1.0) {
+            let problem = format!("{beta} is not strictly between 0 and 1");
+            return Err(Error::invalid("race.beta", problem));
         }
         let gain = self.hybrid.plan_gain;
         if gain < 0.0 {
             let problem = format!("{gain} is below 0; 0 takes the plant's own gain");
             return Err(Error::invalid("race.hybrid.plan_gain", problem));
         }
-        Ok(())
-    }
-}
-
-/// The first key whose value JSON cannot hold: all of them are there, so it is a number that is
-/// not finite.
-fn not_finite(key: &str, value: &serde_json::Value) -> Option<String> {
-    use serde_json::Value;
-    match value {
-        Value::Null => Some(key.to_owned()),
-        Value::Object(entries) => {
-            entries.iter().find_map(|(name, value)| not_finite(&format!("{key}.{name}"), value))
+        for (section, plan) in self.plans() {
+            plan.spec(section, system)?;
         }
-        Value::Array(values) => values.iter().find_map(|value| not_finite(key, value)),
-        _ => None,
+        self.filter.filter().map(|_| ())
+    }
+
+    /// The plans of all controllers by their sections.
+    fn plans(&self) -> [(&'static str, &PlanSettings); 8] {
+        [
+            ("race.hybrid.recovery", &self.hybrid.recovery),
+            ("race.hybrid.fast", &self.hybrid.fast),
+            ("race.no_policy.recovery", &self.no_policy.recovery),
+            ("race.no_policy.fast", &self.no_policy.fast),
+            ("race.mppi", &self.mppi),
+            ("race.soft", &self.soft),
+            ("race.cbf", &self.cbf),
+            ("race.warmstart", &self.warmstart),
+        ]
     }
 }
 

@@ -98,7 +98,7 @@ pub(super) fn next_radius<const NX: usize>(
 }
 
 /// Refuses fewer starts than one clean round needs.
-pub(super) fn check_scenarios<const NX: usize>(asked: &GrowthSettings<NX>) -> Result<()> {
+pub(crate) fn check_scenarios<const NX: usize>(asked: &GrowthSettings<NX>) -> Result<()> {
     let need = required_scenarios(asked.epsilon, asked.round_beta(), 1)?;
     if asked.scenarios >= need {
         return Ok(());

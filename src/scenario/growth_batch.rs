@@ -161,3 +161,81 @@ fn drawn<const NX: usize>(region: &Region<NX>, stream: Stream, count: u64) -> Ve
     }
     starts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::Backend;
+    use crate::backend::cpu::Cpu;
+    use crate::rollout::{Plant, RolloutSpec};
+    use crate::scenario::Unwatched;
+    use crate::scenario::boundary::Boundary;
+    use crate::scenario::growth::grow;
+    use crate::scenario::record::RoundRecord;
+    use crate::system::{BangBang, DoubleIntegrator};
+
+    /// Around these no ball fails, some do at first, and all do.
+    const CENTERS: [[f32; 2]; 6] =
+        [[0.0, 0.0], [0.85, 0.3], [-0.8, -0.5], [1.15, 0.1], [0.5, -0.9], [0.99, 0.35]];
+
+    fn requests() -> Vec<Request<2>> {
+        let request = |(i, center): (usize, [f32; 2])| Request {
+            center,
+            seed: 5 + i as u64 % 2,
+            call: [3, 0, 7][i % 3],
+        };
+        CENTERS.into_iter().enumerate().map(request).collect()
+    }
+
+    fn settings(system: &DoubleIntegrator) -> Settings<2> {
+        let mut settings = Settings::new(system, [0.0; 2], RolloutSpec::new(30, 0.95).unwrap());
+        (settings.growth.radius, settings.growth.rounds) = (0.4, 4);
+        // No multiple of the starts that are drawn side by side.
+        settings.growth.scenarios = 83;
+        settings
+    }
+
+    #[test]
+    fn a_batch_grows_what_each_call_grows_alone() {
+        let system = DoubleIntegrator::default();
+        let policy = BangBang { acceleration: 1.0 };
+        let backend = Backend::Cpu(Cpu::new(Some(2)).unwrap());
+        let plant = Plant { system: &system, policy: &policy };
+        let context = Context { backend: &backend, plant, watch: &Unwatched };
+        let asked = settings(&system);
+        // A band so wide that some starts are run again.
+        let band = 0.02;
+        let grown = grow_each(context, &asked, &requests(), band).unwrap();
+        assert_eq!(grown.len(), CENTERS.len());
+        for (request, grown) in requests().into_iter().zip(&grown) {
+            let settings = Settings { seed: request.seed, ..asked.clone() };
+            let boundary = Boundary { point: request.center, distance: 0.0 };
+            let (outcome, rounds, _) =
+                grow(context, &settings, &boundary, band, request.call).unwrap();
+            let reruns = |round: &RoundRecord| round.f64_reruns;
+            assert_eq!(grown.outcome, outcome, "{request:?}");
+            assert_eq!(grown.rounds as usize, rounds.len(), "{request:?}");
+            assert_eq!(grown.f64_reruns, rounds.iter().map(reruns).sum::<u64>(), "{request:?}");
+        }
+        let verified = grown.iter().filter(|g| matches!(g.outcome, Growth::Verified(_)));
+        let took = |rounds: u32| grown.iter().any(|grown| grown.rounds == rounds);
+        assert!((1..CENTERS.len()).contains(&verified.count()), "{grown:?}");
+        assert!(took(1) && grown.iter().any(|g| g.rounds > 1 && g.rounds < 4), "{grown:?}");
+        assert!(grown.iter().any(|grown| grown.f64_reruns > 0), "{grown:?}");
+    }
+
+    #[test]
+    fn nothing_asked_is_nothing_grown() {
+        let system = DoubleIntegrator::default();
+        let policy = BangBang { acceleration: 1.0 };
+        let backend = Backend::Cpu(Cpu::new(Some(1)).unwrap());
+        let plant = Plant { system: &system, policy: &policy };
+        let context = Context { backend: &backend, plant, watch: &Unwatched };
+        let mut asked = settings(&system);
+        assert_eq!(grow_each(context, &asked, &[], 0.0).unwrap(), []);
+        // 0.1 and 1e-3 over four rounds need 79.
+        asked.growth.scenarios = 20;
+        let error = grow_each(context, &asked, &requests(), 0.0).unwrap_err().to_string();
+        assert!(error.contains("20 scenarios") && error.contains("at least 79"), "{error}");
+    }
+}
