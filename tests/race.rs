@@ -146,14 +146,15 @@ fn unpacked(arrays: &BTreeMap<String, Array>) -> Races {
     assert_eq!(controls.shape, [steps.len(), STEPS, 3]);
     let (states, _) = states.data.as_f32().unwrap().as_chunks::<12>();
     let (controls, _) = controls.data.as_f32().unwrap().as_chunks::<3>();
-    let race = |(steps, (states, controls)): (&u32, (&[[f32; 12]], &[[f32; 3]]))| {
+    let race = |(number, steps): (usize, &u32)| {
         let (steps, nan) = (*steps as usize, |row: &[f32]| row.iter().all(|x| x.is_nan()));
+        let states = &states[number * (STEPS + 1)..][..STEPS + 1];
+        let controls = &controls[number * STEPS..][..STEPS];
         assert!(states[steps + 1..].iter().all(|x| nan(x)));
         assert!(controls[steps..].iter().all(|u| nan(u)));
         (states[..=steps].to_vec(), controls[..steps].to_vec())
     };
-    let rows = states.chunks(STEPS + 1).zip(controls.chunks(STEPS));
-    steps.iter().zip(rows).map(race).collect()
+    steps.iter().enumerate().map(race).collect()
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn file(folder: &TempDir, name: &str, text: &str) -> String {
 #[test]
 fn controllers_are_known_by_name() {
     refused(&["--controllers", "hybrd"], &["--controllers", "`hybrd`", "did you mean `hybrid`"]);
-    refused(&["--controllers", "mppi,mpi-soft"], &["`mpi-soft`", "nearest is `mppi-soft`"]);
+    refused(&["--controllers", "mppi,mpi-soft"], &["`mpi-soft`", "did you mean `mppi-soft`"]);
     refused(&["--controllers", ""], &["--controllers", "``"]);
     let names = |list: &str| -> Vec<String> {
         let samples = ["race.mppi.samples=8", "race.soft.samples=8"];

@@ -131,8 +131,9 @@ fn judged(contender: &Contender, judge: Judge, [won, unsafe_starts]: [u64; 2]) -
     let start = unsafe_starts * SEEDS.len() as u64;
     let rest = lost - start;
     let [collision, fence, missed, overtaken] = [rest / 2, rest / 5, rest / 9, rest / 12];
-    let timeout = rest - collision - fence - missed - overtaken;
-    let counts = [start, collision, fence, missed, overtaken, timeout];
+    let infinite = 3;
+    let timeout = rest - infinite - collision - fence - missed - overtaken;
+    let counts = [start, infinite, collision, fence, missed, overtaken, timeout];
     let share = won as f64 / STARTS as f64;
     let reach = 1.96 * (share * (1.0 - share) / STARTS as f64).sqrt();
     let hybrid = CONTENDERS[0].3[0] as f64;
