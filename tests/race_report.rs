@@ -108,11 +108,11 @@ fn every_number_stands_in_its_row() {
     row("calls of local growth", &["45,678"; 2]);
     row("calls that ended with a verified ball", &["34,567"; 2]);
     row("rounds of growth", &["101,112"; 2]);
-    row("f64 re-runs", &["1,314"; 2]);
+    row("f64 re-runs of growth", &["1,314"; 2]);
     row("beta of the deviation bound", &["0.001"; 2]);
     row("beta of one call of growth", &["0.0002"; 2]);
     row("largest beta of a race", &["0.0131"; 2]);
-    row("beta of the whole experiment", &["9.137"; 2]);
+    row("beta of all races", &["9.137"; 2]);
     row("starts", &["500"]);
     row("noise seeds", &["11, 12, 13, 14, 15"]);
     row("longest race", &["80 steps, 8 s"]);
