@@ -12,8 +12,8 @@ use common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
 use reachcast::cost::{
-    Cost, Fence, LaneCost, Obstacle, Quadratic, RACE_CONTEXT, RaceCost, RaceReference,
-    RecoveryCost, Safety, SafetyCone,
+    Cost, Fence, LaneCost, Obstacle, Quadratic, QuadraticCost, RACE_CONTEXT, RaceCost,
+    RaceReference, RecoveryCost, Safety, SafetyCone,
 };
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::real::Real;
@@ -296,7 +296,7 @@ fn race_problems(horizon: usize) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
         .collect()
 }
 
-fn race_costs() -> [RaceCost; 2] {
+fn race_costs() -> [RaceCost; 3] {
     let safety = Safety { weight: 50.0, radius: 0.2, margin: 0.3, cone: SafetyCone::Either };
     let fence = Fence { weight: 20.0, margin: 0.1 };
     let recovery = RecoveryCost { position: 5.0, velocity: 1.0, control: 0.1, safety, fence };
@@ -310,7 +310,16 @@ fn race_costs() -> [RaceCost; 2] {
         safety,
         fence,
     };
-    [RaceCost::Recovery(recovery), RaceCost::Lane(lane)]
+    let obstacle = Obstacle { states: [0, 2], center: [0.1, -0.9], radius: 0.3, weight: 40.0 };
+    let quadratic = QuadraticCost {
+        state: [2.0, 0.5, 1.5, 0.25, 2.0, 0.5, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0],
+        control: [0.1, 0.2, 0.1],
+        last: [8.0, 1.0, 6.0, 1.0, 8.0, 1.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0],
+        obstacle: Some(obstacle),
+        safety,
+        fence,
+    };
+    [RaceCost::Recovery(recovery), RaceCost::Lane(lane), RaceCost::Quadratic(quadratic)]
 }
 
 fn race_settings(samples: u32, horizon: u32) -> MppiSettings<3> {

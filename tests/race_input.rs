@@ -178,6 +178,16 @@ fn kinds_are_switched_with_all_they_need() {
     let family = "race.mppi.cost={family='centerline',lane=100,speed=2,control=0.5}";
     let cost = config(&mppi(&[family]))["cost"].clone();
     assert_eq!((&cost["family"], &cost["lane"]), (&"centerline".into(), &100.0.into()));
+    let weights = "[1,1,1,1,1,1,0,0,0,0,0,0]";
+    let quadratic = |states: &str| {
+        format!(
+            "race.mppi.cost={{family='quadratic',state={weights},control=[1,1,1],last={weights},\
+             obstacle={{states={states},center=[0.1,-0.5],radius=0.2,weight=9}}}}"
+        )
+    };
+    let named = config(&mppi(&[&quadratic("[0,2]")]))["cost"].clone();
+    assert_eq!(named["obstacle"]["states"], serde_json::json!([0, 2]));
+    keys_refused("mppi", &[&quadratic("[0,12]")], &["race.mppi.cost.obstacle.states", "12"]);
     // What both families have stays; what one alone has is gone.
     assert!(cost["safety"].is_object() && cost.get("away").is_none(), "{cost}");
 }

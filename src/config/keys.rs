@@ -35,7 +35,13 @@ fn parse_value(text: &str) -> Value {
 
 /// Keys that say which other keys a table has, and the keys that one of their values brings.
 const TAGS: [(&str, &[&str]); 2] = [
-    ("family", &["position", "velocity", "lane", "speed", "control", "away", "wide", "last"]),
+    (
+        "family",
+        &[
+            "position", "velocity", "lane", "speed", "control", "away", "wide", "last", "state",
+            "obstacle",
+        ],
+    ),
     ("kind", &["time", "knots"]),
 ];
 

@@ -5,8 +5,8 @@ mod race;
 
 pub use quadratic::{Obstacle, Quadratic};
 pub use race::{
-    CenterlineCost, Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
-    SafetyCone,
+    CenterlineCost, Fence, LaneCost, QuadraticCost, RACE_CONTEXT, RaceCost, RaceReference,
+    RecoveryCost, Safety, SafetyCone,
 };
 
 use crate::real::Real;

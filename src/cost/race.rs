@@ -1,8 +1,8 @@
-//! The costs of the drone race: recovery (family A), centre line (A') and lane (B).
+//! The costs of the drone race: recovery (family A), centre line (A'), lane (B), and a quadratic.
 
 use serde::{Deserialize, Serialize};
 
-use super::{Cost, hinge, square};
+use super::{Cost, Obstacle, Quadratic, hinge, square};
 use crate::real::Real;
 
 /// Numbers of context per stage, see [`RaceReference::context`].
@@ -39,6 +39,8 @@ pub enum RaceCost {
     Centerline(CenterlineCost),
     /// Family B: hold the lane and the speed through the gate.
     Lane(LaneCost),
+    /// The generic quadratic around the reference, with an obstacle.
+    Quadratic(QuadraticCost),
 }
 
 /// Family A: `position |p - p_ref|^2 + velocity |v - v_ref|^2 + control |u|^2`, safety, fences.
@@ -90,6 +92,26 @@ pub struct LaneCost {
     pub wide: f32,
     /// Further weight of the squared distance from the centre line at the last stage, 1/m^2.
     pub last: f32,
+    /// The opponent's cone.
+    pub safety: Safety,
+    /// The fences of the gate.
+    pub fence: Fence,
+}
+
+/// [`Quadratic`] around the reference position and velocity of the ego, the opponent's states
+/// against 0; with an obstacle, safety, fences.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuadraticCost {
+    /// Weights of the squared errors of the twelve states.
+    pub state: [f32; 12],
+    /// Weights of the squared controls.
+    pub control: [f32; 3],
+    /// Weights of the states at the last stage, in place of `state`.
+    pub last: [f32; 12],
+    /// A disc in the plane of two states to keep away from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<Obstacle>,
     /// The opponent's cone.
     pub safety: Safety,
     /// The fences of the gate.
@@ -230,6 +252,18 @@ impl LaneCost {
     }
 }
 
+impl QuadraticCost {
+    #[inline(always)]
+    fn stage<R: Real>(&self, x: &[R; 12], u: &[R; 3], context: &[R; RACE_CONTEXT]) -> R {
+        let [px, py, pz, vx, vy, vz, _, last] = *context;
+        let zero = R::lit(0.0);
+        let Self { state, control, obstacle, .. } = *self;
+        let quadratic = Quadratic { state, control, last: self.last, obstacle };
+        let reference = [px, vx, py, vy, pz, vz, zero, zero, zero, zero, zero, zero, last];
+        quadratic.stage(*x, *u, reference) + (self.safety.cost(x) + self.fence.cost(x))
+    }
+}
+
 impl Cost<12, 3, RACE_CONTEXT> for RaceCost {
     #[inline(always)]
     fn stage<R: Real>(&self, x: [R; 12], u: [R; 3], context: [R; RACE_CONTEXT]) -> R {
@@ -237,6 +271,7 @@ impl Cost<12, 3, RACE_CONTEXT> for RaceCost {
             Self::Recovery(cost) => cost.stage(&x, &u, &context),
             Self::Centerline(cost) => cost.stage(&x, &u, &context),
             Self::Lane(cost) => cost.stage(&x, &u, &context),
+            Self::Quadratic(cost) => cost.stage(&x, &u, &context),
         }
     }
 }

@@ -54,6 +54,7 @@ fn terms(cost: &mut RaceCost) -> (&mut Safety, &mut Fence) {
         RaceCost::Recovery(cost) => (&mut cost.safety, &mut cost.fence),
         RaceCost::Centerline(cost) => (&mut cost.safety, &mut cost.fence),
         RaceCost::Lane(cost) => (&mut cost.safety, &mut cost.fence),
+        RaceCost::Quadratic(cost) => (&mut cost.safety, &mut cost.fence),
     }
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::judge::Judge;
 use crate::control::tier::Domain;
 use crate::control::{BarrierFilter, BarrierForm, Widening};
-use crate::cost::RaceCost;
+use crate::cost::{QuadraticCost, RaceCost};
 use crate::error::{Error, Result};
 use crate::rollout::{MppiSettings, MppiSpec, NoiseKind, Sigma};
 use crate::system::{DroneRace, System};
@@ -208,6 +208,7 @@ impl RaceSettings {
         }
         for (section, plan) in self.plans() {
             plan.spec(section, system)?;
+            check_obstacle(section, &plan.cost)?;
         }
         self.filter.filter().map(|_| ())
     }
@@ -224,6 +225,20 @@ impl RaceSettings {
             ("race.cbf", &self.cbf),
             ("race.warmstart", &self.warmstart),
         ]
+    }
+}
+
+/// Refuses an obstacle in the plane of a state that there is not.
+fn check_obstacle(section: &str, cost: &RaceCost) -> Result<()> {
+    let RaceCost::Quadratic(QuadraticCost { obstacle: Some(obstacle), .. }) = cost else {
+        return Ok(());
+    };
+    match obstacle.states.iter().find(|state| **state >= 12) {
+        None => Ok(()),
+        Some(state) => {
+            let key = format!("{section}.cost.obstacle.states");
+            Err(Error::invalid(key, format!("{state} is no state; there are 0 to 11")))
+        }
     }
 }
 
