@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::control::{BarrierForm, Widening};
-use crate::cost::{CenterlineCost, LaneCost, RaceCost, RecoveryCost};
+use crate::cost::{CenterlineCost, LaneCost, QuadraticCost, RaceCost, RecoveryCost};
 use crate::experiment::judge::Judge;
 use crate::experiment::settings::{
     FirstPlan, PlanSettings, RaceSettings, RecoveryPoint, SigmaSetting,
@@ -115,7 +115,8 @@ fn races_of_the_profiles() {
         assert_eq!((plan.horizon, plan.speed), (horizon, speed), "{number}");
         let (RaceCost::Lane(LaneCost { safety, .. })
         | RaceCost::Centerline(CenterlineCost { safety, .. })
-        | RaceCost::Recovery(RecoveryCost { safety, .. })) = plan.cost;
+        | RaceCost::Recovery(RecoveryCost { safety, .. })
+        | RaceCost::Quadratic(QuadraticCost { safety, .. })) = plan.cost;
         assert_eq!((safety.weight, safety.radius), (weight, 0.2), "{number}");
         assert_eq!(plan.sigma, SigmaSetting::Same(0.4), "{number}");
     }
