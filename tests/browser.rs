@@ -10,7 +10,7 @@ mod records;
 
 use std::fs;
 
-use chromium::{Scheme, browser, check, measured, visit, write_pages};
+use chromium::{Scheme, browser, check_everywhere, visit};
 use reachcast::report::html;
 use reachcast::scenario::record::Record;
 
@@ -36,18 +36,8 @@ fn figures_have_size_and_labels_at_every_width_in_both_schemes() {
     if !browser() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
     let pages: Vec<String> = shown().iter().map(html).collect();
-    write_pages(folder.path(), &pages, &WIDTHS);
-    for scheme in [Scheme::Light, Scheme::Dark] {
-        let visit = visit(folder.path(), "index.html", scheme);
-        assert!(visit.console.is_empty(), "{:?}", visit.console);
-        let measured = measured(&visit);
-        assert_eq!(measured.len(), pages.len() * WIDTHS.len());
-        for (index, page) in measured.iter().enumerate() {
-            check(page, WIDTHS[index % WIDTHS.len()], scheme, 5);
-        }
-    }
+    check_everywhere(&pages, &WIDTHS, 5);
 }
 
 /// The page refuses scripts: one put into it by force does not run, and the console says so.

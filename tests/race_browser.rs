@@ -8,7 +8,7 @@ mod races;
 use std::fs;
 use std::time::Duration;
 
-use chromium::{Scheme, browser, check, measured, visit, visit_for, write_pages};
+use chromium::{Scheme, browser, check_everywhere, measured, visit_for};
 use races::FRAMES;
 use reachcast::experiment::record::RaceRecord;
 use reachcast::report::race_html;
@@ -93,18 +93,8 @@ fn the_page_fits_every_width_in_both_schemes() {
     if !browser() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
     let pages: Vec<String> = shown().iter().map(race_html).collect();
-    write_pages(folder.path(), &pages, &WIDTHS);
-    for scheme in [Scheme::Light, Scheme::Dark] {
-        let visit = visit(folder.path(), "index.html", scheme);
-        assert!(visit.console.is_empty(), "{:?}", visit.console);
-        let measured = measured(&visit);
-        assert_eq!(measured.len(), pages.len() * WIDTHS.len());
-        for (index, page) in measured.iter().enumerate() {
-            check(page, WIDTHS[index % WIDTHS.len()], scheme, DRAWINGS);
-        }
-    }
+    check_everywhere(&pages, &WIDTHS, DRAWINGS);
 }
 
 /// What each act on the controls of the full record led to.

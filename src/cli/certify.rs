@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::args::Global;
 use super::progress::Progress;
-use super::{Outcome, devices, folder_of, report, summary};
+use super::{Outcome, devices, folder_of, json, report, summary};
 use crate::config::{Config, Job, PolicySource};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::files::{Staged, npy_bytes};
 use crate::policy::Policy;
 use crate::rollout::Plant;
@@ -76,9 +76,7 @@ fn stage(staged: &mut Staged, record: &Record, policy: &PolicySource) -> Result<
     staged.add("slice.npy", &npy_bytes(&slice.check_margin, shape))?;
     staged.add("deviation.csv", deviation_csv(&record.deviation).as_bytes())?;
     staged.add("report.html", crate::report::html(record).as_bytes())?;
-    let json = serde_json::to_string_pretty(record);
-    let json = json.map_err(|e| Error::invalid(CERTIFICATE, e.to_string()))?;
-    staged.add(CERTIFICATE, (json + "\n").as_bytes())
+    staged.add(CERTIFICATE, json(CERTIFICATE, record)?.as_bytes())
 }
 
 /// The bounds of each step; the column `exact` is empty for a system that is not linear.

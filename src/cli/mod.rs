@@ -70,10 +70,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
 /// Prints `value` as JSON with `--json`, nothing with `-q`, else `text`.
 fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
     let text = match (global.json, global.quiet) {
-        (true, _) => {
-            let json = serde_json::to_string_pretty(value);
-            json.map_err(|e| Error::invalid("--json", e.to_string()))? + "\n"
-        }
+        (true, _) => json("--json", value)?,
         (false, true) => return Ok(()),
         (false, false) => text(),
     };
@@ -85,6 +82,12 @@ fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String
         }
         _ => Ok(()),
     }
+}
+
+/// `value` as a JSON document that ends with its line; errors call it `name`.
+fn json(name: &str, value: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(value);
+    text.map(|text| text + "\n").map_err(|e| Error::invalid(name, e.to_string()))
 }
 
 /// The folder that `path` lies in.

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::args::{Global, RaceArguments};
 use super::progress::Progress;
-use super::{Outcome, devices, folder_of, report};
+use super::{Outcome, devices, folder_of, json, report};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::experiment::controller::{Name, World};
@@ -194,12 +194,6 @@ fn write(out: &Path, record: &RaceRecord, timing: &Timing) -> Result<Vec<PathBuf
     staged.add("timing.json", json("timing.json", timing)?.as_bytes())?;
     staged.add("results.json", json("results.json", record)?.as_bytes())?;
     staged.publish()
-}
-
-/// `value` as a JSON document.
-fn json(name: &str, value: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(value);
-    text.map(|text| text + "\n").map_err(|e| Error::invalid(name, e.to_string()))
 }
 
 /// The results as a page of text.

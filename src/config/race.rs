@@ -1,13 +1,13 @@
 //! Defaults of the race experiment: the numbers of each profile.
 
 use super::section::Profile;
+use crate::control::BarrierFilter;
 use crate::control::tier::Domain;
-use crate::control::{BarrierFilter, BarrierForm, Widening};
 use crate::cost::{CenterlineCost, Fence, LaneCost, RaceCost, RecoveryCost, Safety, SafetyCone};
 use crate::experiment::judge::Judge;
 use crate::experiment::settings::{
     FilterSettings, FirstPlan, HybridSettings, NetworkFiles, NoPolicySettings, PlanSettings,
-    RaceSettings, RecoveryPoint, SigmaSetting,
+    RaceSettings, RecoveryPoint, STUDY_PLAN_GAIN, STUDY_RECOVERY, STUDY_VALUE_WEIGHT, SigmaSetting,
 };
 use crate::rollout::NoiseKind;
 
@@ -82,11 +82,8 @@ fn start_box() -> Vec<[f64; 2]> {
 
 /// The filter: as published, or with authority over the plant.
 fn filter(rigorous: bool) -> FilterSettings {
-    let BarrierFilter { rate, slack_weight, radius, .. } = BarrierFilter::STUDY;
-    let (form, widening) = match rigorous {
-        true => (BarrierForm::TwoStep, Widening::Heights),
-        false => (BarrierForm::OneStep, Widening::Velocities),
-    };
+    let filter = if rigorous { BarrierFilter::RIGOROUS } else { BarrierFilter::STUDY };
+    let BarrierFilter { form, widening, rate, slack_weight, radius } = filter;
     FilterSettings { form, widening, rate, slack_weight, radius }
 }
 
@@ -102,9 +99,9 @@ fn study_hybrid() -> HybridSettings {
         near_gate_speed: 0.7,
         first_plan: FirstPlan::Brake,
         recovery_point: RecoveryPoint::Verified,
-        plan_gain: 2.0,
+        plan_gain: STUDY_PLAN_GAIN,
         hold_opponent: true,
-        value_weight: 1e6,
+        value_weight: STUDY_VALUE_WEIGHT,
         value_threshold: -0.02,
         recovery: plan(20, 0.7, recovery(soft(5.0), Fence::NONE)),
         fast: plan(20, 0.5, lane(0.5, Safety::NONE)),
@@ -159,7 +156,8 @@ fn plan(horizon: u32, speed: f32, cost: RaceCost) -> PlanSettings {
 
 /// Family A.
 fn recovery(safety: Safety, fence: Fence) -> RaceCost {
-    RaceCost::Recovery(RecoveryCost { position: 5.0, velocity: 1.0, control: 0.1, safety, fence })
+    let [position, velocity, control] = STUDY_RECOVERY;
+    RaceCost::Recovery(RecoveryCost { position, velocity, control, safety, fence })
 }
 
 /// Family A'.

@@ -5,16 +5,12 @@ use super::controller::{Controller, Name, World};
 use super::hybrid::Hybrid;
 use super::no_policy::NoPolicy;
 use super::plan::Paths;
-use super::settings::{HybridSettings, RaceSettings, RecoveryPoint};
+use super::settings::{
+    HybridSettings, RaceSettings, RecoveryPoint, STUDY_PLAN_GAIN, STUDY_RECOVERY,
+    STUDY_VALUE_WEIGHT,
+};
 use crate::cost::{Fence, RaceCost, Safety};
 use crate::error::{Error, Result};
-
-/// Ego gain of the rollouts that the study's plans start from, m/s^2.
-const STUDY_GAIN: f32 = 2.0;
-/// The study's weights of recovery: position, velocity, control.
-const STUDY_RECOVERY: [f32; 3] = [5.0, 1.0, 0.1];
-/// The study's weight of the value term.
-const STUDY_VALUE_WEIGHT: f32 = 1e6;
 
 /// The settings of the race as the controller `name` has them.
 pub(super) fn settings(name: Name, race: &RaceSettings) -> RaceSettings {
@@ -28,7 +24,7 @@ pub(super) fn settings(name: Name, race: &RaceSettings) -> RaceSettings {
         Name::HybridNoFences => each_plan(hybrid, |cost| *terms(cost).1 = Fence::NONE),
         Name::HybridOneIteration => (hybrid.recovery.iterations, hybrid.fast.iterations) = (1, 1),
         Name::HybridStudyStart => {
-            (hybrid.plan_gain, hybrid.hold_opponent) = (STUDY_GAIN, true);
+            (hybrid.plan_gain, hybrid.hold_opponent) = (STUDY_PLAN_GAIN, true);
         }
         Name::HybridStudyRecovery => {
             hybrid.recovery_point = RecoveryPoint::Verified;

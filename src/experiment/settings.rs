@@ -13,6 +13,13 @@ use crate::system::{DroneRace, System};
 /// Most control steps of a race: each has random streams of its own.
 const MOST_STEPS: u32 = 10_000;
 
+/// Ego gain of the rollouts that the study's plans start from, m/s^2.
+pub const STUDY_PLAN_GAIN: f32 = 2.0;
+/// The study's weights of recovery: position, velocity, control.
+pub const STUDY_RECOVERY: [f32; 3] = [5.0, 1.0, 0.1];
+/// The study's weight of the value term.
+pub const STUDY_VALUE_WEIGHT: f32 = 1e6;
+
 /// Everything about a race but the plant, the policy and the certificates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

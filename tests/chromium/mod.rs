@@ -165,3 +165,19 @@ fn light(color: &str) -> f64 {
     let channels: Vec<f64> = channels.filter_map(|channel| channel.parse().ok()).collect();
     channels.iter().take(3).sum::<f64>() / 3.0 / 255.0
 }
+
+/// Shows `pages` at every width in both schemes; each has to fit with its `drawings` drawings, and
+/// the console has to stay empty.
+pub(crate) fn check_everywhere(pages: &[String], widths: &[u32], drawings: usize) {
+    let folder = tempfile::tempdir().unwrap();
+    write_pages(folder.path(), pages, widths);
+    for scheme in [Scheme::Light, Scheme::Dark] {
+        let visit = visit(folder.path(), "index.html", scheme);
+        assert!(visit.console.is_empty(), "{:?}", visit.console);
+        let measured = measured(&visit);
+        assert_eq!(measured.len(), pages.len() * widths.len());
+        for (index, page) in measured.iter().enumerate() {
+            check(page, widths[index % widths.len()], scheme, drawings);
+        }
+    }
+}

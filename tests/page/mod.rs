@@ -2,6 +2,10 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
 /// Tags that the page is made of.
 const TAGS: &str = "html head meta link title style body header main footer section div p span h1 \
     h2 h3 h4 ol ul dl dt dd li figure figcaption table thead tbody tr th td code pre details summary \
@@ -117,4 +121,24 @@ pub(crate) fn figure<'a>(page: &'a str, id: &str) -> &'a str {
 pub(crate) fn drawing<'a>(page: &'a str, id: &str) -> &'a str {
     let (_, rest) = figure(page, id).split_once("<svg class=\"plot\"").unwrap();
     rest.split_once("</svg>").unwrap().0
+}
+
+/// Applies `change` to every string of a record that is a free text; `modes` are the words of
+/// enumerations, which must stay.
+pub(crate) fn change_strings<T: Serialize + DeserializeOwned>(
+    record: &T,
+    modes: &[&str],
+    change: &mut impl FnMut(&str) -> String,
+) -> T {
+    fn walk(value: &mut Value, modes: &[&str], change: &mut impl FnMut(&str) -> String) {
+        match value {
+            Value::String(text) if !modes.contains(&text.as_str()) => *text = change(text),
+            Value::Array(items) => items.iter_mut().for_each(|item| walk(item, modes, change)),
+            Value::Object(map) => map.values_mut().for_each(|item| walk(item, modes, change)),
+            _ => {}
+        }
+    }
+    let mut value = serde_json::to_value(record).unwrap();
+    walk(&mut value, modes, change);
+    serde_json::from_value(value).unwrap()
 }

@@ -53,6 +53,20 @@ pub struct Adapter {
 }
 
 impl Adapter {
+    /// One that is not there, whose kernels see `max_binding_bytes` of a buffer.
+    #[cfg(test)]
+    pub(super) fn made_up(max_binding_bytes: u64) -> Self {
+        Self {
+            name: "made up".to_owned(),
+            api: "none".to_owned(),
+            kind: AdapterKind::Unknown,
+            driver: String::new(),
+            max_buffer_bytes: 1 << 30,
+            max_binding_bytes,
+            max_workgroup_threads: 256,
+        }
+    }
+
     fn new(adapter: &wgpu::Adapter) -> Self {
         let info = adapter.get_info();
         let limits = adapter.limits();

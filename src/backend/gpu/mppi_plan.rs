@@ -209,19 +209,6 @@ fn too_large(adapter: &Adapter, binding: u64) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::gpu::AdapterKind;
-
-    fn adapter(max_binding_bytes: u64) -> Adapter {
-        Adapter {
-            name: "made up".to_owned(),
-            api: "none".to_owned(),
-            kind: AdapterKind::Unknown,
-            driver: String::new(),
-            max_buffer_bytes: 1 << 30,
-            max_binding_bytes,
-            max_workgroup_threads: 256,
-        }
-    }
 
     fn size(controls: usize, horizon: u32, samples: u32, problems: usize) -> Size<'static> {
         let networks = [None; 2];
@@ -261,7 +248,8 @@ mod tests {
             for horizon in [1, 20, 512] {
                 for (controls, problems) in [(1, 1), (3, 1), (3, 500), (12, 100_000)] {
                     let size = size(controls, horizon, samples, problems);
-                    let plan = MppiPlan::new(&adapter(1 << 27), &size).expect("a plan that fits");
+                    let plan =
+                        MppiPlan::new(&Adapter::made_up(1 << 27), &size).expect("a plan that fits");
                     check(&size, &plan, 1 << 27);
                 }
             }
@@ -285,9 +273,11 @@ mod tests {
 
     #[test]
     fn long_plans_are_split_over_dispatches() {
-        let long = MppiPlan::new(&adapter(1 << 27), &size(24, 512, 64, 1)).expect("a plan");
+        let long =
+            MppiPlan::new(&Adapter::made_up(1 << 27), &size(24, 512, 64, 1)).expect("a plan");
         assert!((1..512).contains(&long.update_steps), "{long:?}");
-        let race = MppiPlan::new(&adapter(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
+        let race =
+            MppiPlan::new(&Adapter::made_up(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
         assert_eq!((race.rollout_steps, race.update_steps), (20, 20));
     }
 
@@ -296,7 +286,8 @@ mod tests {
     fn rounds_depend_on_the_samples_alone() {
         for (samples, rounds) in [(500, 1), (65_536, 1), (200_000, 3), (1_000_000, 4)] {
             for problems in [1, 500] {
-                let plan = MppiPlan::new(&adapter(1 << 27), &size(3, 20, samples, problems));
+                let plan =
+                    MppiPlan::new(&Adapter::made_up(1 << 27), &size(3, 20, samples, problems));
                 assert_eq!(plan.expect("a plan").rounds, rounds, "{samples} x {problems}");
             }
         }
@@ -304,9 +295,9 @@ mod tests {
 
     #[test]
     fn what_cannot_run_is_refused() {
-        let small = MppiPlan::new(&adapter(1 << 10), &size(3, 20, 500, 1));
+        let small = MppiPlan::new(&Adapter::made_up(1 << 10), &size(3, 20, 500, 1));
         assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
-        let wide = MppiPlan::new(&adapter(1 << 27), &size(65, 20, 500, 1));
+        let wide = MppiPlan::new(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));
         assert!(wide.expect_err("too wide").to_string().contains("65 controls"));
         let long = most_steps(4, |steps| steps * MAX_TRIPS * 2);
         assert!(long.expect_err("too long").to_string().contains("loop iterations"));

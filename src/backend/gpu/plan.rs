@@ -138,20 +138,7 @@ fn too_large(adapter: &Adapter, columns: u64, parameters: u64, binding: u64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::gpu::AdapterKind;
     use crate::policy::{Activation, Layer, OutputActivation};
-
-    fn adapter(max_binding_bytes: u64) -> Adapter {
-        Adapter {
-            name: "made up".to_owned(),
-            api: "none".to_owned(),
-            kind: AdapterKind::Unknown,
-            driver: String::new(),
-            max_buffer_bytes: 1 << 30,
-            max_binding_bytes,
-            max_workgroup_threads: 256,
-        }
-    }
 
     fn network(widths: &[usize]) -> Mlp {
         let layer = |pair: &[usize]| Layer {
@@ -172,7 +159,7 @@ mod tests {
                 for work in [Work::Measure, Work::Sign, Work::Pairs] {
                     // Parameters of the wide network take a megabyte of their own.
                     let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
-                    let plan = Plan::new(&adapter(binding), work, 12, network, count);
+                    let plan = Plan::new(&Adapter::made_up(binding), work, 12, network, count);
                     let plan = plan.expect("a plan within the limits");
                     let bytes = column_bytes(work, 12, network, plan.segment);
                     let stride = u64::from(plan.stride);
@@ -187,16 +174,16 @@ mod tests {
 
     #[test]
     fn small_batches_get_small_chunks() {
-        let plan = Plan::new(&adapter(1 << 27), Work::Measure, 12, None, 468);
+        let plan = Plan::new(&Adapter::made_up(1 << 27), Work::Measure, 12, None, 468);
         assert_eq!(plan.expect("a plan").stride, 512);
     }
 
     #[test]
     fn what_cannot_run_is_refused() {
-        let small = Plan::new(&adapter(1 << 10), Work::Measure, 12, None, 10);
+        let small = Plan::new(&Adapter::made_up(1 << 10), Work::Measure, 12, None, 10);
         assert!(matches!(small, Err(Error::Device(_))), "{small:?}");
         let states = 4 * MAX_TRIPS as usize;
-        let long = Plan::new(&adapter(1 << 30), Work::Measure, states, None, 10);
+        let long = Plan::new(&Adapter::made_up(1 << 30), Work::Measure, states, None, 10);
         let text = long.expect_err("too many iterations").to_string();
         assert!(text.contains("loop iterations"), "{text}");
     }
