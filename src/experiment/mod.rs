@@ -16,5 +16,6 @@ pub mod run;
 pub mod settings;
 pub mod statistics;
 pub mod summary;
+pub mod sweep;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,3 @@
+//! Sweeps: a grid of settings, raced or certified point by point.
+
+pub mod record;
