@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::args::Global;
 use super::progress::Progress;
-use super::{Outcome, devices, folder_of, json, report, summary};
+use super::{Outcome, devices, folder_of, report, summary};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::Result;
-use crate::files::{Staged, npy_bytes};
+use crate::files::{Staged, json, npy_bytes};
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::scenario;

@@ -5,6 +5,7 @@ mod certify;
 mod devices;
 mod progress;
 mod race;
+mod race_input;
 mod rollout;
 mod scenarios;
 mod stored;
@@ -18,6 +19,7 @@ use clap::Parser;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::files::json;
 use args::{Arguments, Command, Global};
 
 /// What a command that ran to its end came to.
@@ -82,12 +84,6 @@ fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String
         }
         _ => Ok(()),
     }
-}
-
-/// `value` as a JSON document that ends with its line; errors call it `name`.
-fn json(name: &str, value: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(value);
-    text.map(|text| text + "\n").map_err(|e| Error::invalid(name, e.to_string()))
 }
 
 /// The folder that `path` lies in.

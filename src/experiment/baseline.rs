@@ -122,6 +122,7 @@ impl Controller for MppiController<'_> {
             let mut decision = Decision {
                 control: result.plan[0],
                 effective_samples: Some(result.effective_samples),
+                best_cost: Some(result.least_cost),
                 non_finite: result.non_finite,
                 fan: fan(&self.plan, system, &problems, number, self.paths),
                 ..Decision::default()

@@ -118,6 +118,20 @@ impl Name {
         }
     }
 
+    /// The sections of a configuration whose plans it improves; empty without plans.
+    pub fn plan_sections(self) -> &'static [&'static str] {
+        match self {
+            Self::Mppi => &["race.mppi"],
+            Self::MppiSoft => &["race.soft"],
+            Self::MppiCbf => &["race.cbf"],
+            Self::MppiWarmstart => &["race.warmstart"],
+            Self::HybridNoPolicy => &["race.no_policy.recovery", "race.no_policy.fast"],
+            Self::Policy | Self::PpoCbf => &[],
+            // The hybrid, whole or with a part changed.
+            _ => &["race.hybrid.recovery", "race.hybrid.fast"],
+        }
+    }
+
     /// What it is, in a sentence.
     pub fn description(self) -> &'static str {
         match self {
@@ -206,6 +220,8 @@ pub struct Decision {
     pub recovery: Option<[f32; 3]>,
     /// Effective samples of the plan, where there is one.
     pub effective_samples: Option<f64>,
+    /// Smallest cost that a sample of the plan achieved, where there is one.
+    pub best_cost: Option<f32>,
     /// Sampled paths of the ego in x and y, where they were asked for.
     pub fan: Vec<Vec<[f32; 2]>>,
     /// Samples of the plan whose cost is not finite.

@@ -92,6 +92,7 @@ impl<'a> Hybrid<'a> {
                 control: result.plan[0],
                 tier: Some(Tier::Target),
                 effective_samples: Some(result.effective_samples),
+                best_cost: Some(result.least_cost),
                 non_finite: result.non_finite,
                 fan: fan(&self.fast, system, &problems, number, self.paths),
                 ..Decision::default()
@@ -179,6 +180,7 @@ impl<'a> Hybrid<'a> {
         let decide = |(number, result): (usize, crate::rollout::MppiResult<3>)| Decision {
             control: result.plan[0],
             effective_samples: Some(result.effective_samples),
+            best_cost: Some(result.least_cost),
             non_finite: result.non_finite,
             fan: fan(&self.recovery, system, &problems, number, self.paths),
             ..Decision::default()

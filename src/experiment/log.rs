@@ -33,6 +33,8 @@ pub struct StepLog {
     pub ball: Option<BallLog>,
     /// Effective samples of the plan.
     pub effective_samples: Option<f32>,
+    /// Smallest cost of a sample of the plan.
+    pub best_cost: Option<f32>,
     /// Samples of the plan whose cost is not finite.
     pub non_finite: u32,
     /// Whether growth was not called because no beta was left.
@@ -75,6 +77,7 @@ impl From<&Decision> for StepLog {
             check_margin: decision.check_margin,
             ball,
             effective_samples: decision.effective_samples.map(|samples| samples as f32),
+            best_cost: decision.best_cost,
             non_finite: decision.non_finite,
             refused: decision.refused,
             filter: decision.filter.map(|log| (log.status, log.slack as f32, log.active)),
@@ -130,6 +133,7 @@ pub fn arrays(races: &[RaceLog], most: usize) -> Vec<(&'static str, Array)> {
         ("f64_reruns", counts(&|step| step.ball.map_or(0, |ball| ball.f64_reruns))),
         ("non_finite_samples", counts(&|step| step.non_finite)),
         ("effective_samples", floats(&|step| step.effective_samples)),
+        ("best_cost", floats(&|step| step.best_cost)),
         ("filter_status", bytes(&|step| step.filter.map(|(status, ..)| code(status)))),
         ("filter_slack", floats(&|step| step.filter.map(|(_, slack, _)| slack))),
         ("filter_active", bytes(&|step| step.filter.map(|(.., active)| u8::from(active)))),
@@ -190,6 +194,7 @@ pub fn races(arrays: &BTreeMap<String, Array>) -> Result<(Vec<RaceLog>, usize), 
     let (ball_x, ball_y) = (float("ball_x")?, float("ball_y")?);
     let (verified, rounds) = (byte("ball_verified")?, whole("growth_rounds")?);
     let (reruns, effective) = (whole("f64_reruns")?, float("effective_samples")?);
+    let best_cost = float("best_cost")?;
     let (non_finite, refused) = (whole("non_finite_samples")?, byte("growth_refused")?);
     if let Some(tier) = tiers.iter().find(|tier| **tier > 3 && **tier != NONE) {
         return Err(format!("`tier` has the number {tier}"));
@@ -209,6 +214,7 @@ pub fn races(arrays: &BTreeMap<String, Array>) -> Result<(Vec<RaceLog>, usize), 
             f64_reruns: reruns[at],
         }),
         effective_samples: some(effective[at]),
+        best_cost: some(best_cost[at]),
         non_finite: non_finite[at],
         refused: refused[at] == 1,
         filter: decoded(status[at]).map(|status| (status, slack[at], active[at] == 1)),

@@ -65,6 +65,7 @@ impl<'a> NoPolicy<'a> {
                 control: result.plan[0],
                 tier: Some(tier),
                 effective_samples: Some(result.effective_samples),
+                best_cost: Some(result.least_cost),
                 non_finite: result.non_finite,
                 fan: fan(plan, system, &problems, number, self.paths),
                 ..Decision::default()

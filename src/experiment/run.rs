@@ -2,6 +2,7 @@
 //! stopped.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use serde::Serialize;
 
@@ -27,7 +28,7 @@ use crate::scenario::settings::Joint;
 use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
 /// Races of a batch; what is lost when the program is stopped is at most one of them.
-const BATCH: usize = 512;
+pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
 /// Name of the file that says which experiment a folder holds.
@@ -94,7 +95,7 @@ impl Experiment<'_> {
 
     /// Refuses what would fail later: nothing to race, numbers out of range, and settings that a
     /// controller does not take.
-    fn check(&self, names: &[Name]) -> Result<()> {
+    pub(super) fn check(&self, names: &[Name]) -> Result<()> {
         for (place, empty) in
             [("starts", self.starts.is_empty()), ("noise seeds", self.noise_seeds.is_empty())]
         {
@@ -172,9 +173,7 @@ impl Experiment<'_> {
             return stored(&path, starts, steps);
         }
         let seeds = self.seeds(noise_seed, first, starts.len());
-        let mut controller = controller(name, world, starts.len(), Paths::None)?;
-        let flights = fly(controller.as_mut(), world.system, starts, &seeds, steps, watch)?;
-        let logs: Vec<RaceLog> = flights.iter().map(RaceLog::from).collect();
+        let logs = flown(name, world, starts, &seeds, watch)?;
         let mut staged = Staged::new(&folder)?;
         staged.add(&file, &npz_bytes(&arrays(&logs, steps as usize))?)?;
         staged.publish()?;
@@ -182,7 +181,7 @@ impl Experiment<'_> {
     }
 
     /// The seeds of the races `first..first + count`.
-    fn seeds(&self, noise_seed: u64, first: usize, count: usize) -> Vec<u64> {
+    pub(super) fn seeds(&self, noise_seed: u64, first: usize, count: usize) -> Vec<u64> {
         (first..first + count).map(|race| race_seed(noise_seed, race as u64)).collect()
     }
 
@@ -220,12 +219,7 @@ impl Experiment<'_> {
             bounds: if tiered { Some(self.bounds()?) } else { None },
             steps: race.steps,
             step_seconds: STEP_SECONDS,
-            starts: StartsRecord {
-                source: self.source.clone(),
-                count: self.starts.len() as u64,
-                sha256: self.starts_sha256(),
-                ceilings: Judge::ALL.map(|judge| self.ceiling(judge)).to_vec(),
-            },
+            starts: self.starts_record(),
             noise_seeds: self.noise_seeds.clone(),
             controllers: controllers.collect(),
             absent: absent.collect(),
@@ -265,6 +259,16 @@ impl Experiment<'_> {
         Ok(same.then_some(shown))
     }
 
+    /// The starts in words and figures.
+    pub(super) fn starts_record(&self) -> StartsRecord {
+        StartsRecord {
+            source: self.source.clone(),
+            count: self.starts.len() as u64,
+            sha256: self.starts_sha256(),
+            ceilings: Judge::ALL.map(|judge| self.ceiling(judge)).to_vec(),
+        }
+    }
+
     /// Starts that do not violate `judge` before anyone moves.
     fn ceiling(&self, judge: Judge) -> CeilingRecord {
         let safe = self.starts.iter().filter(|start| safe_at_start(judge, start)).count();
@@ -278,46 +282,70 @@ impl Experiment<'_> {
 
     /// Makes sure that the folder is of this experiment, and says so in it.
     fn claim_folder(&self) -> Result<()> {
-        let path = self.folder.join(MANIFEST);
-        let mine = self.manifest();
-        match std::fs::read_to_string(&path) {
-            Ok(text) if text == mine => Ok(()),
-            Ok(_) => {
-                let problem = "another experiment is stored here (other configuration, starts, \
-                               networks, backend or program); give another --out, or remove \
-                               this folder";
-                Err(Error::file(&path, problem))
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                let mut staged = Staged::new(&self.folder)?;
-                staged.add(MANIFEST, mine.as_bytes())?;
-                staged.publish().map(|_| ())
-            }
-            Err(error) => Err(Error::file(&path, error)),
-        }
+        claim_folder(&self.folder, &format!("{:#}\n", self.manifest()))
     }
 
     /// Everything that the races depend on but their controller and noise seed, the program included.
-    fn manifest(&self) -> String {
+    pub(super) fn manifest(&self) -> serde_json::Value {
         let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
             self.world;
         let digest = |network: Option<&Mlp>| network.map(Mlp::digest);
         let origin =
             provenance(backend, Plant { system, policy }, certificates.seed, self.config.clone());
-        let program = std::env::current_exe().and_then(std::fs::read);
-        let program =
-            program.map_or_else(|_| "unknown".to_owned(), |bytes| digest::sha256([&bytes[..]]));
-        let manifest = serde_json::json!({
+        serde_json::json!({
             "schema": RACE_SCHEMA,
-            "program_sha256": program,
+            "program_sha256": program_sha256(),
             "provenance": origin,
             "starts_sha256": self.starts_sha256(),
             "value_sha256": digest(value),
             "disturbance_sha256": digest(disturbance),
             "ppo_sha256": digest(ppo),
-        });
-        format!("{manifest:#}\n")
+        })
     }
+}
+
+/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and says so in
+/// it.
+pub(super) fn claim_folder(folder: &Path, manifest: &str) -> Result<()> {
+    let path = folder.join(MANIFEST);
+    match std::fs::read_to_string(&path) {
+        Ok(text) if text == manifest => Ok(()),
+        Ok(_) => {
+            let problem = "another experiment is stored here (other configuration, starts, \
+                           parameters, networks, backend or program); give another --out, or \
+                           remove this folder";
+            Err(Error::file(&path, problem))
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let mut staged = Staged::new(folder)?;
+            staged.add(MANIFEST, manifest.as_bytes())?;
+            staged.publish().map(|_| ())
+        }
+        Err(error) => Err(Error::file(&path, error)),
+    }
+}
+
+/// SHA-256 of the program that runs.
+pub(super) fn program_sha256() -> &'static str {
+    static DIGEST: OnceLock<String> = OnceLock::new();
+    DIGEST.get_or_init(|| {
+        let program = std::env::current_exe().and_then(std::fs::read);
+        program.map_or_else(|_| "unknown".to_owned(), |bytes| digest::sha256([&bytes[..]]))
+    })
+}
+
+/// The races of the controller `name` from `starts`, with the settings of the controller in `world`.
+pub(super) fn flown(
+    name: Name,
+    world: World<'_>,
+    starts: &[[f32; 12]],
+    seeds: &[u64],
+    watch: &dyn Watch,
+) -> Result<Vec<RaceLog>> {
+    let mut controller = controller(name, world, starts.len(), Paths::None)?;
+    let steps = world.race.steps;
+    let flights = fly(controller.as_mut(), world.system, starts, seeds, steps, watch)?;
+    Ok(flights.iter().map(RaceLog::from).collect())
 }
 
 /// The races that the file at `path` holds, if they are those from `starts` and of that length.
@@ -336,18 +364,25 @@ fn stored(path: &Path, starts: &[[f32; 12]], steps: u32) -> Result<Vec<RaceLog>>
     }
 }
 
+/// Mean of compute times; 0 without any.
+pub(super) fn mean_seconds(seconds: &[f32]) -> f64 {
+    seconds.iter().map(|s| f64::from(*s)).sum::<f64>() / seconds.len().max(1) as f64
+}
+
+/// The number that `share` of `sorted` stays below; 0 without any.
+pub(super) fn quantile(sorted: &[f32], share: f64) -> f64 {
+    let place = (share * sorted.len() as f64) as usize;
+    sorted.get(place.min(sorted.len().saturating_sub(1))).map_or(0.0, |s| f64::from(*s))
+}
+
 /// Compute time from that of each step.
 fn timing(name: Name, mut sorted: Vec<f32>) -> TimingRecord {
     sorted.sort_by(f32::total_cmp);
-    let at = |share: f64| {
-        let place = (share * sorted.len() as f64) as usize;
-        sorted.get(place.min(sorted.len().saturating_sub(1))).map_or(0.0, |s| f64::from(*s))
-    };
+    let at = |share: f64| quantile(&sorted, share);
     TimingRecord {
         name: name.text().to_owned(),
         steps: sorted.len() as u64,
-        mean_seconds: sorted.iter().map(|s| f64::from(*s)).sum::<f64>()
-            / sorted.len().max(1) as f64,
+        mean_seconds: mean_seconds(&sorted),
         p99_seconds: at(0.99),
         most_seconds: at(1.0),
     }

@@ -2,7 +2,7 @@
 
 use super::controller::Name;
 use super::judge::{FailureClass, Judge, verdict};
-use super::log::RaceLog;
+use super::log::{RaceLog, StepLog};
 use super::metrics::{RaceMetrics, mean_metrics};
 use super::race::STEP_SECONDS;
 use super::record::{ControllerRecord, FilterRecord, TierRecord};
@@ -11,6 +11,27 @@ use crate::control::FilterStatus;
 
 /// Slack from which a barrier counts as relaxed, m^2.
 const RELAXED: f32 = 1e-6;
+
+/// Sums over the control steps that had a plan.
+#[derive(Clone, Copy, Debug, Default)]
+struct PlanSums {
+    effective_samples: (u64, f64),
+    best_cost: (u64, f64),
+}
+
+impl PlanSums {
+    /// Adds the plan of `step`; a cost that is not finite is not counted.
+    fn add(&mut self, step: &StepLog) {
+        add_to(&mut self.effective_samples, step.effective_samples);
+        add_to(&mut self.best_cost, step.best_cost.filter(|cost| cost.is_finite()));
+    }
+}
+
+/// Counts `value` and adds it, if there is one.
+fn add_to((count, sum): &mut (u64, f64), value: Option<f32>) {
+    *count += u64::from(value.is_some());
+    *sum += f64::from(value.unwrap_or(0.0));
+}
 
 /// What is kept of the races of one controller.
 #[derive(Clone, Debug)]
@@ -24,6 +45,7 @@ pub struct Summary {
     tiered: bool,
     filter: FilterRecord,
     non_finite_samples: u64,
+    plans: PlanSums,
     /// Compute time of each control step of each race, s.
     pub seconds: Vec<f32>,
 }
@@ -54,6 +76,7 @@ impl Summary {
             tiered: false,
             filter: FilterRecord::default(),
             non_finite_samples: 0,
+            plans: PlanSums::default(),
             seconds: Vec::new(),
         }
     }
@@ -91,6 +114,7 @@ impl Summary {
             self.tiered |= step.tier.is_some();
             self.seconds.push(step.seconds);
             self.non_finite_samples += u64::from(step.non_finite);
+            self.plans.add(step);
             self.tiers.growth_refused += u64::from(step.refused);
             spent += step.beta;
             self.tiers.beta_total += step.beta;
@@ -110,6 +134,13 @@ impl Summary {
             }
         }
         self.tiers.beta_race = self.tiers.beta_race.max(spent);
+    }
+
+    /// Means over the control steps that had a plan: effective samples, and the smallest cost of a
+    /// sample where one was finite.
+    pub fn plan_means(&self) -> [Option<f64>; 2] {
+        let mean = |(count, sum): (u64, f64)| (count > 0).then(|| sum / count as f64);
+        [mean(self.plans.effective_samples), mean(self.plans.best_cost)]
     }
 
     /// The record; `hybrid` is the controller that the others are compared with, if it ran.

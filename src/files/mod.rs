@@ -3,17 +3,29 @@
 mod array;
 mod npz;
 mod states;
+mod table;
 
 pub use array::{MeasureWriter, npy_bytes};
 pub use npz::{Array, Data, npz_bytes, read_npz};
 pub use states::StateReader;
+pub use table::{Column, Table};
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+
+/// `value` as a JSON document that ends with its line; errors call it `name`.
+///
+/// # Errors
+/// [`Error::Invalid`] if it has no JSON form.
+pub fn json(name: &str, value: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(value);
+    text.map(|text| text + "\n").map_err(|e| Error::invalid(name, e.to_string()))
+}
 
 /// Files of one folder, written beside their final names and renamed together at the end.
 ///

@@ -285,6 +285,17 @@ pub enum GrowthOutcome {
     NoBoundary,
 }
 
+impl GrowthOutcome {
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Verified => "verified",
+            Self::Exhausted => "exhausted",
+            Self::NoBoundary => "no-boundary",
+        }
+    }
+}
+
 /// One round of growth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -18,6 +18,7 @@ fn full(number: u8, status: FilterStatus, verified: bool) -> StepLog {
             f64_reruns: 70_000 + u32::from(number),
         }),
         effective_samples: Some(10.0 * n),
+        best_cost: Some(3.0 - n),
         non_finite: 5 * u32::from(number),
         refused: verified,
         filter: Some((status, 0.125 * n, !verified)),

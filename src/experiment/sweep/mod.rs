@@ -1,3 +1,11 @@
 //! Sweeps: a grid of settings, raced or certified point by point.
 
+mod certificate;
+mod race;
 pub mod record;
+mod store;
+mod table;
+
+pub use certificate::{certificate_point, certificate_sha256};
+pub use store::Store;
+pub use table::table;

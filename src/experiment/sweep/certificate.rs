@@ -1,0 +1,66 @@
+//! A point of a sweep as a certificate.
+
+use super::record::CertificatePoint;
+use crate::backend::Backend;
+use crate::digest;
+use crate::error::Result;
+use crate::experiment::run::program_sha256;
+use crate::policy::Policy;
+use crate::rollout::Plant;
+use crate::scenario::settings::Settings;
+use crate::scenario::{self, Watch, provenance};
+use crate::system::System;
+
+/// SHA-256 over everything that a certificate depends on.
+pub fn certificate_sha256<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    seed: u64,
+    config: serde_json::Value,
+) -> String
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let point = serde_json::json!({
+        "program_sha256": program_sha256(),
+        "provenance": provenance(backend, plant, seed, config),
+    });
+    digest::sha256([point.to_string().as_bytes()])
+}
+
+/// Certifies the plant and keeps the figures that a sweep compares.
+///
+/// # Errors
+/// Those of [`scenario::certify`].
+pub fn certificate_point<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    settings: &Settings<NX>,
+    config: serde_json::Value,
+    watch: &dyn Watch,
+) -> Result<CertificatePoint>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let record = scenario::certify(backend, plant, settings, config, watch)?;
+    let (deviation, global, growth) = (&record.deviation, &record.global, &record.growth);
+    Ok(CertificatePoint {
+        deviation_scenarios: deviation.claim.scenarios,
+        deviation_risk: deviation.claim.certified_risk,
+        deviation_bound: deviation.bound.iter().copied().fold(0.0, f64::max),
+        draws: global.draws,
+        accepted: global.accepted,
+        share_interval: global.share_interval,
+        volume_interval: global.volume_interval,
+        conditional_risk: global.claim.certified_risk,
+        growth_scenarios: settings.growth.scenarios,
+        growth: growth.outcome,
+        rounds: growth.rounds.len() as u64,
+        radius: growth.radius,
+        holds: record.holds,
+        beta_total: record.beta_total,
+        seconds: record.timing.wall_seconds,
+    })
+}

@@ -1,0 +1,106 @@
+//! The folder of a sweep: one file per finished point, and the tables of all of them.
+
+use std::path::{Path, PathBuf};
+
+use super::record::{PointRecord, PointResult, SweepRecord};
+use super::table::table;
+use crate::error::{Error, Result};
+use crate::experiment::run::claim_folder;
+use crate::files::{Staged, json};
+
+/// A sweep whose points are stored as they come.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+    /// All that is known of the sweep so far.
+    record: SweepRecord,
+}
+
+impl Store {
+    /// A sweep in `folder`, which belongs to the sweep that `identity` describes: everything but
+    /// the values of its axes, so that a grid can be extended.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the folder holds another experiment, [`Error::Write`] if it cannot be
+    /// written to.
+    pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
+        claim_folder(folder, &format!("{identity:#}\n"))?;
+        let folder = folder.to_owned();
+        Ok(Self { folder, record })
+    }
+
+    /// Adds the point with the values `values` and the hash `sha256`: the stored one, else what
+    /// `compute` comes to, which is stored.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a stored point that is damaged; those of `compute`; [`Error::Write`].
+    pub fn point(
+        &mut self,
+        sha256: String,
+        values: Vec<String>,
+        compute: impl FnOnce() -> Result<PointResult>,
+    ) -> Result<()> {
+        let file = format!("{sha256}.json");
+        let path = self.folder.join("points").join(&file);
+        let found = stored(&path, &sha256)?;
+        let is_new = found.is_none();
+        let result = match found {
+            Some(result) => result,
+            None => compute()?,
+        };
+        self.record.points.push(PointRecord { sha256, values, result });
+        if !is_new {
+            return Ok(());
+        }
+        let point = self.record.points.last().expect("one was added");
+        let mut staged = Staged::new(&self.folder.join("points"))?;
+        staged.add(&file, json(&file, point)?.as_bytes())?;
+        staged.publish()?;
+        self.tables().map(drop)
+    }
+
+    /// Writes `sweep.csv` and `sweep.parquet` of the points so far.
+    fn tables(&self) -> Result<Vec<PathBuf>> {
+        let table = table(&self.record);
+        let mut staged = Staged::new(&self.folder)?;
+        staged.add("sweep.parquet", &table.parquet()?)?;
+        staged.add("sweep.csv", &table.csv()?)?;
+        staged.publish()
+    }
+
+    /// Writes the tables, `sweep.json` and `page` of the record as `report.html`; the files.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn finish(&self, page: impl FnOnce(&SweepRecord) -> String) -> Result<Vec<PathBuf>> {
+        let mut files = self.tables()?;
+        let mut staged = Staged::new(&self.folder)?;
+        staged.add("report.html", page(&self.record).as_bytes())?;
+        staged.add("sweep.json", json("sweep.json", &self.record)?.as_bytes())?;
+        files.extend(staged.publish()?);
+        Ok(files)
+    }
+
+    /// The sweep so far.
+    pub fn record(&self) -> &SweepRecord {
+        &self.record
+    }
+}
+
+/// The result that the file at `path` holds; none where there is no file.
+fn stored(path: &Path, sha256: &str) -> Result<Option<PointResult>> {
+    let damaged = |problem: &dyn std::fmt::Display| {
+        let text = format!("{problem}; remove the file, and the point is computed again");
+        Error::file(path, text)
+    };
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(damaged(&error)),
+    };
+    let point: PointRecord = serde_json::from_str(&text).map_err(|error| damaged(&error))?;
+    match point.sha256 == sha256 {
+        true => Ok(Some(point.result)),
+        false => Err(damaged(&"it is of another point")),
+    }
+}
