@@ -25,6 +25,7 @@ Examples:
   reachcast query reachcast-out --states configs/race_starts_500.csv
   reachcast check reachcast-out
   reachcast race configs/race.toml
+  reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
   reachcast scenarios --epsilon 0.1 --beta 1e-3
 
 Exit codes:
@@ -158,6 +159,29 @@ Examples:
   reachcast race configs/race.toml --profile study --controllers hybrid,mppi --noise-seeds 5
   reachcast race configs/race.toml --controllers ablations --starts 2000 --out ablations")]
     Race(RaceArguments),
+    /// Race or certify every point of a grid of settings
+    ///
+    /// Writes sweep.csv and sweep.parquet as points are done, then sweep.json and report.html, to the
+    /// folder of --out (default: reachcast-sweep). Stopped half-way, the same command goes on where it
+    /// was; points that are stored are not computed again, also after a grid was extended.
+    #[command(after_help = "\
+Every option that takes a LIST is an axis of the grid; the values of one axis are separated by commas.
+What is not an axis has the value of the configuration.
+
+Races (--of race): every point flies the same starts with the same noise seeds; axes --controllers,
+--samples, --horizon, --temperature, --sigma, --noise, --iterations, --vary. An axis of plans changes
+all plans of the controller, for the hybrid those of tiers 0 and 3. A noise is `independent`,
+`colored:TIME` or `spline:KNOTS`.
+
+Certificates (--of certificate): axes --epsilon, --beta, --radius, --horizon, --bound, --count, --vary.
+
+Examples:
+  reachcast sweep configs/race.toml --samples 16,64,256,1024,4096 --horizon 10,20,30 --starts 100
+  reachcast sweep configs/race.toml --controllers hybrid,mppi --noise independent,colored:3,spline:5
+  reachcast sweep configs/race.toml --vary race.mppi.cost.speed=0.5,1,2 --noise-seeds 5
+  reachcast sweep configs/race.toml --of certificate --epsilon 0.05,0.1,0.2 --radius 0.02,0.05,0.1
+  reachcast sweep configs/race.toml --of certificate --bound fixed-shape,variables,exact")]
+    Sweep(SweepArguments),
     /// Tell how many scenarios a claim needs
     #[command(after_help = "\
 Examples:
@@ -183,6 +207,84 @@ pub(super) struct RaceArguments {
     /// Runs of each controller, with the noise seeds SEED, SEED + 1, ...
     #[arg(long, value_name = "M", default_value_t = 1)]
     pub(super) noise_seeds: u64,
+}
+
+/// What `sweep` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(super) struct SweepArguments {
+    /// Configuration (TOML)
+    pub(super) config: PathBuf,
+    /// What each point is
+    #[arg(long, value_enum, default_value_t = Of::Race)]
+    pub(super) of: Of,
+    /// Any key of the configuration and its values; repeatable
+    #[arg(long, value_name = "KEY=LIST")]
+    pub(super) vary: Vec<String>,
+    /// Steps of a plan (races), or of a rollout (certificates)
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) horizon: Option<String>,
+    #[command(flatten, next_help_heading = "Races")]
+    pub(super) race: RaceAxes,
+    #[command(flatten, next_help_heading = "Certificates")]
+    pub(super) certificate: CertificateAxes,
+}
+
+/// What the points of a sweep are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Of {
+    /// Races of one controller
+    Race,
+    /// Certificates
+    Certificate,
+}
+
+/// Axes and options of a sweep of races.
+#[derive(Args, Clone, Debug)]
+pub(super) struct RaceAxes {
+    /// Controllers [default: mppi]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) controllers: Option<String>,
+    /// Samples K of a plan
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) samples: Option<String>,
+    /// Temperatures lambda of a plan, in units of cost
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) temperature: Option<String>,
+    /// Standard deviations of the noise; a list in brackets has one for each control
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) sigma: Option<String>,
+    /// How the noise hangs together over the steps
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) noise: Option<String>,
+    /// Improvements of a plan at each control step
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) iterations: Option<String>,
+    /// Starts: how many to draw from race.start_box, or a file, .npy or .csv [default: race.starts]
+    #[arg(long, value_name = "N|FILE")]
+    pub(super) starts: Option<String>,
+    /// Runs of each point, with the noise seeds SEED, SEED + 1, ... [default: 1]
+    #[arg(long, value_name = "M")]
+    pub(super) noise_seeds: Option<u64>,
+}
+
+/// Axes of a sweep of certificates.
+#[derive(Args, Clone, Debug)]
+pub(super) struct CertificateAxes {
+    /// Risks epsilon of deviation bound and growth
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) epsilon: Option<String>,
+    /// One minus the confidence of each claim
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) beta: Option<String>,
+    /// Radii eps_x of the perturbation
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) radius: Option<String>,
+    /// Deviation bounds: fixed-shape, variables, bonferroni, separate, exact
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) bound: Option<String>,
+    /// Where the scenario counts come from: simple, exact (bounds), config [default: simple]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(super) count: Option<String>,
 }
 
 /// The claim that `scenarios` is asked about.

@@ -10,6 +10,7 @@ mod rollout;
 mod scenarios;
 mod stored;
 mod summary;
+mod sweep;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -64,6 +65,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Query { folder, states } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
         Command::Race(asked) => race::run(global, asked),
+        Command::Sweep(asked) => sweep::run(global, asked),
         Command::Scenarios(asked) => scenarios::run(global, *asked),
         Command::Devices => devices::list(global),
     }

@@ -38,7 +38,8 @@ impl RaceInput {
     pub(super) fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let config = Config::load(path, overrides)?;
         let race = config.race.clone().ok_or_else(|| {
-            let problem = "only the system `drone-race` has races";
+            let problem = "only the system `drone-race` has races; certificates it has: `certify`, \
+                           `sweep --of certificate`";
             Error::invalid(path.display().to_string(), problem)
         })?;
         let folder = folder_of(path).to_owned();

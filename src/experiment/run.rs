@@ -33,6 +33,8 @@ pub(super) const BATCH: usize = 512;
 const MOST_STREAMS: u64 = 1 << 24;
 /// Name of the file that says which experiment a folder holds.
 const MANIFEST: &str = "experiment.json";
+/// Name of the page that every command with results writes.
+const REPORT: &str = "report.html";
 
 /// What is to be raced.
 #[derive(Clone, Debug)]
@@ -317,6 +319,11 @@ pub(super) fn claim_folder(folder: &Path, manifest: &str) -> Result<()> {
             Err(Error::file(&path, problem))
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            if folder.join(REPORT).exists() {
+                let problem =
+                    "a report of something else is here; give another --out, or remove it";
+                return Err(Error::file(&folder.join(REPORT), problem));
+            }
             let mut staged = Staged::new(folder)?;
             staged.add(MANIFEST, manifest.as_bytes())?;
             staged.publish().map(|_| ())

@@ -19,3 +19,8 @@ mod words;
 
 pub use html::html;
 pub use race::race_html;
+
+/// placeholder
+pub fn sweep_html(_r: &crate::experiment::sweep::record::SweepRecord) -> String {
+    String::new()
+}

@@ -10,6 +10,28 @@ use crate::error::{Error, Result};
 /// Counts above this are refused: beyond it an f64 no longer tells neighbours apart.
 const MOST_SCENARIOS: f64 = 9_007_199_254_740_992.0;
 
+/// Which bound a scenario count comes from, section 2 of `docs/method.md`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CountRule {
+    /// [`simple_scenarios`].
+    Simple,
+    /// [`required_scenarios`].
+    Exact,
+}
+
+impl CountRule {
+    /// The scenarios that a claim needs.
+    ///
+    /// # Errors
+    /// As [`simple_scenarios`].
+    pub fn scenarios(self, epsilon: f64, beta: f64, decision_vars: u32) -> Result<u64> {
+        match self {
+            Self::Simple => simple_scenarios(epsilon, beta, decision_vars),
+            Self::Exact => required_scenarios(epsilon, beta, decision_vars),
+        }
+    }
+}
+
 /// Scenarios by the simple bound `ceil((2 / epsilon) (ln(1 / beta) + d))`, Theorem 1 of the paper,
 /// section 2 of `docs/method.md`.
 ///

@@ -59,7 +59,7 @@ where
 {
     let begun = Instant::now();
     let context = Context { backend, plant, watch };
-    growth::check_scenarios(&settings.growth)?;
+    check_settings(settings)?;
     let ledger = ledger(settings)?;
     let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
     let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
@@ -109,6 +109,18 @@ where
         picture,
         timing: Timing { wall_seconds: begun.elapsed().as_secs_f64(), threads: 0, rollouts },
     })
+}
+
+/// Refuses settings whose claims could not be made, as far as that shows without work: scenarios
+/// that are too few, claims that spend more than 1 together, an empty box.
+///
+/// # Errors
+/// [`Error::TooFewScenarios`] and [`Error::Invalid`].
+pub fn check_settings<const NX: usize>(settings: &Settings<NX>) -> Result<()> {
+    growth::check_scenarios(&settings.growth)?;
+    deviation::check_scenarios(&settings.deviation, settings.spec.horizon)?;
+    ledger(settings)?;
+    Region::new_box(settings.low, settings.high).map(|_| ())
 }
 
 /// What the margins lose with the constants used.

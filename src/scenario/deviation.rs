@@ -58,17 +58,7 @@ where
     P: Policy<NX, NU>,
 {
     let asked = &settings.deviation;
-    let program = Program::new(asked, settings.spec.horizon);
-    let need = required_scenarios(program.epsilon, program.beta, program.decision_vars)?;
-    if asked.scenarios < need {
-        return Err(Error::TooFewScenarios {
-            have: asked.scenarios,
-            need,
-            epsilon: program.epsilon,
-            beta: program.beta,
-            decision_vars: program.decision_vars,
-        });
-    }
+    let program = check_scenarios(asked, settings.spec.horizon)?;
     let exact = exact(context.plant.system, settings)?;
     let pilot = (asked.joint == Joint::FixedShape).then_some(asked.pilot);
     let shape = match pilot {
@@ -104,6 +94,22 @@ where
         support,
         posterior_risk: wait_and_judge(asked.scenarios, support, program.beta),
         non_finite: sample.non_finite,
+    })
+}
+
+/// The program of the bound; refuses fewer pairs than it needs.
+pub(super) fn check_scenarios(asked: &DeviationSettings, horizon: u32) -> Result<Program> {
+    let program = Program::new(asked, horizon);
+    let need = required_scenarios(program.epsilon, program.beta, program.decision_vars)?;
+    if asked.scenarios >= need {
+        return Ok(program);
+    }
+    Err(Error::TooFewScenarios {
+        have: asked.scenarios,
+        need,
+        epsilon: program.epsilon,
+        beta: program.beta,
+        decision_vars: program.decision_vars,
     })
 }
 

@@ -17,7 +17,7 @@ pub(crate) mod tail;
 mod verify;
 
 pub(crate) use certify::provenance;
-pub use certify::{Tightened, certify, hashes, tightened};
+pub use certify::{Tightened, certify, check_settings, hashes, tightened};
 pub use verify::{CheckReport, Finding, QueryRow, check, query};
 
 use crate::backend::Backend;

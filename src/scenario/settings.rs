@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bound::CountRule;
+use super::deviation::Program;
+use crate::error::Result;
 use crate::rollout::{PairControl, RolloutSpec};
 use crate::system::System;
 
@@ -141,6 +144,20 @@ pub struct Settings<const NX: usize> {
 }
 
 impl<const NX: usize> Settings<NX> {
+    /// The scenarios that `rule` asks for: pairs of the deviation bound, starts of a round of growth.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] for a risk or a beta that no count supports.
+    pub fn scenario_counts(&self, rule: CountRule) -> Result<[u64; 2]> {
+        let Program { decision_vars, epsilon, beta } =
+            Program::new(&self.deviation, self.spec.horizon);
+        let growth = &self.growth;
+        Ok([
+            rule.scenarios(epsilon, beta, decision_vars)?,
+            rule.scenarios(growth.epsilon, growth.round_beta(), 1)?,
+        ])
+    }
+
     /// Sound settings for `system` around `state`, to be adjusted field by field: risk 0.1 and
     /// beta 1e-3 throughout, computed constants, a joint deviation bound of radius 0.05 by fixed
     /// shape under replayed controls, 20,000 draws, a slice of 21 by 21 cells over the first two

@@ -1,6 +1,6 @@
 //! A point of a sweep as a certificate.
 
-use super::record::CertificatePoint;
+use super::record::{AxisRecord, CertificatePoint, SWEEP_SCHEMA, SweepRecord};
 use crate::backend::Backend;
 use crate::digest;
 use crate::error::Result;
@@ -10,6 +10,31 @@ use crate::rollout::Plant;
 use crate::scenario::settings::Settings;
 use crate::scenario::{self, Watch, provenance};
 use crate::system::System;
+
+/// A sweep of certificates over `axes` with `total` points, none of which is done; `config` is what
+/// every point starts from.
+pub fn certificate_sweep<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    seed: u64,
+    config: serde_json::Value,
+    (axes, total): (Vec<AxisRecord>, u64),
+) -> SweepRecord
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    SweepRecord {
+        schema: SWEEP_SCHEMA,
+        provenance: provenance(backend, plant, seed, config),
+        starts: None,
+        noise_seeds: Vec::new(),
+        judge: None,
+        axes,
+        total,
+        points: Vec::new(),
+    }
+}
 
 /// SHA-256 over everything that a certificate depends on.
 pub fn certificate_sha256<S, P, const NX: usize, const NU: usize>(

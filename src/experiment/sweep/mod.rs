@@ -6,6 +6,6 @@ pub mod record;
 mod store;
 mod table;
 
-pub use certificate::{certificate_point, certificate_sha256};
+pub use certificate::{certificate_point, certificate_sha256, certificate_sweep};
 pub use store::Store;
 pub use table::table;

@@ -1,6 +1,6 @@
 //! A point of a sweep as races: success, plans, and the latency of a control step.
 
-use super::record::{LatencyRecord, RacePoint};
+use super::record::{AxisRecord, LatencyRecord, RacePoint, SWEEP_SCHEMA, SweepRecord};
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::experiment::controller::{Name, World};
@@ -9,7 +9,8 @@ use crate::experiment::race::{fly, race_seed};
 use crate::experiment::roster::{absent, controller, settings};
 use crate::experiment::run::{BATCH, Experiment, flown, mean_seconds, quantile};
 use crate::experiment::summary::Summary;
-use crate::scenario::{Unwatched, Watch};
+use crate::rollout::Plant;
+use crate::scenario::{Unwatched, Watch, provenance};
 
 /// Control steps that are timed, if they fit into [`LATENCY_BUDGET`].
 const TIMED_STEPS: u32 = 200;
@@ -17,6 +18,32 @@ const TIMED_STEPS: u32 = 200;
 const LATENCY_BUDGET: f64 = 2.0;
 
 impl Experiment<'_> {
+    /// The sweep over `axes` with `total` points, none of which is done; this experiment is what
+    /// every point starts from.
+    pub fn sweep(&self, axes: Vec<AxisRecord>, total: u64) -> SweepRecord {
+        let World { backend, system, policy, race, certificates, .. } = self.world;
+        let plant = Plant { system, policy };
+        SweepRecord {
+            schema: SWEEP_SCHEMA,
+            provenance: provenance(backend, plant, certificates.seed, self.config.clone()),
+            starts: Some(self.starts_record()),
+            noise_seeds: self.noise_seeds.clone(),
+            judge: Some(race.judge),
+            axes,
+            total,
+            points: Vec::new(),
+        }
+    }
+
+    /// Everything that the points of a sweep share.
+    pub fn sweep_identity(&self) -> serde_json::Value {
+        serde_json::json!({
+            "sweep_of": "races",
+            "manifest": self.manifest(),
+            "noise_seeds": self.noise_seeds,
+        })
+    }
+
     /// SHA-256 over everything that the races of the controller `name` depend on.
     pub fn point_sha256(&self, name: Name) -> String {
         let point = serde_json::json!({

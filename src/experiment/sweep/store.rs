@@ -1,6 +1,7 @@
 //! The folder of a sweep: one file per finished point, and the tables of all of them.
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
@@ -8,25 +9,32 @@ use crate::error::{Error, Result};
 use crate::experiment::run::claim_folder;
 use crate::files::{Staged, json};
 
+/// The tables grow with the sweep: they are not written again sooner than this.
+const TABLE_PERIOD: Duration = Duration::from_secs(1);
+
 /// A sweep whose points are stored as they come.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
     /// All that is known of the sweep so far.
     record: SweepRecord,
+    /// When the tables were written last.
+    written: Option<Instant>,
 }
 
 impl Store {
-    /// A sweep in `folder`, which belongs to the sweep that `identity` describes: everything but
-    /// the values of its axes, so that a grid can be extended.
+    /// A sweep in `folder`, which belongs to the sweep of these axes that `identity` describes:
+    /// everything that all points share. Values are no part of it, so that a grid can be extended.
     ///
     /// # Errors
     /// [`Error::File`] if the folder holds another experiment, [`Error::Write`] if it cannot be
     /// written to.
     pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
-        claim_folder(folder, &format!("{identity:#}\n"))?;
+        let axes: Vec<&str> = record.axes.iter().map(|axis| axis.name.as_str()).collect();
+        let manifest = serde_json::json!({ "axes": axes, "shared": identity });
+        claim_folder(folder, &format!("{manifest:#}\n"))?;
         let folder = folder.to_owned();
-        Ok(Self { folder, record })
+        Ok(Self { folder, record, written: None })
     }
 
     /// Adds the point with the values `values` and the hash `sha256`: the stored one, else what
@@ -44,9 +52,12 @@ impl Store {
         let path = self.folder.join("points").join(&file);
         let found = stored(&path, &sha256)?;
         let is_new = found.is_none();
-        let result = match found {
-            Some(result) => result,
-            None => compute()?,
+        let result = match found.map_or_else(compute, Ok) {
+            Ok(result) => result,
+            Err(error) => {
+                self.tables()?;
+                return Err(error);
+            }
         };
         self.record.points.push(PointRecord { sha256, values, result });
         if !is_new {
@@ -56,11 +67,15 @@ impl Store {
         let mut staged = Staged::new(&self.folder.join("points"))?;
         staged.add(&file, json(&file, point)?.as_bytes())?;
         staged.publish()?;
-        self.tables().map(drop)
+        match self.written.is_some_and(|written| written.elapsed() < TABLE_PERIOD) {
+            true => Ok(()),
+            false => self.tables().map(drop),
+        }
     }
 
     /// Writes `sweep.csv` and `sweep.parquet` of the points so far.
-    fn tables(&self) -> Result<Vec<PathBuf>> {
+    fn tables(&mut self) -> Result<Vec<PathBuf>> {
+        self.written = Some(Instant::now());
         let table = table(&self.record);
         let mut staged = Staged::new(&self.folder)?;
         staged.add("sweep.parquet", &table.parquet()?)?;
@@ -72,7 +87,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Write`].
-    pub fn finish(&self, page: impl FnOnce(&SweepRecord) -> String) -> Result<Vec<PathBuf>> {
+    pub fn finish(&mut self, page: impl FnOnce(&SweepRecord) -> String) -> Result<Vec<PathBuf>> {
         let mut files = self.tables()?;
         let mut staged = Staged::new(&self.folder)?;
         staged.add("report.html", page(&self.record).as_bytes())?;

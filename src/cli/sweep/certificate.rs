@@ -1,0 +1,180 @@
+//! A sweep of certificates.
+
+use std::path::Path;
+
+use super::grid::{Grid, Target, Values};
+use crate::backend::Backend;
+use crate::cli::args::{Global, SweepArguments};
+use crate::cli::folder_of;
+use crate::cli::progress::Progress;
+use crate::config::{Config, Job, Overrides, PolicySource};
+use crate::error::{Error, Result};
+use crate::experiment::sweep::record::{AxisRecord, PointResult, SweepRecord};
+use crate::experiment::sweep::{Store, certificate_point, certificate_sha256, certificate_sweep};
+use crate::policy::Policy;
+use crate::rollout::Plant;
+use crate::scenario::bound::CountRule;
+use crate::scenario::check_settings;
+use crate::scenario::settings::Settings;
+use crate::system::System;
+
+/// Keys that `--count` sets.
+const COUNTS: [&str; 2] = ["deviation.scenarios", "growth.scenarios"];
+
+/// What every point has.
+struct Sweep<'a> {
+    config: &'a Path,
+    base: Overrides,
+    grid: &'a Grid,
+    backend: &'a Backend,
+}
+
+/// Certifies every point that is not stored yet.
+pub(super) fn run(
+    global: &Global,
+    asked: &SweepArguments,
+    grid: &Grid,
+    (backend, progress, out): (&Backend, &Progress, &Path),
+) -> Result<Store> {
+    let sweep = Sweep { config: &asked.config, base: global.overrides(), grid, backend };
+    let points = grid.points();
+    let axes = (grid.records(), points.len() as u64);
+    let base = Config::load(&asked.config, &sweep.base)?;
+    let policy = base.policy_source(folder_of(&asked.config))?;
+    let record = base.with_plant(&policy, Begin { config: &base, backend, axes })?;
+    let hashes = points.iter().map(|values| sweep.checked(values)).collect::<Result<Vec<_>>>()?;
+    let identity = serde_json::json!({
+        "sweep_of": "certificates",
+        "schema": record.schema,
+        "provenance": record.provenance,
+    });
+    let mut store = Store::open(out, &identity, record)?;
+    for (values, sha256) in points.into_iter().zip(hashes) {
+        store.point(sha256, values.clone(), || sweep.certify(&values, progress))?;
+    }
+    Ok(store)
+}
+
+impl Sweep<'_> {
+    /// The configuration and policy of a point, and where its scenario counts come from.
+    fn point(&self, values: &Values) -> Result<(Config, PolicySource, Option<CountRule>)> {
+        let rule = match self.grid.value(values, &Target::Count) {
+            Some("config") => None,
+            Some("exact") => Some(CountRule::Exact),
+            _ => Some(CountRule::Simple),
+        };
+        let overrides = self.grid.overrides(&self.base, values, None)?;
+        let sets = |assignment: &&String| {
+            COUNTS.contains(&assignment.split('=').next().unwrap_or_default().trim())
+        };
+        if let (Some(_), Some(set)) = (rule, overrides.set.iter().find(sets)) {
+            let problem = "the counts follow from epsilon, beta and --count; give --count config \
+                           to set them";
+            return Err(Error::invalid(set.as_str(), problem));
+        }
+        let config = Config::load(self.config, &overrides);
+        let config = config.map_err(|error| self.grid.blamed(error, values))?;
+        let policy = config.policy_source(folder_of(self.config))?;
+        Ok((config, policy, rule))
+    }
+
+    /// SHA-256 of a point that can be certified.
+    fn checked(&self, values: &Values) -> Result<String> {
+        let (config, policy, rule) = self.point(values)?;
+        config.with_plant(&policy, Check { config: &config, rule, backend: self.backend })
+    }
+
+    /// Certifies a point.
+    fn certify(&self, values: &Values, progress: &Progress) -> Result<PointResult> {
+        let (config, policy, rule) = self.point(values)?;
+        let job = Certify { config: &config, rule, backend: self.backend, progress };
+        config.with_plant(&policy, job)
+    }
+}
+
+/// The settings of a point and the configuration that has their counts.
+fn counted<S, const NX: usize, const NU: usize>(
+    config: &Config,
+    system: &S,
+    rule: Option<CountRule>,
+) -> Result<(Settings<NX>, serde_json::Value)>
+where
+    S: System<NX, NU>,
+{
+    let axes = system.states();
+    let mut config = config.clone();
+    if let Some(rule) = rule {
+        let counts = config.settings(&axes)?.scenario_counts(rule)?;
+        [config.deviation.scenarios, config.growth.scenarios] = counts;
+    }
+    Ok((config.settings(&axes)?, config.to_json()?))
+}
+
+/// The sweep before its first point.
+struct Begin<'a> {
+    config: &'a Config,
+    backend: &'a Backend,
+    axes: (Vec<AxisRecord>, u64),
+}
+
+impl Job for Begin<'_> {
+    type Output = SweepRecord;
+
+    fn run<S, P, const NX: usize, const NU: usize>(
+        self,
+        plant: Plant<'_, S, P>,
+    ) -> Result<SweepRecord>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let Self { config, backend, axes } = self;
+        Ok(certificate_sweep(backend, plant, config.seed, config.to_json()?, axes))
+    }
+}
+
+/// The hash of a point, once its settings are checked.
+struct Check<'a> {
+    config: &'a Config,
+    rule: Option<CountRule>,
+    backend: &'a Backend,
+}
+
+impl Job for Check<'_> {
+    type Output = String;
+
+    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<String>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let (settings, config) = counted(self.config, plant.system, self.rule)?;
+        check_settings(&settings)?;
+        Ok(certificate_sha256(self.backend, plant, settings.seed, config))
+    }
+}
+
+/// The certificate of a point.
+struct Certify<'a> {
+    config: &'a Config,
+    rule: Option<CountRule>,
+    backend: &'a Backend,
+    progress: &'a Progress,
+}
+
+impl Job for Certify<'_> {
+    type Output = PointResult;
+
+    fn run<S, P, const NX: usize, const NU: usize>(
+        self,
+        plant: Plant<'_, S, P>,
+    ) -> Result<PointResult>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let (settings, config) = counted(self.config, plant.system, self.rule)?;
+        let point = certificate_point(self.backend, plant, &settings, config, self.progress)?;
+        Ok(PointResult::Certificate(point))
+    }
+}

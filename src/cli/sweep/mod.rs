@@ -1,0 +1,35 @@
+//! The command `sweep`: a grid of settings, raced or certified point by point.
+
+mod axes;
+mod certificate;
+mod grid;
+mod race;
+mod text;
+
+use std::path::PathBuf;
+
+use super::args::{Global, Of, SweepArguments};
+use super::progress::Progress;
+use super::{Outcome, devices, report};
+use crate::error::Result;
+use crate::report::sweep_html;
+
+/// Where the results go unless `--out` says otherwise.
+const DEFAULT_OUT: &str = "reachcast-sweep";
+
+/// Runs the points that are not stored yet and writes the tables and the page of all.
+pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
+    let grid = axes::grid(asked)?;
+    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let progress = Progress::new(global);
+    let backend = devices::open(global)?;
+    let work = (&backend, &progress, out.as_path());
+    let mut store = match asked.of {
+        Of::Race => race::run(global, asked, &grid, work)?,
+        Of::Certificate => certificate::run(global, asked, &grid, work)?,
+    };
+    progress.finish();
+    let files = store.finish(sweep_html)?;
+    report(global, store.record(), || text::text(store.record(), &files))?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,107 @@
+//! A sweep of races: the same starts and noise seeds at every point.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+
+use super::grid::{Grid, Target, Values};
+use crate::backend::Backend;
+use crate::cli::args::{Global, SweepArguments};
+use crate::cli::progress::Progress;
+use crate::cli::race_input::{RaceInput, noise_seeds};
+use crate::config::Overrides;
+use crate::error::{Error, Result};
+use crate::experiment::controller::Name;
+use crate::experiment::run::Experiment;
+use crate::experiment::sweep::Store;
+use crate::experiment::sweep::record::PointResult;
+use crate::scenario::Watch;
+
+/// What every point has.
+struct Sweep<'a> {
+    config: &'a Path,
+    base: Overrides,
+    grid: &'a Grid,
+    backend: &'a Backend,
+    out: &'a Path,
+    starts: Vec<[f32; 12]>,
+    source: String,
+    noise_seeds: Vec<u64>,
+}
+
+/// Races every point that is not stored yet.
+pub(super) fn run(
+    global: &Global,
+    asked: &SweepArguments,
+    grid: &Grid,
+    (backend, progress, out): (&Backend, &Progress, &Path),
+) -> Result<Store> {
+    let base = global.overrides();
+    let input = RaceInput::load(&asked.config, &base)?;
+    let (starts, source) = input.starts(asked.race.starts.as_deref())?;
+    let noise_seeds = noise_seeds(input.config.seed, asked.race.noise_seeds.unwrap_or(1))?;
+    let config = asked.config.as_path();
+    let sweep = Sweep { config, base, grid, backend, out, starts, source, noise_seeds };
+    let points = grid.points();
+    // All of them before the first race: a grid does not end half-way at a value out of range.
+    let hashes =
+        points.iter().map(|values| sweep.checked(values)).collect::<Result<Vec<String>>>()?;
+    let shared = sweep.experiment(&input)?;
+    let record = shared.sweep(grid.records(), points.len() as u64);
+    let mut store = Store::open(out, &shared.sweep_identity(), record)?;
+    let total = points.len();
+    for (i, (values, sha256)) in points.into_iter().zip(hashes).enumerate() {
+        let label = grid.label(i, total, &values);
+        store.point(sha256, values.clone(), || sweep.race(&values, &label, progress))?;
+    }
+    Ok(store)
+}
+
+impl Sweep<'_> {
+    /// The controller of a point.
+    fn controller(&self, values: &Values) -> Result<Name> {
+        let text = self.grid.value(values, &Target::Controller).unwrap_or_default();
+        let known = Name::value_variants().iter().find(|name| name.text() == text);
+        known.copied().ok_or_else(|| Error::invalid("--controllers", format!("no `{text}`")))
+    }
+
+    /// The configuration of a point.
+    fn input(&self, values: &Values) -> Result<RaceInput> {
+        let controller = Some(self.controller(values)?);
+        let overrides = self.grid.overrides(&self.base, values, controller)?;
+        let input = RaceInput::load(self.config, &overrides);
+        input.map_err(|error| self.grid.blamed(error, values))
+    }
+
+    /// The races of a point.
+    fn experiment<'a>(&'a self, input: &'a RaceInput) -> Result<Experiment<'a>> {
+        Ok(Experiment {
+            world: input.world(self.backend)?,
+            names: Vec::new(),
+            starts: self.starts.clone(),
+            source: self.source.clone(),
+            noise_seeds: self.noise_seeds.clone(),
+            config: input.config.to_json()?,
+            folder: self.out.to_owned(),
+        })
+    }
+
+    /// SHA-256 of a point that can be raced.
+    fn checked(&self, values: &Values) -> Result<String> {
+        let name = self.controller(values)?;
+        let input = self.input(values)?;
+        let experiment = self.experiment(&input)?;
+        experiment.check_point(name)?;
+        Ok(experiment.point_sha256(name))
+    }
+
+    /// Races a point.
+    fn race(&self, values: &Values, label: &str, progress: &Progress) -> Result<PointResult> {
+        let name = self.controller(values)?;
+        let input = self.input(values)?;
+        let experiment = self.experiment(&input)?;
+        let races = self.starts.len() * self.noise_seeds.len();
+        progress.begin(label, races as u64 * u64::from(experiment.world.race.steps));
+        experiment.point(name, progress).map(PointResult::Race)
+    }
+}
