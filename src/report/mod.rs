@@ -8,13 +8,17 @@ mod contour;
 mod figure;
 mod figures;
 mod html;
+mod losses;
 mod palette;
 mod plot;
 mod race;
+mod sheet;
+mod shell;
 mod slice;
 mod span;
 mod table;
 mod text;
+mod verdicts;
 mod words;
 
 pub use html::html;
