@@ -10,6 +10,9 @@ use crate::rollout::PairControl;
 use crate::scenario::record::{GrowthOutcome, Record};
 use crate::scenario::settings::Joint;
 
+/// What the footer says of two runs with one seed.
+const SAME: &str = "only the wall time and the threads differ between two runs with the same seed";
+
 /// The report as one HTML document that loads nothing from anywhere.
 ///
 /// It depends on the record alone, so equal records give equal pages byte for byte; only
@@ -27,7 +30,7 @@ pub fn html(record: &Record) -> String {
         header = header(record),
         statements = statements(record),
         numbers = numbers(record),
-        footer = footer(record),
+        footer = shell::footer(&record.provenance, SAME),
     )
 }
 
@@ -153,13 +156,5 @@ fn numbers(record: &Record) -> String {
         table::wide(record),
         table::steps(record),
         shell::configuration(&record.provenance)
-    )
-}
-
-fn footer(record: &Record) -> String {
-    format!(
-        "<footer>Written by reachcast {} from one record; only the wall time and the threads \
-         differ between two runs with the same seed.</footer>\n",
-        escape(&record.provenance.version)
     )
 }

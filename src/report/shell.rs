@@ -52,6 +52,33 @@ pub(super) fn head(title: &str, styles: &str, scripts: Scripts) -> String {
     )
 }
 
+/// An outcome that leads the page.
+pub(super) struct Headline {
+    /// Whose, and of what.
+    pub(super) title: String,
+    /// The outcome.
+    pub(super) value: String,
+    /// What belongs to it, one sentence each.
+    pub(super) details: Vec<String>,
+}
+
+/// The card of a headline.
+pub(super) fn card(headline: &Headline) -> String {
+    let details = headline.details.iter().map(|text| format!("<p>{}</p>", escape(text)));
+    format!(
+        "<section class=\"card claim\"><h2>{}</h2><p class=\"headline\">{}</p>{}</section>\n",
+        escape(&headline.title),
+        escape(&headline.value),
+        details.collect::<String>()
+    )
+}
+
+/// The foot of the page, with what it says of repeated runs.
+pub(super) fn footer(provenance: &Provenance, repeated: &str) -> String {
+    let version = escape(&provenance.version);
+    format!("<footer>Written by reachcast {version} from one record; {repeated}.</footer>\n")
+}
+
 /// The items of a list.
 pub(super) fn items(texts: &[String]) -> String {
     texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()

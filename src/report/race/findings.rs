@@ -3,17 +3,8 @@
 use super::words::{self, points};
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
+use crate::report::shell::Headline;
 use crate::report::text::{count, counted, listed, minus, percent, percents, upper};
-
-/// The outcome of the leading controller under a judge.
-pub(super) struct Headline {
-    /// Who and under which judge.
-    pub(super) title: String,
-    /// The rate.
-    pub(super) rate: String,
-    /// Interval, published rate and ceiling.
-    pub(super) details: Vec<String>,
-}
 
 /// One headline per judge that judged the leading controller.
 pub(super) fn headlines(record: &RaceRecord) -> Vec<Headline> {
@@ -24,7 +15,7 @@ pub(super) fn headlines(record: &RaceRecord) -> Vec<Headline> {
         let judged = words::judged(lead, judge)?;
         Some(Headline {
             title: format!("{} under the {} judge", lead.name, judge.name()),
-            rate: percent(judged.rate),
+            value: percent(judged.rate),
             details: details(record, judged),
         })
     };

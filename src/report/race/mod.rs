@@ -35,25 +35,13 @@ pub fn race_html(record: &RaceRecord) -> String {
         tiers = tiers::figure(record).html(),
         film = film::figure(record).html(),
         numbers = numbers(record),
-        footer = footer(record),
+        footer = shell::footer(&record.provenance, "compute times are stored apart"),
         script = script(record),
     )
 }
 
 fn header(record: &RaceRecord) -> String {
-    let cards: String = findings::headlines(record)
-        .iter()
-        .map(|headline| {
-            let details: String =
-                headline.details.iter().map(|text| format!("<p>{}</p>", escape(text))).collect();
-            format!(
-                "<section class=\"card claim\"><h2>{}</h2><p class=\"headline\">{}</p>{details}\
-                 </section>\n",
-                escape(&headline.title),
-                escape(&headline.rate)
-            )
-        })
-        .collect();
+    let cards: String = findings::headlines(record).iter().map(shell::card).collect();
     format!(
         "<header>\n<p class=\"brand\">Reachcast race study</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">{}</p>\n<p class=\"policy\">Policy: {}</p>\n\
@@ -107,14 +95,6 @@ fn numbers(record: &RaceRecord) -> String {
         table::wide(record),
         table::narrow(record),
         shell::configuration(&record.provenance)
-    )
-}
-
-fn footer(record: &RaceRecord) -> String {
-    format!(
-        "<footer>Written by reachcast {} from one record; compute times are stored apart.\
-         </footer>\n",
-        escape(&record.provenance.version)
     )
 }
 
