@@ -2,6 +2,7 @@
 
 use super::figures;
 use super::palette;
+use super::shell::{self, HATCH, Scripts, items};
 use super::table;
 use super::text::{escape, number, upper};
 use super::words::{self, Verdict};
@@ -9,12 +10,8 @@ use crate::rollout::PairControl;
 use crate::scenario::record::{GrowthOutcome, Record};
 use crate::scenario::settings::Joint;
 
-/// The style of every page.
-pub(super) const STYLE: &str = include_str!("style.css");
-/// The pattern of violated constraints, shared by all figures.
-pub(super) const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
-    <pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
-    <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern></defs></svg>\n";
+/// What the footer says of two runs with one seed.
+const SAME: &str = "only the wall time and the threads differ between two runs with the same seed";
 
 /// The report as one HTML document that loads nothing from anywhere.
 ///
@@ -29,25 +26,11 @@ pub fn html(record: &Record) -> String {
          <div class=\"figures\">\n{value}{certified}{paths}<div class=\"stack\">\n{deviation}{growth}</div>\
          </div></section>\n{numbers}</main>\n{footer}\
          </body>\n</html>\n",
-        head = head(record),
+        head = shell::head(&record.system.name, &palette::rules(), Scripts::None),
         header = header(record),
         statements = statements(record),
         numbers = numbers(record),
-        footer = footer(record),
-    )
-}
-
-fn head(record: &Record) -> String {
-    format!(
-        "<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" \
-         content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n\
-         <title>Reachcast: {}</title>\n<style>\n{STYLE}{}</style>\n</head>\n",
-        escape(&record.system.name),
-        palette::rules()
+        footer = shell::footer(&record.provenance, SAME),
     )
 }
 
@@ -98,9 +81,6 @@ fn card(verdict: &Verdict) -> String {
 }
 
 fn statements(record: &Record) -> String {
-    let items = |texts: &[String]| -> String {
-        texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()
-    };
     format!(
         "<div class=\"words\"><section aria-labelledby=\"claimed\">\
          <h2 id=\"claimed\">What is claimed</h2>\n<ol class=\"statements\">\n{}</ol>\n\
@@ -163,7 +143,6 @@ fn limits(record: &Record) -> Vec<String> {
 }
 
 fn numbers(record: &Record) -> String {
-    let config = serde_json::to_string_pretty(&record.provenance.config).unwrap_or_default();
     format!(
         "<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <p class=\"hint\">Risks and bounds are rounded up, radii down, intervals outwards. The \
@@ -171,20 +150,11 @@ fn numbers(record: &Record) -> String {
          <code>certificate.json</code>.</p>\n\
          {}<div class=\"tables\">\n{}</div>\n{}\
          <details><summary>Deviation bound at each step</summary>\n{}</details>\n\
-         <details><summary>Configuration with every default</summary>\n\
-         <pre tabindex=\"0\">{}</pre></details></section>\n",
+         {}</section>\n",
         table::claims(record),
         table::narrow(record),
         table::wide(record),
         table::steps(record),
-        escape(&config)
-    )
-}
-
-fn footer(record: &Record) -> String {
-    format!(
-        "<footer>Written by reachcast {} from one record; only the wall time and the threads \
-         differ between two runs with the same seed.</footer>\n",
-        escape(&record.provenance.version)
+        shell::configuration(&record.provenance)
     )
 }

@@ -1,4 +1,5 @@
-//! The reports: one self-contained HTML page made from a stored certificate or race record.
+//! The reports: one self-contained HTML page made from the record of a certificate, a race study or a
+//! sweep.
 //!
 //! Figures are written as SVG here rather than with a plot library: `plotters` writes each colour
 //! and text size as a fixed value and its legend into the plot, so that the page could follow
@@ -8,19 +9,22 @@ mod contour;
 mod figure;
 mod figures;
 mod html;
+mod losses;
 mod palette;
 mod plot;
 mod race;
+mod scale;
+mod sheet;
+mod shell;
 mod slice;
+mod sortable;
 mod span;
+mod sweep;
 mod table;
 mod text;
+mod verdicts;
 mod words;
 
 pub use html::html;
 pub use race::race_html;
-
-/// placeholder
-pub fn sweep_html(_r: &crate::experiment::sweep::record::SweepRecord) -> String {
-    String::new()
-}
+pub use sweep::sweep_html;

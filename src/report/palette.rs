@@ -1,4 +1,6 @@
-//! The diverging colour scale of the slice: orange below zero, blue above, for light and dark.
+//! The colour scale of slices and heat maps: orange below zero, blue above, for light and dark.
+
+use super::span::Span;
 
 /// Steps of the scale on each side of zero.
 pub(super) const LEVELS: usize = 16;
@@ -21,6 +23,12 @@ pub(super) fn class(value: f64, limit: f64) -> String {
     let position = (value.abs() / limit).sqrt() * LEVELS as f64;
     let level = (position.ceil() as usize).clamp(1, LEVELS);
     format!("{}{level}", if value > 0.0 { 'p' } else { 'n' })
+}
+
+/// Class of a value between `limits`, in even steps: `p1..`, one hue from light to strong.
+pub(super) fn even(value: f64, limits: Span) -> String {
+    let share = (value - limits.low) / limits.width();
+    format!("p{}", ((share * LEVELS as f64).ceil() as usize).clamp(1, LEVELS))
 }
 
 /// The style rules of the scale, light first, then dark for screens.
@@ -53,7 +61,8 @@ fn mix(stops: Stops, share: f64) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::{LEVELS, class, rules};
+    use super::{LEVELS, class, even, rules};
+    use crate::report::span::Span;
 
     #[test]
     fn the_sign_decides_the_side() {
@@ -64,6 +73,14 @@ mod tests {
         assert_eq!(class(-5.0, 1.0), format!("n{LEVELS}"));
         assert_eq!(class(-1e30, 1.0), "nf");
         assert_eq!(class(f64::NAN, 1.0), "nf");
+    }
+
+    #[test]
+    fn even_steps_end_at_the_limits() {
+        let limits = Span { low: 20.0, high: 36.0 };
+        assert_eq!(even(20.0, limits), "p1");
+        assert_eq!(even(21.5, limits), "p2");
+        assert_eq!(even(36.0, limits), format!("p{LEVELS}"));
     }
 
     #[test]

@@ -36,6 +36,17 @@ pub(super) struct Labels<'a> {
     pub(super) whole: bool,
 }
 
+/// Where ticks stand along an axis, ascending, and what they say.
+pub(super) type Ticks = Vec<(f64, String)>;
+
+/// An axis with ticks of its own, in place of round numbers.
+pub(super) struct Axis {
+    /// What it covers.
+    pub(super) span: Span,
+    /// Its ticks; a label that would touch the one before it is left out.
+    pub(super) ticks: Ticks,
+}
+
 /// A plot under construction.
 pub(super) struct Plot {
     id: String,
@@ -45,6 +56,7 @@ pub(super) struct Plot {
     left: f64,
     width: f64,
     height: f64,
+    ticks: [Option<Ticks>; 2],
     clipped: String,
     marks: String,
     foot: String,
@@ -60,11 +72,7 @@ impl Plot {
     /// An empty plot that is `outer` wide with its labels.
     pub(super) fn across_width(id: &str, x: Span, y: Span, shape: Shape, outer: f64) -> Self {
         let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
-        let room = |y: Span, height: f64| {
-            let (ticks, decimals) = y.ticks(height / 46.0);
-            let longest = ticks.iter().map(|&tick| label(tick, decimals).chars().count());
-            32.0 + CHARACTER * longest.max().unwrap_or(1) as f64
-        };
+        let room = |y: Span, height: f64| room(&round(y, height / 46.0));
         let (mut width, mut height) = (outer - MARGIN - room(y, 400.0), 0.0);
         match shape {
             Shape::Free(fixed) => height = fixed,
@@ -86,11 +94,38 @@ impl Plot {
             left: left + spare.max(0.0) / 2.0,
             width: width + spare.min(0.0),
             height,
+            ticks: [None, None],
             clipped: String::new(),
             marks: String::new(),
             foot: String::new(),
             foot_height: 0.0,
         }
+    }
+
+    /// An empty plot between two axes of their own; `right` is left free beside it.
+    pub(super) fn ticked(id: &str, axes: [Axis; 2], height: f64, [outer, right]: [f64; 2]) -> Self {
+        let [x, y] = axes;
+        let left = room(&y.ticks);
+        let empty = Self::across_width(id, x.span, y.span, Shape::Free(height), outer);
+        let width = outer - MARGIN - right - left;
+        let mut plot = Self { left, width, ..empty };
+        plot.ticks = [Some(plot.thinned(x.ticks)), Some(y.ticks)];
+        plot
+    }
+
+    /// The ticks along x without the labels that would touch the one before.
+    fn thinned(&self, mut ticks: Ticks) -> Ticks {
+        let mut free = f64::NEG_INFINITY;
+        for (tick, text) in &mut ticks {
+            let half = CHARACTER * text.chars().count() as f64 / 2.0;
+            let at = self.across(*tick);
+            if at - half < free {
+                text.clear();
+            } else {
+                free = at + half;
+            }
+        }
+        ticks
     }
 
     /// Where `x` lies across the plot.
@@ -171,6 +206,12 @@ impl Plot {
         self.clipped += &mark;
     }
 
+    /// Puts a mark right of the axes, at a height of the plot.
+    pub(super) fn beside(&mut self, down: f64, drawing: &str) {
+        let (across, down) = (coordinate(self.left + self.width + 6.0), coordinate(down));
+        self.marks += &format!("<g transform=\"translate({across} {down})\">{drawing}</g>");
+    }
+
     fn placed(&self, [x, y]: [f64; 2], drawing: &str) -> String {
         let within = |span: Span, value: f64| {
             let slack = 1e-9 * span.width();
@@ -215,35 +256,30 @@ impl Plot {
     }
 
     fn axes(&self, labels: &Labels) -> String {
-        let bottom = MARGIN + self.height;
-        let parts = (self.width / 52.0).max(1.0);
-        let parts = if labels.whole { parts.min(self.x.width()) } else { parts };
-        let (ticks, decimals) = self.x.ticks(parts.max(1.0));
         let mut axes = String::new();
-        for tick in ticks {
-            let at = coordinate(self.across(tick));
-            let (from, to, base) = (coordinate(MARGIN), coordinate(bottom + 4.0), bottom + 17.0);
-            axes += &format!(
-                "<path class=\"grid\" d=\"M{at} {from}V{to}\"/>\
-                 <text class=\"tick\" x=\"{at}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
-                coordinate(base),
-                label(tick, decimals)
-            );
+        for (tick, text) in self.x_ticks(labels) {
+            let at = self.across(tick);
+            let [line, from, to] = [at, MARGIN, MARGIN + self.height + 4.0].map(coordinate);
+            axes += &format!("<path class=\"grid\" d=\"M{line} {from}V{to}\"/>");
+            axes += &tick_label([at, MARGIN + self.height + 17.0], "middle", &text);
         }
-        let (ticks, decimals) = self.y.ticks((self.height / 46.0).max(1.0));
-        for tick in ticks {
+        for (tick, text) in self.y_ticks() {
             let at = self.down(tick);
-            let (from, to) = (coordinate(self.left - 4.0), coordinate(self.left + self.width));
-            axes += &format!(
-                "<path class=\"grid\" d=\"M{from} {}H{to}\"/>\
-                 <text class=\"tick\" x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
-                coordinate(at),
-                coordinate(self.left - 7.0),
-                coordinate(at + 4.0),
-                label(tick, decimals)
-            );
+            let [line, from, to] = [at, self.left - 4.0, self.left + self.width].map(coordinate);
+            axes += &format!("<path class=\"grid\" d=\"M{from} {line}H{to}\"/>");
+            axes += &tick_label([self.left - 7.0, at + 4.0], "end", &text);
         }
         axes + &self.names(labels)
+    }
+
+    fn x_ticks(&self, labels: &Labels) -> Ticks {
+        let parts = (self.width / 52.0).max(1.0);
+        let parts = if labels.whole { parts.min(self.x.width()) } else { parts };
+        self.ticks[0].clone().unwrap_or_else(|| round(self.x, parts.max(1.0)))
+    }
+
+    fn y_ticks(&self) -> Ticks {
+        self.ticks[1].clone().unwrap_or_else(|| round(self.y, (self.height / 46.0).max(1.0)))
     }
 
     fn names(&self, labels: &Labels) -> String {
@@ -257,7 +293,7 @@ impl Plot {
         } else {
             String::new()
         };
-        let longest = self.left - 7.0 - self.tick_room();
+        let longest = self.left - 13.0 - CHARACTER * longest(&self.y_ticks());
         format!(
             "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{x}</text>\
              <text class=\"name\" transform=\"translate({} {}) rotate(-90)\" \
@@ -268,17 +304,36 @@ impl Plot {
             coordinate(half)
         )
     }
+}
 
-    /// Room that the labels left of the plot take.
-    fn tick_room(&self) -> f64 {
-        let (ticks, decimals) = self.y.ticks((self.height / 46.0).max(1.0));
-        let longest = ticks.iter().map(|&tick| label(tick, decimals).chars().count());
-        CHARACTER * longest.max().unwrap_or(1) as f64 + 6.0
+/// What stands at a tick; nothing where its label was left out.
+fn tick_label([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
+    if text.is_empty() {
+        return String::new();
     }
+    let (x, y, text) = (coordinate(x), coordinate(y), escape(text));
+    format!("<text class=\"tick\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>")
+}
+
+/// Ticks at round values, about `parts` of them.
+fn round(span: Span, parts: f64) -> Ticks {
+    let (ticks, decimals) = span.ticks(parts);
+    ticks.into_iter().map(|tick| (tick, label(tick, decimals))).collect()
+}
+
+/// Characters of the longest label.
+fn longest(ticks: &Ticks) -> f64 {
+    let lengths = ticks.iter().map(|(_, text)| text.chars().count());
+    lengths.max().unwrap_or(1) as f64
+}
+
+/// Room left of the axes for the labels and the name.
+fn room(ticks: &Ticks) -> f64 {
+    32.0 + CHARACTER * longest(ticks)
 }
 
 /// A tick's value with a true minus sign.
-fn label(tick: f64, decimals: usize) -> String {
+pub(super) fn label(tick: f64, decimals: usize) -> String {
     // Zero comes out of the multiplication with a sign, now and then.
     let tick = if tick.abs() < 1e-12 { 0.0 } else { tick };
     let text = if tick != 0.0 && !(1e-4..1e6).contains(&tick.abs()) {

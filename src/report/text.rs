@@ -85,6 +85,35 @@ pub(super) fn or_dash(value: Option<impl Display>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| value.to_string())
 }
 
+/// A share in percent; the sign stays on the line of its number.
+pub(super) fn percent(share: f64) -> String {
+    format!("{}\u{a0}%", number(100.0 * share))
+}
+
+/// An interval of shares in percent, rounded outwards.
+pub(super) fn percents(shares: [f64; 2]) -> String {
+    format!("{}\u{a0}%", interval(shares.map(|share| 100.0 * share)))
+}
+
+/// A number with true minus signs, after which no line breaks.
+pub(super) fn minus(number: &str) -> String {
+    number.replace('-', "−")
+}
+
+/// `noun` after its count, `nouns` unless there is one.
+pub(super) fn counted(count: usize, noun: &str, nouns: &str) -> String {
+    format!("{count} {}", if count == 1 { noun } else { nouns })
+}
+
+/// `a`, `a and b`, or `a, b and c`.
+pub(super) fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 fn rounded(value: f64, rounding: Rounding) -> String {
     if !ordinary(value) {
         return "not finite".to_owned();

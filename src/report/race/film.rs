@@ -1,13 +1,13 @@
 //! One race in time: a drawing that is stepped through, its controls, and words per moment.
 
 use super::moment::{self, Scene};
-use super::sheet::WIDTH;
-use super::words::{self, counted, listed};
 use crate::experiment::record::{FrameRecord, PictureRecord, RaceRecord};
 use crate::report::figure::{Figure, Swatch, cross, diamond};
 use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::sheet::WIDTH;
 use crate::report::span::Span;
-use crate::report::text::{escape, ordinary};
+use crate::report::text::{counted, escape, listed, ordinary};
+use crate::report::verdicts;
 
 /// Half the gate's width, m.
 const GATE: f64 = 0.3;
@@ -36,8 +36,8 @@ pub(super) fn figure(record: &RaceRecord) -> Figure {
 fn caption(picture: &PictureRecord) -> String {
     let verdicts = picture.verdicts.iter().map(|(judge, verdict)| {
         let verdict = verdict
-            .map_or_else(|| "won".to_owned(), |class| format!("lost ({})", words::class(class)));
-        format!("{verdict} under the {} judge", words::judge(*judge))
+            .map_or_else(|| "won".to_owned(), |class| format!("lost ({})", verdicts::class(class)));
+        format!("{verdict} under the {} judge", judge.name())
     });
     let verdicts: Vec<_> = verdicts.collect();
     let outcome = if verdicts.is_empty() {

@@ -1,19 +1,10 @@
 //! Sentences computed from the record: what was found, and what that does not say.
 
-use super::words::{self, counted, listed, percent, percents, points};
+use super::words::{self, points};
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
-use crate::report::text::{count, upper};
-
-/// The outcome of the leading controller under a judge.
-pub(super) struct Headline {
-    /// Who and under which judge.
-    pub(super) title: String,
-    /// The rate.
-    pub(super) rate: String,
-    /// Interval, published rate and ceiling.
-    pub(super) details: Vec<String>,
-}
+use crate::report::shell::Headline;
+use crate::report::text::{count, counted, listed, minus, percent, percents, upper};
 
 /// One headline per judge that judged the leading controller.
 pub(super) fn headlines(record: &RaceRecord) -> Vec<Headline> {
@@ -23,8 +14,8 @@ pub(super) fn headlines(record: &RaceRecord) -> Vec<Headline> {
     let headline = |judge| {
         let judged = words::judged(lead, judge)?;
         Some(Headline {
-            title: format!("{} under the {} judge", lead.name, words::judge(judge)),
-            rate: percent(judged.rate),
+            title: format!("{} under the {} judge", lead.name, judge.name()),
+            value: percent(judged.rate),
             details: details(record, judged),
         })
     };
@@ -90,7 +81,7 @@ fn published(record: &RaceRecord, judge: Judge) -> Option<String> {
     .into_iter()
     .flatten()
     .collect();
-    let judge = words::judge(judge);
+    let judge = judge.name();
     (!parts.is_empty())
         .then(|| format!("Under the {judge} judge the published rate lies {}.", parts.join("; ")))
 }
@@ -106,11 +97,11 @@ fn runner_up(record: &RaceRecord, judge: Judge) -> Option<String> {
              p\u{a0}=\u{a0}{})",
             points(paired.difference),
             words::point_interval(paired.interval),
-            words::minus(&upper(paired.p_value))
+            minus(&upper(paired.p_value))
         )
     });
     let rate = percent(judged.rate);
-    let judge = words::judge(judge);
+    let judge = judge.name();
     Some(format!(
         "The best of the others under the {judge} judge is {}: {rate}{paired}.",
         best.name

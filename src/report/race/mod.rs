@@ -4,34 +4,18 @@ mod failures;
 mod film;
 mod findings;
 mod moment;
-mod sheet;
 mod success;
 mod table;
 mod tiers;
 mod words;
 
-use super::html::{HATCH, STYLE};
-use super::text::{count, escape};
+use super::shell::{self, HATCH, SHEET_STYLE, Scripts, WEAVES, items};
+use super::text::{count, counted, escape, listed};
 use crate::experiment::record::RaceRecord;
-use words::{counted, listed};
 
 const RACE_STYLE: &str = include_str!("race.css");
 /// Steps through the moments of the race that is shown.
 const SCRIPT: &str = include_str!("race.js");
-/// The patterns that tell classes and tiers apart without colour.
-const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
-    <pattern id=\"rising\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
-    <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern>\
-    <pattern id=\"falling\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
-    <path d=\"M-1.5 4.5L1.5 7.5M0 0L6 6M4.5-1.5L7.5 1.5\"/></pattern>\
-    <pattern id=\"level\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\">\
-    <path d=\"M0 2.5H5\"/></pattern>\
-    <pattern id=\"upright\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\">\
-    <path d=\"M2.5 0V5\"/></pattern>\
-    <pattern id=\"dotted\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
-    <circle cx=\"1.5\" cy=\"1.5\" r=\"1\"/><circle cx=\"4.5\" cy=\"4.5\" r=\"1\"/></pattern>\
-    </defs></svg>\n";
-
 /// The report of a race experiment as one HTML document that loads nothing from anywhere.
 ///
 /// It depends on the record alone, so equal records give equal pages byte for byte. One inline
@@ -43,7 +27,7 @@ pub fn race_html(record: &RaceRecord) -> String {
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
          <div class=\"gallery\">\n{success}{failures}{tiers}{film}</div></section>\n\
          {numbers}</main>\n{footer}{script}</body>\n</html>\n",
-        head = head(),
+        head = shell::head("race study", &format!("{SHEET_STYLE}{RACE_STYLE}"), Scripts::Own),
         header = header(record),
         statements = statements(record),
         success = success::figure(record).html(),
@@ -51,37 +35,13 @@ pub fn race_html(record: &RaceRecord) -> String {
         tiers = tiers::figure(record).html(),
         film = film::figure(record).html(),
         numbers = numbers(record),
-        footer = footer(record),
+        footer = shell::footer(&record.provenance, "compute times are stored apart"),
         script = script(record),
     )
 }
 
-fn head() -> String {
-    format!(
-        "<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
-         style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n\
-         <title>Reachcast: race study</title>\n<style>\n{STYLE}{RACE_STYLE}</style>\n</head>\n"
-    )
-}
-
 fn header(record: &RaceRecord) -> String {
-    let cards: String = findings::headlines(record)
-        .iter()
-        .map(|headline| {
-            let details: String =
-                headline.details.iter().map(|text| format!("<p>{}</p>", escape(text))).collect();
-            format!(
-                "<section class=\"card claim\"><h2>{}</h2><p class=\"headline\">{}</p>{details}\
-                 </section>\n",
-                escape(&headline.title),
-                escape(&headline.rate)
-            )
-        })
-        .collect();
+    let cards: String = findings::headlines(record).iter().map(shell::card).collect();
     format!(
         "<header>\n<p class=\"brand\">Reachcast race study</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">{}</p>\n<p class=\"policy\">Policy: {}</p>\n\
@@ -107,10 +67,6 @@ fn setting(record: &RaceRecord) -> String {
     format!("Starts: {}. Every controller flew all of them with {seeds}.", record.starts.source)
 }
 
-fn items(texts: &[String]) -> String {
-    texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()
-}
-
 fn statements(record: &RaceRecord) -> String {
     let described = record.controllers.iter().map(|controller| {
         let [name, description] = [&controller.name, &controller.description].map(|s| escape(s));
@@ -130,25 +86,15 @@ fn statements(record: &RaceRecord) -> String {
 }
 
 fn numbers(record: &RaceRecord) -> String {
-    let config = serde_json::to_string_pretty(&record.provenance.config).unwrap_or_default();
     format!(
         "<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <p class=\"hint\">Intervals are rounded outwards, betas and p-values up. Every digit is \
          in <code>results.json</code>.</p>\n\
          {}<div class=\"tables\">\n{}</div>\n\
-         <details><summary>Configuration with every default</summary>\n\
-         <pre tabindex=\"0\">{}</pre></details></section>\n",
+         {}</section>\n",
         table::wide(record),
         table::narrow(record),
-        escape(&config)
-    )
-}
-
-fn footer(record: &RaceRecord) -> String {
-    format!(
-        "<footer>Written by reachcast {} from one record; compute times are stored apart.\
-         </footer>\n",
-        escape(&record.provenance.version)
+        shell::configuration(&record.provenance)
     )
 }
 

@@ -1,9 +1,9 @@
 //! One moment of the race: what is drawn, and what is said.
 
-use super::words::{self, counted};
+use super::words;
 use crate::experiment::record::{FrameRecord, PictureRecord, RaceRecord};
 use crate::report::plot::{Plot, coordinate};
-use crate::report::text::{escape, lower, number, ordinary};
+use crate::report::text::{counted, escape, lower, minus, number, ordinary};
 
 /// The opponent.
 pub(super) const OPPONENT: &str =
@@ -240,7 +240,7 @@ fn dash() -> String {
 fn check(frame: &FrameRecord) -> String {
     frame.check_margin.map_or_else(dash, |margin| {
         let meaning = if margin > 0.0 { "certified" } else { "not certified" };
-        format!("{}, {meaning}", words::minus(&number(margin.into())))
+        format!("{}, {meaning}", minus(&number(margin.into())))
     })
 }
 

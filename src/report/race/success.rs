@@ -1,11 +1,12 @@
 //! Success rates: a bar per controller, the published rate beside it, the ceiling as a line.
 
-use super::sheet::{Anchor, Sheet, WIDTH, panels};
-use super::words::{self, percent, percents};
+use super::words;
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, PublishedRecord, RaceRecord};
 use crate::report::figure::{Figure, Swatch};
-use crate::report::text::{ordinary, shorten};
+use crate::report::sheet::{Anchor, Sheet, WIDTH, panels};
+use crate::report::text::{ordinary, percent, percents, shorten};
+use crate::report::verdicts;
 
 /// Left end of the scale.
 const LEFT: f64 = 8.0;
@@ -26,7 +27,7 @@ pub(super) fn figure(record: &RaceRecord) -> Figure {
     let drawn: Vec<_> = judges
         .iter()
         .filter(|&&judge| words::verdicts(record, judge).next().is_some())
-        .map(|&judge| (format!("{} judge", words::judge(judge)), panel(record, judge)))
+        .map(|&judge| (format!("{} judge", judge.name()), panel(record, judge)))
         .collect();
     Figure {
         id: "figure-success",
@@ -77,7 +78,7 @@ fn caption(record: &RaceRecord, judges: &[Judge]) -> String {
         let ceiling = words::ceiling(record, judge).map_or_else(String::new, |(_, share)| {
             format!(", under which at most {} of the races can be won", percent(share))
         });
-        format!("The {} judge applies {}{ceiling}.", words::judge(judge), words::rules(judge))
+        format!("The {} judge applies {}{ceiling}.", judge.name(), verdicts::rules(judge))
     });
     rules.collect::<Vec<_>>().join(" ")
 }
@@ -101,7 +102,7 @@ fn panel(record: &RaceRecord, judge: Judge) -> String {
         top += height;
     }
     scale(&mut sheet, top);
-    let description = format!("Success rates under the {} judge", words::judge(judge));
+    let description = format!("Success rates under the {} judge", judge.name());
     sheet.finish(top + 22.0, &description)
 }
 

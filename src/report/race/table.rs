@@ -1,13 +1,14 @@
 //! The tables of the race page: every number of the record but the moments of the picture.
 
-use super::words::{self, CLASSES, percent, percents, points};
+use super::words::{self, points};
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{
     BoundsRecord, ControllerRecord, FilterRecord, JudgedRecord, MetricsRecord, RaceRecord,
     TierRecord,
 };
 use crate::report::table::{pairs, table};
-use crate::report::text::{count, number, or_dash, upper};
+use crate::report::text::{count, minus, number, or_dash, percent, percents, upper};
+use crate::report::verdicts::{self, CLASSES};
 use crate::scenario::record::ConstantRecord;
 
 /// A table of more than three columns; nothing without a row.
@@ -47,7 +48,7 @@ fn success(record: &RaceRecord, judge: Judge) -> String {
     let body = words::verdicts(record, judge)
         .map(|(controller, judged)| success_row(controller, judged))
         .collect();
-    rows(&format!("Races won under the {} judge", words::judge(judge)), &head, body)
+    rows(&format!("Races won under the {} judge", judge.name()), &head, body)
 }
 
 /// The paired comparisons with the hybrid on the same starts.
@@ -68,11 +69,11 @@ fn compared(record: &RaceRecord, judge: Judge) -> String {
             words::point_interval(paired.interval),
             count(paired.only_this),
             count(paired.only_other),
-            words::minus(&upper(paired.p_value)),
+            minus(&upper(paired.p_value)),
         ])
     };
     let body = words::verdicts(record, judge).filter_map(row).collect();
-    let title = format!("Compared with the hybrid under the {} judge", words::judge(judge));
+    let title = format!("Compared with the hybrid under the {} judge", judge.name());
     rows(&title, &head, body)
 }
 
@@ -91,17 +92,17 @@ fn success_row(controller: &ControllerRecord, judged: &JudgedRecord) -> Vec<Stri
 }
 
 fn failures(record: &RaceRecord, judge: Judge) -> String {
-    let names = CLASSES.map(words::class);
+    let names = CLASSES.map(verdicts::class);
     let head: Vec<&str> = ["controller"].into_iter().chain(names).chain(["all"]).collect();
     let body = words::verdicts(record, judge).map(|(controller, judged)| {
-        let counts = CLASSES.map(|class| words::failures(judged, class));
+        let counts = CLASSES.map(|class| verdicts::failures(judged, class));
         let name = controller.name.clone();
         let all = counts.iter().sum();
         std::iter::once(name).chain(counts.into_iter().chain([all]).map(count)).collect()
     });
     let title = format!(
         "Races lost under the {} judge, of {} over all seeds",
-        words::judge(judge),
+        judge.name(),
         count(words::races(record))
     );
     rows(&title, &head, body.collect())
@@ -123,7 +124,7 @@ fn metrics(record: &RaceRecord, judge: Judge) -> String {
         Some(std::iter::once(controller.name.clone()).chain(metrics_row(metrics)).collect())
     };
     let body = record.controllers.iter().filter_map(own).collect();
-    let judge = words::judge(judge);
+    let judge = judge.name();
     rows(&format!("Means over successes under the {judge} judge"), &head, body)
 }
 

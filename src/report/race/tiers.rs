@@ -1,10 +1,10 @@
 //! Tiers over time: which share of the races flies in which tier.
 
-use super::sheet::{WIDTH, panels};
 use super::words;
 use crate::experiment::record::{RaceRecord, TierRecord};
 use crate::report::figure::{Figure, Swatch};
 use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::sheet::{WIDTH, panels};
 use crate::report::span::Span;
 
 /// Tiers and the races that are over, from the bottom of the stack.

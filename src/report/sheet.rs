@@ -1,9 +1,9 @@
 //! A small drawing of its own height: texts and areas on a fixed width.
 
-use crate::report::plot::coordinate;
-use crate::report::text::escape;
+use super::plot::coordinate;
+use super::text::escape;
 
-/// Width of every drawing of the page in its own units, about a phone's.
+/// Width of a drawing in its own units, about a phone's.
 pub(super) const WIDTH: f64 = 340.0;
 
 /// Where a text is held.

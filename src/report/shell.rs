@@ -1,0 +1,95 @@
+//! What all pages share: the head of the document, styles, patterns, lists.
+
+use super::text::escape;
+use crate::scenario::record::Provenance;
+
+/// The style of every page.
+const STYLE: &str = include_str!("style.css");
+/// The pattern of violated constraints, shared by all figures.
+pub(super) const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+    <pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern></defs></svg>\n";
+/// The style of panels of small drawings, for the pages that have them.
+pub(super) const SHEET_STYLE: &str = include_str!("sheet.css");
+/// The patterns that tell classes and tiers apart without colour.
+pub(super) const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+    <pattern id=\"rising\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern>\
+    <pattern id=\"falling\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M-1.5 4.5L1.5 7.5M0 0L6 6M4.5-1.5L7.5 1.5\"/></pattern>\
+    <pattern id=\"level\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M0 2.5H5\"/></pattern>\
+    <pattern id=\"upright\" width=\"5\" height=\"5\" patternUnits=\"userSpaceOnUse\">\
+    <path d=\"M2.5 0V5\"/></pattern>\
+    <pattern id=\"dotted\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
+    <circle cx=\"1.5\" cy=\"1.5\" r=\"1\"/><circle cx=\"4.5\" cy=\"4.5\" r=\"1\"/></pattern>\
+    </defs></svg>\n";
+
+/// Which scripts a page allows to run.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Scripts {
+    /// None at all.
+    None,
+    /// Those in the page itself.
+    Own,
+}
+
+/// The head of a document that loads nothing; `styles` follow the style of every page.
+pub(super) fn head(title: &str, styles: &str, scripts: Scripts) -> String {
+    let scripts = match scripts {
+        Scripts::None => "",
+        Scripts::Own => "script-src 'unsafe-inline'; ",
+    };
+    format!(
+        "<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         style-src 'unsafe-inline'; {scripts}img-src data:\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>Reachcast: {}</title>\n<style>\n{STYLE}{styles}</style>\n</head>\n",
+        escape(title)
+    )
+}
+
+/// An outcome that leads the page.
+pub(super) struct Headline {
+    /// Whose, and of what.
+    pub(super) title: String,
+    /// The outcome.
+    pub(super) value: String,
+    /// What belongs to it, one sentence each.
+    pub(super) details: Vec<String>,
+}
+
+/// The card of a headline.
+pub(super) fn card(headline: &Headline) -> String {
+    let details = headline.details.iter().map(|text| format!("<p>{}</p>", escape(text)));
+    format!(
+        "<section class=\"card claim\"><h2>{}</h2><p class=\"headline\">{}</p>{}</section>\n",
+        escape(&headline.title),
+        escape(&headline.value),
+        details.collect::<String>()
+    )
+}
+
+/// The foot of the page, with what it says of repeated runs.
+pub(super) fn footer(provenance: &Provenance, repeated: &str) -> String {
+    let version = escape(&provenance.version);
+    format!("<footer>Written by reachcast {version} from one record; {repeated}.</footer>\n")
+}
+
+/// The items of a list.
+pub(super) fn items(texts: &[String]) -> String {
+    texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()
+}
+
+/// The configuration, folded away.
+pub(super) fn configuration(provenance: &Provenance) -> String {
+    let config = serde_json::to_string_pretty(&provenance.config).unwrap_or_default();
+    format!(
+        "<details><summary>Configuration with every default</summary>\n\
+         <pre tabindex=\"0\">{}</pre></details>",
+        escape(&config)
+    )
+}

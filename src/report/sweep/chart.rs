@@ -1,0 +1,143 @@
+//! A measure of the points along an axis: curves over numbers, rows over words.
+
+use super::curves;
+use super::grid::Grid;
+use super::lines::{self, Layout};
+use super::readings::{Measure, Range};
+use super::rows;
+use crate::report::figure::{Figure, Swatch};
+use crate::report::scale::Scale;
+use crate::report::sheet::panels;
+use crate::report::text::percent;
+
+/// Axes that a figure has room for: across, lines, panels.
+const DEPTH: usize = 3;
+/// Classes of the bands, the narrowest first.
+const BANDS: [&str; 2] = ["band inner", "band outer"];
+
+/// A chart: what it shows, and its scale.
+pub(super) struct Chart<'c, 'g, 'a> {
+    /// The points and how they are laid out.
+    pub(super) layout: &'c Layout<'g, 'a>,
+    /// What is shown of them.
+    pub(super) measure: &'c Measure,
+    /// Its scale, the same for all panels.
+    pub(super) scale: Scale,
+    /// Most that can be reached, as a share.
+    pub(super) ceiling: Option<f64>,
+}
+
+/// The figure of a measure; `ceiling` is the share that cannot be exceeded.
+pub(super) fn figure(grid: &Grid<'_>, measure: &Measure, ceiling: Option<f64>) -> Figure {
+    let layout = Layout::new(grid, DEPTH);
+    let chart =
+        scale(&layout, measure).map(|scale| Chart { layout: &layout, measure, scale, ceiling });
+    Figure {
+        id: measure.id,
+        title: measure.title.to_owned(),
+        legend: chart.as_ref().map_or_else(Vec::new, legend),
+        caption: caption(&layout, measure, chart.as_ref()),
+        drawing: match &chart {
+            Some(chart) => Ok(drawing(chart)),
+            None => Err("Nothing of this was measured.".to_owned()),
+        },
+    }
+}
+
+/// One scale for everything that is shown; `None` without a value.
+fn scale(layout: &Layout<'_, '_>, measure: &Measure) -> Option<Scale> {
+    let mut values = Vec::new();
+    for panel in layout.panel_places() {
+        for line in layout.line_places() {
+            for reading in layout.readings(measure, line, panel).into_iter().flatten() {
+                values.push(reading.value);
+                values.extend(reading.bands.into_iter().flatten());
+            }
+        }
+    }
+    match measure.range {
+        Range::Percent => (!values.is_empty()).then(|| Scale::linear(0.0, 100.0)),
+        Range::FromZero => Scale::from_zero(&values),
+        Range::Log => Scale::log(&values),
+        Range::Fitting => Scale::fitting(&values),
+    }
+}
+
+fn drawing(chart: &Chart<'_, '_, '_>) -> String {
+    let one = |panel: Option<usize>, number: usize| {
+        if chart.over_numbers() {
+            curves::panel(chart, panel, number)
+        } else {
+            rows::panel(chart, panel, number)
+        }
+    };
+    let places = chart.layout.panel_places();
+    if let [None] = places[..] {
+        return one(None, 0);
+    }
+    let drawn = places
+        .into_iter()
+        .flatten()
+        .enumerate()
+        .map(|(number, place)| (chart.layout.panel_title(place), one(Some(place), number)));
+    panels(&drawn.collect::<Vec<_>>())
+}
+
+impl Chart<'_, '_, '_> {
+    /// Whether the axis across is one of numbers.
+    fn over_numbers(&self) -> bool {
+        let axes = &self.layout.slice.grid.axes;
+        self.layout.across.is_some_and(|axis| axes[axis].is_numeric())
+    }
+
+    /// Name of the axis across.
+    pub(super) fn across(&self) -> String {
+        let axes = &self.layout.slice.grid.axes;
+        self.layout.across.map_or_else(String::new, |axis| axes[axis].label())
+    }
+
+    /// What is read out in place of a panel.
+    pub(super) fn description(&self, panel: Option<usize>) -> String {
+        let panel =
+            panel.map_or_else(String::new, |place| format!(", {}", self.layout.panel_title(place)));
+        format!("{} against {}{panel}", self.measure.title, self.across())
+    }
+
+    /// The ceiling in the unit of the measure.
+    pub(super) fn limit(&self) -> Option<f64> {
+        self.ceiling.map(|share| 100.0 * share)
+    }
+}
+
+fn legend(chart: &Chart<'_, '_, '_>) -> Vec<(Swatch, String)> {
+    let joined = chart.over_numbers();
+    let mut legend = chart.layout.legend(|index| match joined {
+        true => Swatch::Marked(lines::class(index), lines::mark(index)),
+        false => Swatch::Mark(lines::mark(index)),
+    });
+    let filled = joined && chart.layout.line_places().len() <= curves::FILLED;
+    for (class, name) in BANDS.iter().zip(chart.measure.bands) {
+        let swatch = match filled {
+            true => Swatch::Area(class),
+            false => {
+                Swatch::Line(if *class == BANDS[0] { "reach inner hue" } else { "reach outer hue" })
+            }
+        };
+        legend.push((swatch, (*name).to_owned()));
+    }
+    if let Some(share) = chart.ceiling {
+        let name = format!("most that can be won: {}", percent(share));
+        legend.push((Swatch::Line("ceiling"), name));
+    }
+    legend
+}
+
+fn caption(
+    layout: &Layout<'_, '_>,
+    measure: &Measure,
+    chart: Option<&Chart<'_, '_, '_>>,
+) -> String {
+    let logarithmic = chart.is_some_and(|chart| chart.scale.is_log());
+    let logarithmic = if logarithmic { " The scale of the values is logarithmic." } else { "" };
+    format!("{}{logarithmic}{}", measure.caption, layout.left_out())
+}

@@ -1,0 +1,123 @@
+//! Success against latency: every point, the Pareto front joined, its knee named.
+
+use super::front::{Candidate, Front};
+use super::grid::Grid;
+use super::lines::{self, Layout};
+use super::readings::{LATENCY, SUCCESS};
+use crate::report::figure::{Figure, Swatch};
+use crate::report::plot::{Labels, Plot};
+use crate::report::scale::Scale;
+use crate::report::text::{escape, percent, shorten};
+
+/// Width and height.
+const SIZE: [f64; 2] = [440.0, 280.0];
+/// Characters of the knee's name in the drawing.
+const NAME: usize = 38;
+/// A point whose line has no colour of its own.
+const REST: &str = "<circle class=\"spot rest\" r=\"3\"/>";
+const KNEE: &str = "<circle class=\"knee\" r=\"8\"/>";
+
+/// The figure; `ceiling` is the share that cannot be exceeded.
+pub(super) fn figure(grid: &Grid<'_>, front: Option<&Front>, ceiling: Option<f64>) -> Figure {
+    Figure {
+        id: "figure-front",
+        title: "Races won against latency".to_owned(),
+        drawing: match front {
+            Some(front) => Ok(drawing(grid, front, ceiling)),
+            None => Err("No point has both a success rate and a latency.".to_owned()),
+        },
+        legend: front.map_or_else(Vec::new, |front| legend(grid, front, ceiling)),
+        caption: front.map_or_else(String::new, |front| caption(grid, front)),
+    }
+}
+
+/// The axis whose values have colours, with the places that have one.
+fn hues(grid: &Grid<'_>) -> Option<(usize, Vec<usize>)> {
+    Layout::new(grid, 2).lines
+}
+
+/// The mark of a point, in the colour of its line.
+fn mark(grid: &Grid<'_>, candidate: &Candidate, hues: Option<&(usize, Vec<usize>)>) -> String {
+    let Some((axis, places)) = hues else {
+        return lines::mark(0);
+    };
+    let place = grid.points[candidate.index].places[*axis];
+    let line = places.iter().position(|&shown| shown == place);
+    line.map_or_else(|| REST.to_owned(), lines::mark)
+}
+
+fn drawing(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> String {
+    let [width, height] = SIZE;
+    let axes = [front.scale.axis(6.0), Scale::linear(0.0, 100.0).axis(height / 46.0)];
+    let mut plot = Plot::ticked("front", axes, height, [width, 0.0]);
+    let at = |candidate: &Candidate| [front.scale.place(candidate.cost), candidate.gain];
+    if let Some(share) = ceiling {
+        let span = front.scale.span();
+        let line = plot.line([span.low, span.high].map(|place| [place, 100.0 * share]));
+        plot.path("ceiling", &line);
+    }
+    let line = plot.line(front.joined.iter().map(at));
+    plot.path("front", &line);
+    let hues = hues(grid);
+    for candidate in &front.candidates {
+        plot.mark(at(candidate), &mark(grid, candidate, hues.as_ref()));
+    }
+    if let Some(knee) = &front.knee {
+        plot.mark(at(knee), KNEE);
+        let late = plot.across(at(knee)[0]) > width / 2.0;
+        let name = shorten(&grid.name(&grid.points[knee.index]), NAME);
+        plot.mark(at(knee), &label(&name, late));
+    }
+    let labels = Labels { x: LATENCY.label, y: SUCCESS.label, whole: false };
+    plot.finish(&labels, "Races won against the latency of a control step")
+}
+
+/// The knee's name below it, toward the middle of the plot.
+fn label(name: &str, late: bool) -> String {
+    let (x, anchor) = if late { (8, "end") } else { (-8, "start") };
+    format!(
+        "<text class=\"knee-name\" x=\"{x}\" y=\"25\" text-anchor=\"{anchor}\">{}</text>",
+        escape(name)
+    )
+}
+
+fn legend(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> Vec<(Swatch, String)> {
+    let layout = Layout::new(grid, 2);
+    let mut legend = layout.legend(|index| Swatch::Mark(lines::mark(index)));
+    if let Some((axis, places)) = &layout.lines
+        && places.len() < grid.axes[*axis].values.len()
+    {
+        legend.push((Swatch::Mark(REST.to_owned()), "other values".to_owned()));
+    }
+    legend.push((Swatch::Line("front"), "Pareto front".to_owned()));
+    if front.knee.is_some() {
+        legend.push((Swatch::Mark(KNEE.to_owned()), "knee of the front".to_owned()));
+    }
+    if let Some(share) = ceiling {
+        legend.push((Swatch::Line("ceiling"), format!("most that can be won: {}", percent(share))));
+    }
+    legend
+}
+
+fn caption(grid: &Grid<'_>, front: &Front) -> String {
+    let logarithm = if front.scale.is_log() { "the logarithm of the latency" } else { "latency" };
+    let knee = match (&front.knee, front.joined.len()) {
+        (Some(knee), _) => format!(
+            "The knee, {}, is the point of the front that lies farthest above the chord between \
+             its two ends, with {logarithm} and the success rate each scaled to [0, 1].",
+            grid.name(&grid.points[knee.index])
+        ),
+        (None, 0 | 1) => {
+            "One point is better than all others in both: the front has no knee.".to_owned()
+        }
+        (None, 2) => "A front of two points has no knee.".to_owned(),
+        (None, _) => format!(
+            "No point of the front lies above the chord between its two ends, with {logarithm} \
+             and the success rate each scaled to [0, 1]: it has no knee."
+        ),
+    };
+    format!(
+        "Every point of the sweep; the front joins those that no other point beats in one and \
+         equals or beats in the other. {knee} Rates and latencies are estimates, and so is the front."
+    )
+}
