@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
@@ -78,7 +79,8 @@ pub struct Layer {
 /// `state_order` (names separated by commas).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mlp {
-    layers: Vec<Layer>,
+    /// Shared by copies of the network.
+    layers: Arc<[Layer]>,
     activation: Activation,
     output: OutputActivation,
     state_order: Option<Vec<String>>,
@@ -95,7 +97,7 @@ impl Mlp {
         activation: Activation,
         output: OutputActivation,
     ) -> Result<Self> {
-        let mlp = Self { layers, activation, output, state_order: None };
+        let mlp = Self { layers: layers.into(), activation, output, state_order: None };
         mlp.validate().map_err(|problem| Error::invalid("network", problem))?;
         Ok(mlp)
     }
@@ -138,7 +140,7 @@ impl Mlp {
         while tensors.tensor(&format!("layers.{}.weight", layers.len())).is_ok() {
             layers.push(read_layer(&tensors, layers.len())?);
         }
-        let mlp = Self { layers, activation, output, state_order };
+        let mlp = Self { layers: layers.into(), activation, output, state_order };
         mlp.validate()?;
         Ok(mlp)
     }
@@ -146,6 +148,12 @@ impl Mlp {
     /// The layers, input side first.
     pub fn layers(&self) -> &[Layer] {
         &self.layers
+    }
+
+    /// Whether `other` is this network or a copy of it, told without a look at its numbers.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let shape = (self.activation, self.output) == (other.activation, other.output);
+        shape && Arc::ptr_eq(&self.layers, &other.layers)
     }
 
     /// Activation of the hidden layers.

@@ -106,7 +106,8 @@ pub(super) fn unit<const N: usize>(words: [u32; N]) -> Lanes<N> {
 }
 
 /// Two independent standard normal numbers from uniforms in `(0, 1]` and `[0, 1)` (Box and
-/// Muller 1958), in + - * / and sqrt alone; recorded for the shaders like physics.
+/// Muller 1958), in + - * / and sqrt alone; recorded for the shaders like physics. In f32 within
+/// 3e-6 of the same two uniforms taken in f64, over all magnitudes that there are.
 #[inline(always)]
 pub fn normal_pair<R: Real>(magnitude: R, turn: R) -> [R; 2] {
     let radius = (R::lit(-2.0) * magnitude.ln_unit()).sqrt();
@@ -331,5 +332,27 @@ impl<const NX: usize> Pairs<'_, NX> {
             *x = *nominal + Lanes::lit(self.radius) * *x;
         }
         [nominal, perturbed]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_are_close_to_those_in_f64() {
+        // A large magnitude is a small radius: from the smallest uniform to 1, and all turns.
+        let grid = |count: u32| (1..=count).map(move |i| i as f32 / count as f32);
+        let magnitudes = grid(2000).chain((0..24).map(|i| (-(i as f32)).exp2()));
+        let mut worst = 0.0_f64;
+        for magnitude in magnitudes {
+            for turn in grid(500).map(|turn| turn - 1.0 / 500.0) {
+                let ours = normal_pair(magnitude, turn);
+                let truth = normal_pair(f64::from(magnitude), f64::from(turn));
+                let error = |i: usize| (f64::from(ours[i]) - truth[i]).abs();
+                worst = worst.max(error(0)).max(error(1));
+            }
+        }
+        assert!(worst < 3e-6, "{worst}");
     }
 }

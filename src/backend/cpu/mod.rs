@@ -11,22 +11,26 @@ mod mlp;
 mod mppi;
 mod mppi_rollout;
 mod mppi_update;
+mod packs;
 mod reach_avoid;
 mod schedule;
 #[cfg(test)]
 mod tests;
 mod tile;
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use self::deviation::Deviation;
 use self::dispatch::Instructions;
 use self::mlp::Packed;
+use self::packs::Packs;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use super::{MeasureSink, PairSink};
 use crate::error::{Error, Result};
-use crate::policy::Policy;
+use crate::policy::{Mlp, Policy};
 use crate::rollout::{
     DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };
@@ -38,6 +42,7 @@ pub struct Cpu {
     pool: rayon::ThreadPool,
     instructions: Instructions,
     model: String,
+    packs: Packs,
 }
 
 impl Cpu {
@@ -65,7 +70,7 @@ impl Cpu {
             .thread_name(|i| format!("rollout-{i}"))
             .build()
             .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
-        Ok(Self { pool, instructions, model: model_name() })
+        Ok(Self { pool, instructions, model: model_name(), packs: Packs::default() })
     }
 
     /// The processor in words: model and instruction set. Not the number of threads: nothing that a
@@ -87,7 +92,7 @@ impl Cpu {
     {
         check(&task.starts, task.range.end, task.tightening, &task.spec)?;
         let network = self.pack::<P, NX, NU>(plant.policy)?;
-        let network = network.as_ref();
+        let network = network.as_deref();
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, network);
@@ -124,7 +129,7 @@ impl Cpu {
     {
         check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
         let network = self.pack::<P, NX, NU>(plant.policy)?;
-        let network = network.as_ref();
+        let network = network.as_deref();
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
@@ -154,12 +159,17 @@ impl Cpu {
     }
 
     /// The network of `policy`, if it is one, packed for the kernel.
-    fn pack<P, const NX: usize, const NU: usize>(&self, policy: &P) -> Result<Option<Packed>>
+    fn pack<P, const NX: usize, const NU: usize>(&self, policy: &P) -> Result<Option<Arc<Packed>>>
     where
         P: Policy<NX, NU>,
     {
         let network = Packed::of::<P, NX, NU>(policy)?;
-        Ok(network.map(|network| Packed::new(network, self.instructions.rows())))
+        Ok(network.map(|network| self.packed(network)))
+    }
+
+    /// `network`, packed for the kernel.
+    fn packed(&self, network: &Mlp) -> Arc<Packed> {
+        self.packs.of(network, self.instructions.rows())
     }
 
     fn schedule(&self, count: usize, network: Option<&Packed>) -> Schedule {

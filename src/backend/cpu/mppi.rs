@@ -3,12 +3,10 @@
 use rayon::prelude::*;
 
 use super::Cpu;
-use super::mlp::Packed;
 use super::mppi_rollout::MppiRollout;
 use crate::backend::softmin::Partial;
 use crate::cost::Cost;
 use crate::error::Result;
-use crate::policy::Mlp;
 use crate::rollout::{CostQuery, MppiResult, MppiTask};
 use crate::system::System;
 
@@ -28,9 +26,8 @@ impl Cpu {
         S: System<NX, NU>,
         C: Cost<NX, NU, NC>,
     {
-        let pack = |network: &Mlp| Packed::new(network, self.instructions.rows());
-        let value = task.value.map(|value| pack(value.network));
-        let disturbance = task.disturbance.map(|disturbance| pack(disturbance.network));
+        let value = task.value.map(|value| self.packed(value.network));
+        let disturbance = task.disturbance.map(|asked| self.packed(asked.network));
         let samples = task.spec.settings().samples;
         let mut costs = match task.costs {
             CostQuery::Summary => Vec::new(),
@@ -46,7 +43,7 @@ impl Cpu {
         let parts: Vec<Partial<NU>> = self.pool.install(|| {
             let units = outs.par_iter_mut().enumerate().map(|(number, out)| {
                 let (problem, samples) = unit_of(number);
-                let networks = [value.as_ref(), disturbance.as_ref()];
+                let networks = [value.as_deref(), disturbance.as_deref()];
                 let costs = out.take();
                 let unit = MppiRollout { system, cost, task, networks, problem, samples, costs };
                 self.instructions.run(unit)

@@ -84,7 +84,7 @@ mod tests {
     use super::{Candidate, knee, undominated};
 
     fn candidates(values: &[[f64; 2]]) -> Vec<Candidate> {
-        let candidate = |(index, &[cost, gain])| Candidate { index, cost, gain };
+        let candidate = |(index, &[cost, gain]): (usize, &[f64; 2])| Candidate { index, cost, gain };
         values.iter().enumerate().map(candidate).collect()
     }
 
