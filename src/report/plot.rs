@@ -113,9 +113,9 @@ impl Plot {
         plot
     }
 
-    /// The ticks along x without the labels that would touch the one before.
+    /// The ticks along x without the labels that would touch the one before, or those along y.
     fn thinned(&self, mut ticks: Ticks) -> Ticks {
-        let mut free = f64::NEG_INFINITY;
+        let mut free = self.left - 7.0;
         for (tick, text) in &mut ticks {
             let half = CHARACTER * text.chars().count() as f64 / 2.0;
             let at = self.across(*tick);

@@ -5,7 +5,7 @@ use super::span::Span;
 use super::text::{minus, number, shorten};
 
 /// Share of an axis that is left free at either end.
-const EDGE: f64 = 0.06;
+const EDGE: f64 = 0.08;
 /// Characters of a tick's label.
 const LABEL: usize = 7;
 
@@ -86,7 +86,7 @@ impl Scale {
             all.filter(|value| (low..=high).contains(value)).collect()
         };
         let enough = |ticks: &Vec<f64>| ticks.len() >= 3;
-        let linear = || Span { low, high }.ticks(4.0).0;
+        let linear = || Span { low, high }.ticks(6.0).0;
         let choices = [among(&[1]), among(&[1, 2, 5])].into_iter();
         choices.into_iter().find(enough).unwrap_or_else(linear)
     }

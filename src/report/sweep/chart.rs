@@ -12,8 +12,8 @@ use crate::report::text::percent;
 
 /// Axes that a figure has room for: across, lines, panels.
 const DEPTH: usize = 3;
-/// Classes of the bands, the narrowest first.
-const BANDS: [&str; 2] = ["band inner", "band outer"];
+/// Classes of the intervals, the narrowest first.
+const REACHES: [&str; 2] = ["reach inner", "reach outer"];
 
 /// A chart: what it shows, and its scale.
 pub(super) struct Chart<'c, 'g, 'a> {
@@ -116,12 +116,10 @@ fn legend(chart: &Chart<'_, '_, '_>) -> Vec<(Swatch, String)> {
         false => Swatch::Mark(lines::mark(index)),
     });
     let filled = joined && chart.layout.line_places().len() <= curves::FILLED;
-    for (class, name) in BANDS.iter().zip(chart.measure.bands) {
-        let swatch = match filled {
-            true => Swatch::Area(class),
-            false => {
-                Swatch::Line(if *class == BANDS[0] { "reach inner hue" } else { "reach outer hue" })
-            }
+    for (class, name) in REACHES.iter().zip(chart.measure.bands) {
+        let swatch = match filled && *class == REACHES[0] {
+            true => Swatch::Area("band"),
+            false => Swatch::Line(class),
         };
         legend.push((swatch, (*name).to_owned()));
     }

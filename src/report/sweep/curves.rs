@@ -15,6 +15,8 @@ pub(super) const FILLED: usize = 3;
 const SIZES: [[f64; 2]; 2] = [[440.0, 280.0], [WIDTH, 210.0]];
 /// Most lines, and characters of each, that are named beside their end.
 const NAMED: [usize; 2] = [5, 9];
+/// Distance of two ticks upwards, about.
+const TICK: f64 = 40.0;
 /// Least distance of two names beside each other.
 const APART: f64 = 14.0;
 /// Shift between the intervals of neighbouring lines.
@@ -29,7 +31,7 @@ pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usi
     let x = across(chart);
     let values: Vec<f64> = numbers(chart);
     let texts = values.iter().zip(texts(chart)).map(|(&value, text)| (value, text));
-    let axes = [x.axis_at(texts), chart.scale.axis(height / 46.0)];
+    let axes = [x.axis_at(texts), chart.scale.axis(height / TICK)];
     let id = format!("{}-{number}", chart.measure.id);
     let mut plot = Plot::ticked(&id, axes, height, [width, right]);
     let mut ends = Vec::new();
@@ -92,10 +94,10 @@ impl Curve<'_, '_, '_> {
     fn draw(&self, plot: &mut Plot) {
         let hue = format!("hue-{}", self.index);
         let filled = self.chart.layout.line_places().len() <= FILLED;
+        if filled {
+            self.fill(plot, &format!("band {hue}"));
+        }
         for (band, class) in ["inner", "outer"].into_iter().enumerate() {
-            if filled {
-                self.fill(plot, band, &format!("band {class} {hue}"));
-            }
             self.reach(plot, band, &format!("reach {class} {hue}"));
         }
         let scale = self.chart.scale;
@@ -109,12 +111,12 @@ impl Curve<'_, '_, '_> {
         }
     }
 
-    /// The band between neighbours that both have one.
-    fn fill(&self, plot: &mut Plot, band: usize, class: &str) {
+    /// The narrowest band between neighbours that both have one.
+    fn fill(&self, plot: &mut Plot, class: &str) {
         let mut data = String::new();
         for pair in self.points.windows(2) {
             let [(x0, left), (x1, right)] = pair else { continue };
-            if let (Some(left), Some(right)) = (self.band(left, band), self.band(right, band)) {
+            if let (Some(left), Some(right)) = (self.band(left, 0), self.band(right, 0)) {
                 let corners = [[*x0, left[0]], [*x1, right[0]], [*x1, right[1]], [*x0, left[1]]];
                 data += &plot.polygon(corners);
             }

@@ -39,17 +39,19 @@ pub(super) fn races(grid: &Grid<'_>, front: Option<&Front>) -> Findings {
         add("Best point", &best, best_of(grid, &best, rated.len()));
     }
     let overlapping: Vec<_> = rated.iter().filter(|one| one.reaches(&best)).collect();
-    if let Some(axis) = grid.samples() {
-        let place = |one: &&&Rated<'_, '_>| one.point.places[axis];
-        let least = overlapping.iter().map(|one| one.point.places[axis]).min();
-        let fewest = overlapping.iter().filter(|one| Some(place(one)) == least);
-        if let Some(one) = fewest.max_by(|a, b| a.judged.rate.total_cmp(&b.judged.rate)) {
-            let name = format!("Fewest samples: {}", grid.axes[axis].value(one.point.places[axis]));
-            add(&name, one, overlap(grid, one, "The fewest samples"));
-        }
-    }
     let fastest = overlapping.iter().min_by(|a, b| a.milliseconds().total_cmp(&b.milliseconds()));
-    if let Some(one) = fastest {
+    let fewest = grid.samples().and_then(|axis| Some((axis, fewest(&overlapping, axis)?)));
+    let is_fastest = |one: &Rated<'_, '_>| fastest.is_some_and(|fast| fast.is(one));
+    if let Some((axis, one)) = fewest {
+        let name = format!("Fewest samples: {}", grid.axes[axis].value(one.point.places[axis]));
+        let also = if is_fastest(one) {
+            "The fewest samples, and the lowest latency,"
+        } else {
+            "The fewest samples"
+        };
+        add(&name, one, overlap(grid, one, also));
+    }
+    if let Some(one) = fastest.filter(|one| fewest.is_none_or(|(_, few)| !few.is(one))) {
         findings.found.push(overlap(grid, one, "The lowest latency"));
     }
     if let Some(knee) = front.and_then(|front| front.knee.as_ref()) {
@@ -62,6 +64,14 @@ pub(super) fn races(grid: &Grid<'_>, front: Option<&Front>) -> Findings {
     findings
 }
 
+/// The highest rate among those with the fewest samples.
+fn fewest<'r, 'p, 'a>(all: &[&'r Rated<'p, 'a>], axis: usize) -> Option<&'r Rated<'p, 'a>> {
+    let place = |one: &&Rated<'_, '_>| one.point.places[axis];
+    let least = all.iter().map(place).min()?;
+    let few = all.iter().filter(|one| place(one) == least);
+    few.copied().max_by(|a, b| a.judged.rate.total_cmp(&b.judged.rate))
+}
+
 /// A point with a verdict.
 struct Rated<'p, 'a> {
     point: &'p Point<'a>,
@@ -72,6 +82,11 @@ impl<'p, 'a> Rated<'p, 'a> {
     fn new(grid: &Grid<'_>, point: &'p Point<'a>) -> Option<Self> {
         let judged = judged(grid.record, point.record)?;
         judged.rate.is_finite().then_some(Self { point, judged })
+    }
+
+    /// Whether both are the same point.
+    fn is(&self, other: &Self) -> bool {
+        self.point.places == other.point.places
     }
 
     /// Median latency, ms.

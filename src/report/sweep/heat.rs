@@ -11,9 +11,9 @@ use crate::report::text::shorten;
 /// Width of the drawing.
 const WIDTH: f64 = 440.0;
 /// Height of a row, at most, and of all rows, at least and at most.
-const HEIGHTS: [f64; 3] = [40.0, 90.0, 330.0];
+const HEIGHTS: [f64; 3] = [44.0, 130.0, 330.0];
 /// Room for the colour bar.
-const FOOT: f64 = 52.0;
+const FOOT: f64 = 62.0;
 /// Height of the colour bar.
 const BAR: f64 = 12.0;
 /// Characters of a value beside a row.
@@ -134,7 +134,7 @@ fn bar(width: f64, limits: Span, label: &str) -> String {
             low + 17.0
         );
     }
-    let (middle, base) = (coordinate(width / 2.0), 4.0 + BAR + 34.0);
+    let (middle, base) = (coordinate(width / 2.0), 4.0 + BAR + 36.0);
     bar + &format!(
         "<text class=\"name\" x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">{label}</text>"
     )

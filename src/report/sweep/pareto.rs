@@ -5,14 +5,17 @@ use super::grid::Grid;
 use super::lines::{self, Layout};
 use super::readings::{LATENCY, SUCCESS};
 use crate::report::figure::{Figure, Swatch};
-use crate::report::plot::{Labels, Plot};
+use crate::report::plot::{Labels, Plot, coordinate};
 use crate::report::scale::Scale;
+use crate::report::span::Span;
 use crate::report::text::{escape, percent, shorten};
 
 /// Width and height.
 const SIZE: [f64; 2] = [440.0, 280.0];
+/// Percent above which a name above the front would meet the ceiling.
+const ROOM: f64 = 78.0;
 /// Characters of the knee's name in the drawing.
-const NAME: usize = 38;
+const NAME: usize = 34;
 /// A point whose line has no colour of its own.
 const REST: &str = "<circle class=\"spot rest\" r=\"3\"/>";
 const KNEE: &str = "<circle class=\"knee\" r=\"8\"/>";
@@ -64,21 +67,35 @@ fn drawing(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> String {
     }
     if let Some(knee) = &front.knee {
         plot.mark(at(knee), KNEE);
-        let late = plot.across(at(knee)[0]) > width / 2.0;
         let name = shorten(&grid.name(&grid.points[knee.index]), NAME);
-        plot.mark(at(knee), &label(&name, late));
+        label(&mut plot, front, at(knee), &format!("knee: {name}"));
     }
     let labels = Labels { x: LATENCY.label, y: SUCCESS.label, whole: false };
     plot.finish(&labels, "Races won against the latency of a control step")
 }
 
-/// The knee's name below it, toward the middle of the plot.
-fn label(name: &str, late: bool) -> String {
-    let (x, anchor) = if late { (8, "end") } else { (-8, "start") };
-    format!(
-        "<text class=\"knee-name\" x=\"{x}\" y=\"25\" text-anchor=\"{anchor}\">{}</text>",
-        escape(name)
-    )
+/// The knee's name with a line to it: above the front, where no point is, if there is room.
+fn label(plot: &mut Plot, front: &Front, [across, up]: [f64; 2], name: &str) {
+    let highest = front.joined.last().map_or(0.0, |best| best.gain);
+    let height = if highest < ROOM { highest + 12.0 } else { 8.0 };
+    let side = if height > up { -1.0 } else { 1.0 };
+    let [from, to] = [up, height].map(|gain| plot.down(gain));
+    let line = format!("M0 {}V{}", coordinate(8.0 * side), coordinate(to - from - 4.0 * side));
+    plot.mark([across, up], &format!("<path class=\"leader\" d=\"{line}\"/>"));
+    // Half the text, at most, fits left and right of the middle.
+    let half = 4.1 * name.chars().count() as f64;
+    let at = plot.across(across);
+    let Span { low, high } = front.scale.span();
+    let [left, right] = [plot.across(low) + half + 4.0, plot.across(high) - half - 4.0];
+    let shift = at.min(right).max(left) - at;
+    plot.mark(
+        [across, height],
+        &format!(
+            "<text class=\"knee-name\" x=\"{}\" y=\"4\" text-anchor=\"middle\">{}</text>",
+            coordinate(shift),
+            escape(name)
+        ),
+    );
 }
 
 fn legend(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> Vec<(Swatch, String)> {
