@@ -361,9 +361,9 @@ fn heat_maps_show_each_cell_with_its_number() {
     let cells = |map: &str| map.matches("class=\"cell ").count() - 16;
     assert_eq!(cells(map), 27);
     assert_eq!(map.matches("class=\"on ").count(), 27);
-    // The colours go from 10 to 90.
-    assert!(map.contains("<text class=\"on p1\" y=\"4.3\" text-anchor=\"middle\">11.1</text>"));
-    assert!(map.contains("<text class=\"on p16\" y=\"4.3\" text-anchor=\"middle\">88.8</text>"));
+    // The colours go from 0 to 100 in sixteen steps.
+    assert!(map.contains("<text class=\"on p2\" y=\"4.3\" text-anchor=\"middle\">11.1</text>"));
+    assert!(map.contains("<text class=\"on p15\" y=\"4.3\" text-anchor=\"middle\">88.8</text>"));
     assert!(!page.contains("not run"));
     record.points.truncate(13);
     let page = sound(&record, "partial");

@@ -174,7 +174,7 @@ fn certificate(point: &Values<'_>) -> CertificatePoint {
     let radius = point.number("radius", 0.1);
     let exact = point.0.contains(&("bound", "exact"));
     let scenarios = if exact { 0 } else { (6.9078 / epsilon * 2.3).ceil() as u64 };
-    let bound = radius * if exact { 3.303 } else { 2.743 + 0.1 * epsilon.ln() * -1.0 };
+    let bound = radius * if exact { 3.303 } else { 2.743 - 0.1 * epsilon.ln() };
     let share = (0.12 - 0.13 * bound).max(0.0);
     let accepted = (20_000.0 * share) as u64;
     let verified = bound < 0.42;

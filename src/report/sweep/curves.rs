@@ -1,7 +1,7 @@
 //! Curves over an axis of numbers, with bands around them.
 
 use super::chart::Chart;
-use super::lines;
+use super::lines::{self, Shown};
 use super::readings::Reading;
 use crate::report::plot::{Labels, Plot};
 use crate::report::scale::Scale;
@@ -19,8 +19,8 @@ const NAMED: [usize; 2] = [5, 9];
 const TICK: f64 = 40.0;
 /// Least distance of two names beside each other.
 const APART: f64 = 14.0;
-/// Shift between the intervals of neighbouring lines.
-const SHIFT: f64 = 3.0;
+/// Shift between neighbouring lines, where their intervals would hide each other.
+const SHIFT: f64 = 2.6;
 
 /// The curves of one panel.
 pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usize) -> String {
@@ -37,8 +37,9 @@ pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usi
     let mut ends = Vec::new();
     for (index, line) in chart.layout.line_places().into_iter().enumerate() {
         let readings = chart.layout.readings(chart.measure, line, panel);
-        let places: Vec<f64> = values.iter().map(|&value| x.place(value)).collect();
-        let curve = Curve { chart, index, points: places.into_iter().zip(readings).collect() };
+        let shift = shift(chart, index) / plot.lengths(1.0)[0];
+        let places = values.iter().map(|&value| x.place(value) + shift);
+        let curve = Curve { chart, index, points: places.zip(readings).collect() };
         curve.draw(&mut plot);
         if let (Some(name), Some(end)) = (names.get(index).cloned().flatten(), curve.end()) {
             ends.push((plot.down(end), index, name));
@@ -72,7 +73,7 @@ fn across(chart: &Chart<'_, '_, '_>) -> Scale {
 
 /// Names of the lines, where they are few and short.
 fn names(chart: &Chart<'_, '_, '_>) -> Vec<Option<String>> {
-    let Some((axis, places)) = &chart.layout.lines else {
+    let Some(Shown { axis, places }) = &chart.layout.lines else {
         return Vec::new();
     };
     let axis = &chart.layout.slice.grid.axes[*axis];
@@ -80,6 +81,13 @@ fn names(chart: &Chart<'_, '_, '_>) -> Vec<Option<String>> {
     let [most, longest] = NAMED;
     let few = names.len() <= most && names.iter().all(|name| name.chars().count() <= longest);
     names.into_iter().map(|name| few.then_some(name)).collect()
+}
+
+/// How far line `index` stands beside its values: nowhere, while the bands are filled.
+fn shift(chart: &Chart<'_, '_, '_>, index: usize) -> f64 {
+    let lines = chart.layout.line_places().len();
+    let middle = (lines - 1) as f64 / 2.0;
+    if lines <= FILLED { 0.0 } else { SHIFT * (index as f64 - middle) }
 }
 
 /// One line of a panel.
@@ -124,17 +132,13 @@ impl Curve<'_, '_, '_> {
         plot.path(class, &data);
     }
 
-    /// Each interval as an upright line; those of several lines stand side by side.
+    /// Each interval as an upright line.
     fn reach(&self, plot: &mut Plot, band: usize, class: &str) {
-        let lines = self.chart.layout.line_places().len();
-        let shift = SHIFT * (self.index as f64 - (lines - 1) as f64 / 2.0);
-        let shift = if lines <= FILLED { 0.0 } else { shift / plot.lengths(1.0)[0] };
-        let mut data = String::new();
-        for (x, reading) in &self.points {
-            if let Some([low, high]) = self.band(reading, band) {
-                data += &plot.line([[x + shift, low], [x + shift, high]]);
-            }
-        }
+        let reaches = self.points.iter().filter_map(|(x, reading)| {
+            let [low, high] = self.band(reading, band)?;
+            Some(plot.line([[*x, low], [*x, high]]))
+        });
+        let data: String = reaches.collect();
         plot.path(class, &data);
     }
 
@@ -144,10 +148,10 @@ impl Curve<'_, '_, '_> {
         Some(band.map(|end| self.chart.scale.place(end)))
     }
 
-    /// The place of the last value.
+    /// The place of the last value, if the line goes that far.
     fn end(&self) -> Option<f64> {
-        let last = self.points.iter().rev().find_map(|(_, reading)| reading.as_ref())?;
-        Some(self.chart.scale.place(last.value))
+        let (_, last) = self.points.last()?;
+        last.as_ref().map(|last| self.chart.scale.place(last.value))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::front::{Candidate, Front};
 use super::grid::Grid;
-use super::lines::{self, Layout};
+use super::lines::{self, Layout, Shown};
 use super::readings::{LATENCY, SUCCESS};
 use crate::report::figure::{Figure, Swatch};
 use crate::report::plot::{Labels, Plot, coordinate};
@@ -34,17 +34,12 @@ pub(super) fn figure(grid: &Grid<'_>, front: Option<&Front>, ceiling: Option<f64
     }
 }
 
-/// The axis whose values have colours, with the places that have one.
-fn hues(grid: &Grid<'_>) -> Option<(usize, Vec<usize>)> {
-    Layout::new(grid, 2).lines
-}
-
 /// The mark of a point, in the colour of its line.
-fn mark(grid: &Grid<'_>, candidate: &Candidate, hues: Option<&(usize, Vec<usize>)>) -> String {
-    let Some((axis, places)) = hues else {
+fn mark(layout: &Layout<'_, '_>, candidate: &Candidate) -> String {
+    let Some(Shown { axis, places }) = &layout.lines else {
         return lines::mark(0);
     };
-    let place = grid.points[candidate.index].places[*axis];
+    let place = layout.slice.grid.points[candidate.index].places[*axis];
     let line = places.iter().position(|&shown| shown == place);
     line.map_or_else(|| REST.to_owned(), lines::mark)
 }
@@ -61,9 +56,9 @@ fn drawing(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> String {
     }
     let line = plot.line(front.joined.iter().map(at));
     plot.path("front", &line);
-    let hues = hues(grid);
+    let layout = Layout::new(grid, 2);
     for candidate in &front.candidates {
-        plot.mark(at(candidate), &mark(grid, candidate, hues.as_ref()));
+        plot.mark(at(candidate), &mark(&layout, candidate));
     }
     if let Some(knee) = &front.knee {
         plot.mark(at(knee), KNEE);
@@ -101,7 +96,7 @@ fn label(plot: &mut Plot, front: &Front, [across, up]: [f64; 2], name: &str) {
 fn legend(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> Vec<(Swatch, String)> {
     let layout = Layout::new(grid, 2);
     let mut legend = layout.legend(|index| Swatch::Mark(lines::mark(index)));
-    if let Some((axis, places)) = &layout.lines
+    if let Some(Shown { axis, places }) = &layout.lines
         && places.len() < grid.axes[*axis].values.len()
     {
         legend.push((Swatch::Mark(REST.to_owned()), "other values".to_owned()));
