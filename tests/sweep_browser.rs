@@ -35,6 +35,22 @@ fn sweeps_of_races_fit_every_width_in_both_schemes() {
     check(&[sweeps::races(), partial, long], 7);
 }
 
+/// More lines than colours, more rows and columns than labels.
+#[test]
+fn long_axes_fit_every_width_in_both_schemes() {
+    if !browser() {
+        return;
+    }
+    let values: Vec<String> = (1..=40).map(|value| (25 * value).to_string()).collect();
+    let values: Vec<&str> = values.iter().map(String::as_str).collect();
+    let long: sweeps::Axes<'_> = &[("samples", &["16", "64"]), ("horizon", &values)];
+    // Success, latency, front, heat map, six panels of failures.
+    check(&[sweeps::race_grid(long)], 10);
+    let wide: sweeps::Axes<'_> = &[("samples", &values), ("sigma", &["0.1", "0.2"])];
+    // Too many bars to read.
+    check(&[sweeps::race_grid(wide)], 4);
+}
+
 #[test]
 fn grids_of_words_and_of_many_axes_fit_every_width() {
     if !browser() {

@@ -281,7 +281,7 @@ fn fronts_of_few_points_have_no_knee() {
         assert!(figure(&page, "figure-front").contains(text), "{text}");
         assert!(!page.contains("class=\"knee") && !page.contains("Knee of the front"));
     };
-    without(1, "One point is better than all others in both: the front has no knee.");
+    without(1, "The front is a single point and has no knee.");
     without(2, "A front of two points has no knee.");
     let mut straight = known();
     straight.points.truncate(3);

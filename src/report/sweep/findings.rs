@@ -34,7 +34,8 @@ pub(super) fn races(grid: &Grid<'_>, front: Option<&Front>) -> Findings {
         );
         return findings;
     }
-    findings.add(best.headline(grid, "Best point"), best_of(grid, &best, all.len()));
+    let title = if all.len() == 1 { "The one point" } else { "Best point" };
+    findings.add(best.headline(grid, title), best_of(grid, &best, all.len()));
     if all.len() > 1 {
         let overlapping: Vec<_> = all.iter().filter(|one| one.reaches(&best)).collect();
         overlaps(grid, &overlapping, &mut findings);

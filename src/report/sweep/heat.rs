@@ -23,7 +23,7 @@ const NAME: usize = 8;
 /// Characters of a name in the title.
 const TITLE: usize = 40;
 /// Width of a character, at most, and least height of a cell with a number in it.
-const TEXT: [f64; 2] = [7.4, 15.0];
+const TEXT: [f64; 2] = [7.4, 16.2];
 
 /// The figure, for a grid with two numeric parameters of at least two values each.
 pub(super) fn figure(grid: &Grid<'_>, measure: &Measure) -> Option<Figure> {

@@ -119,9 +119,7 @@ fn caption(grid: &Grid<'_>, front: &Front) -> String {
              its two ends, with {logarithm} and the success rate each scaled to [0, 1].",
             grid.name(&grid.points[knee.index])
         ),
-        (None, 0 | 1) => {
-            "One point is better than all others in both: the front has no knee.".to_owned()
-        }
+        (None, 0 | 1) => "The front is a single point and has no knee.".to_owned(),
         (None, 2) => "A front of two points has no knee.".to_owned(),
         (None, _) => format!(
             "No point of the front lies above the chord between its two ends, with {logarithm} \
