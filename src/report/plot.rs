@@ -288,7 +288,7 @@ impl Plot {
         } else {
             String::new()
         };
-        let longest = self.left - 13.0 - CHARACTER * longest(&self.y_ticks());
+        let longest = self.left - 15.0 - CHARACTER * longest(&self.y_ticks());
         format!(
             "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{x}</text>\
              <text class=\"name\" transform=\"translate({} {}) rotate(-90)\" \

@@ -7,7 +7,7 @@ use crate::report::plot::{Labels, Plot};
 use crate::report::scale::Scale;
 use crate::report::sheet::WIDTH;
 use crate::report::span::Span;
-use crate::report::text::{escape, shorten};
+use crate::report::text::escape;
 
 /// Most lines whose bands are filled; those of more would hide each other.
 pub(super) const FILLED: usize = 3;
@@ -24,63 +24,57 @@ const SHIFT: f64 = 2.6;
 
 /// The curves of one panel.
 pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usize) -> String {
-    let names = names(chart);
-    let longest = names.iter().flatten().map(|name| name.chars().count()).max();
+    let (names, values) = (names(chart), values(chart));
+    let longest = names.iter().map(|name| name.chars().count()).max();
     let right = longest.map_or(0.0, |longest| 4.0 + 7.6 * longest as f64);
     let [width, height] = SIZES[usize::from(panel.is_some())];
-    let x = across(chart);
-    let values: Vec<f64> = numbers(chart);
-    let texts = values.iter().zip(texts(chart)).map(|(&value, text)| (value, text));
-    let axes = [x.axis_at(texts), chart.scale.axis(height / TICK)];
+    let x = across(&values);
+    let axes = [x.axis_at(values.clone()), chart.scale.axis(height / TICK)];
     let id = format!("{}-{number}", chart.measure.id);
     let mut plot = Plot::ticked(&id, axes, height, [width, right]);
     let mut ends = Vec::new();
     for (index, line) in chart.layout.line_places().into_iter().enumerate() {
         let readings = chart.layout.readings(chart.measure, line, panel);
         let shift = shift(chart, index) / plot.lengths(1.0)[0];
-        let places = values.iter().map(|&value| x.place(value) + shift);
+        let places = values.iter().map(|(value, _)| x.place(*value) + shift);
         let curve = Curve { chart, index, points: places.zip(readings).collect() };
         curve.draw(&mut plot);
-        if let (Some(name), Some(end)) = (names.get(index).cloned().flatten(), curve.end()) {
-            ends.push((plot.down(end), index, name));
+        if let (Some(name), Some(end)) = (names.get(index), curve.end()) {
+            ends.push((plot.down(end), index, name.as_str()));
         }
     }
-    ceiling(chart, &mut plot);
+    ceiling(chart, &mut plot, x.span());
     beside(&mut plot, ends, height);
     let (across, description) = (chart.across(), chart.description(panel));
     let labels = Labels { x: &across, y: chart.measure.label, whole: false };
     plot.finish(&labels, &description)
 }
 
-/// The values across.
-fn numbers(chart: &Chart<'_, '_, '_>) -> Vec<f64> {
+/// The values across, with their texts.
+fn values(chart: &Chart<'_, '_, '_>) -> Vec<(f64, String)> {
     let axes = &chart.layout.slice.grid.axes;
     let values = chart.layout.across.map_or(&[][..], |axis| &axes[axis].values);
-    values.iter().filter_map(|(_, number)| *number).collect()
-}
-
-/// The values across, as they were given.
-fn texts(chart: &Chart<'_, '_, '_>) -> Vec<String> {
-    let axes = &chart.layout.slice.grid.axes;
-    let values = chart.layout.across.map_or(&[][..], |axis| &axes[axis].values);
-    values.iter().map(|(text, _)| (*text).to_owned()).collect()
+    values.iter().filter_map(|(text, number)| Some(((*number)?, (*text).to_owned()))).collect()
 }
 
 /// The scale across: of all values of the axis.
-fn across(chart: &Chart<'_, '_, '_>) -> Scale {
-    Scale::fitting(&numbers(chart)).unwrap_or(Scale::linear(0.0, 1.0))
+fn across(values: &[(f64, String)]) -> Scale {
+    let numbers: Vec<f64> = values.iter().map(|(number, _)| *number).collect();
+    Scale::fitting(&numbers).unwrap_or(Scale::linear(0.0, 1.0))
 }
 
-/// Names of the lines, where they are few and short.
-fn names(chart: &Chart<'_, '_, '_>) -> Vec<Option<String>> {
+/// Names of the lines, where they are few and short; else none.
+fn names(chart: &Chart<'_, '_, '_>) -> Vec<String> {
     let Some(Shown { axis, places }) = &chart.layout.lines else {
         return Vec::new();
     };
     let axis = &chart.layout.slice.grid.axes[*axis];
-    let names: Vec<_> = places.iter().map(|&place| axis.value(place)).collect();
+    let mut names: Vec<_> = places.iter().map(|&place| axis.value(place)).collect();
     let [most, longest] = NAMED;
-    let few = names.len() <= most && names.iter().all(|name| name.chars().count() <= longest);
-    names.into_iter().map(|name| few.then_some(name)).collect()
+    if names.len() > most || names.iter().any(|name| name.chars().count() > longest) {
+        names.clear();
+    }
+    names
 }
 
 /// How far line `index` stands beside its values: nowhere, while the bands are filled.
@@ -155,17 +149,16 @@ impl Curve<'_, '_, '_> {
     }
 }
 
-fn ceiling(chart: &Chart<'_, '_, '_>, plot: &mut Plot) {
+fn ceiling(chart: &Chart<'_, '_, '_>, plot: &mut Plot, Span { low, high }: Span) {
     if let Some(limit) = chart.limit() {
         let place = chart.scale.place(limit);
-        let Span { low, high } = across(chart).span();
         let line = plot.line([[low, place], [high, place]]);
         plot.path("ceiling", &line);
     }
 }
 
 /// Names beside the ends of their lines, apart from each other.
-fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, String)>, height: f64) {
+fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, &str)>, height: f64) {
     ends.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
     let mut free = f64::NEG_INFINITY;
     for (down, ..) in &mut ends {
@@ -178,7 +171,7 @@ fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, String)>, height: f64) {
         free = *down - APART;
     }
     for (down, index, name) in ends {
-        let name = escape(&shorten(&name, NAMED[1]));
+        let name = escape(name);
         plot.beside(down + 4.0, &format!("<text class=\"end hue-{index}\">{name}</text>"));
     }
 }
