@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-#[path = "sweeps/mod.rs"]
-mod sweeps;
+#[path = "sweep_run/mod.rs"]
+mod sweep_run;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -16,7 +16,7 @@ use reachcast::experiment::record::RaceRecord;
 use reachcast::experiment::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
 use reachcast::scenario::bound::{required_scenarios, simple_scenarios};
 use reachcast::scenario::record::{GrowthOutcome, Record};
-use sweeps::{CONFIG, Folder, command, done, message_of, record, sweep};
+use sweep_run::{CONFIG, Folder, command, done, message_of, record, sweep};
 
 /// Columns that are measured anew.
 const TIMED: [&str; 5] = ["step_ms_median", "step_ms_p95", "step_ms_p99", "batch_ms", "seconds"];
@@ -85,8 +85,8 @@ fn a_point_is_what_race_flies() {
         };
         let set: Vec<String> =
             sections.iter().map(|section| format!("--set={section}.samples={samples}")).collect();
-        let mut arguments = vec!["race", CONFIG, "--starts", sweeps::STARTS, "--noise-seeds", "2"];
-        arguments.extend(["--set", sweeps::STEPS, "--controllers", name]);
+        let mut arguments = vec!["race", CONFIG, "--starts", sweep_run::STARTS, "--noise-seeds", "2"];
+        arguments.extend(["--set", sweep_run::STEPS, "--controllers", name]);
         arguments.extend(set.iter().map(String::as_str));
         let text = printed(&arguments, &folder.path(&format!("race{i}")));
         let race: RaceRecord = serde_json::from_str(&text).unwrap();

@@ -2,19 +2,19 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-#[path = "sweeps/mod.rs"]
-mod sweeps;
+#[path = "sweep_run/mod.rs"]
+mod sweep_run;
 
 use std::path::Path;
 
-use sweeps::{Folder, command, done, message_of, sweep, sweep_of};
+use sweep_run::{Folder, command, done, message_of, sweep, sweep_of};
 
 /// Expects exit code 2, nothing on standard output, no folder, and `words` in the message.
 fn refused_by(config: &str, arguments: &[&str], words: &[&str]) {
     let folder = Folder::new();
     let out = folder.path("out");
     let mut command = match config {
-        sweeps::CONFIG if !arguments.contains(&"certificate") => command(&out, arguments),
+        sweep_run::CONFIG if !arguments.contains(&"certificate") => command(&out, arguments),
         _ => sweep_of(config, &out, arguments),
     };
     let output = command.args(["--backend", "cpu", "--json"]).output().unwrap();
@@ -26,7 +26,7 @@ fn refused_by(config: &str, arguments: &[&str], words: &[&str]) {
 }
 
 fn refused(arguments: &[&str], words: &[&str]) {
-    refused_by(sweeps::CONFIG, arguments, words);
+    refused_by(sweep_run::CONFIG, arguments, words);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn too_many_points() {
 /// Expects that the sweep refuses what is in `out`.
 fn occupied(out: &Path, config: &str, arguments: &[&str], words: &[&str]) {
     let mut command = match config {
-        sweeps::CONFIG => command(out, arguments),
+        sweep_run::CONFIG => command(out, arguments),
         _ => sweep_of(config, out, arguments),
     };
     let message = message_of(&command.args(["--backend", "cpu"]).output().unwrap(), 2);
@@ -136,7 +136,7 @@ fn a_folder_with_something_else_in_it() {
     sweep(&out, &["--samples", "8,16"]);
     let table = std::fs::read(out.join("sweep.csv")).unwrap();
     let words = ["experiment.json", "another experiment", "--out", "remove"];
-    let refuse = |arguments: &[&str]| occupied(&out, sweeps::CONFIG, arguments, &words);
+    let refuse = |arguments: &[&str]| occupied(&out, sweep_run::CONFIG, arguments, &words);
     refuse(&["--horizon", "5,10"]);
     refuse(&["--samples", "8,16", "--seed", "2"]);
     refuse(&["--samples", "8,16", "--noise-seeds", "2"]);
@@ -148,13 +148,13 @@ fn a_folder_with_something_else_in_it() {
     let other = folder.path("certificates");
     let of = ["--of", "certificate", "--set", "global.draws=500", "--radius", "0.01,0.02"];
     done(integrator, &other, &of);
-    occupied(&other, sweeps::CONFIG, &["--samples", "8,16"], &words);
+    occupied(&other, sweep_run::CONFIG, &["--samples", "8,16"], &words);
 
     let page = folder.path("page");
     std::fs::create_dir(&page).unwrap();
     std::fs::write(page.join("report.html"), "a report").unwrap();
     let words = ["report.html", "something else", "--out"];
-    occupied(&page, sweeps::CONFIG, &["--samples", "8,16"], &words);
+    occupied(&page, sweep_run::CONFIG, &["--samples", "8,16"], &words);
     assert_eq!(std::fs::read(page.join("report.html")).unwrap(), b"a report");
 }
 

@@ -14,6 +14,8 @@ const FOOT: f64 = 46.0;
 const HIGHEST: f64 = 480.0;
 /// Width of a character of a tick label, at most.
 const CHARACTER: f64 = 7.6;
+/// Height of a tick label, at most.
+const LINE: f64 = 16.2;
 /// Characters that an axis name may take.
 const NAME: usize = 44;
 
@@ -109,23 +111,16 @@ impl Plot {
         let empty = Self::across_width(id, x.span, y.span, Shape::Free(height), outer);
         let width = outer - MARGIN - right - left;
         let mut plot = Self { left, width, ..empty };
-        plot.ticks = [Some(plot.thinned(x.ticks)), Some(y.ticks)];
-        plot
-    }
-
-    /// The ticks along x without the labels that would touch the one before.
-    fn thinned(&self, mut ticks: Ticks) -> Ticks {
-        let mut free = f64::NEG_INFINITY;
-        for (tick, text) in &mut ticks {
+        let across = |tick: f64, text: &str| {
             let half = CHARACTER * text.chars().count() as f64 / 2.0;
-            let at = self.across(*tick);
-            if at - half < free {
-                text.clear();
-            } else {
-                free = at + half;
-            }
-        }
-        ticks
+            [plot.across(tick) - half, plot.across(tick) + half + 4.0]
+        };
+        let up = |tick: f64, _: &str| [-plot.down(tick), LINE - plot.down(tick)];
+        // The labels along x keep clear of those along y.
+        let x = thinned(x.ticks, left - 7.0, across);
+        let y = thinned(y.ticks, f64::NEG_INFINITY, up);
+        plot.ticks = [Some(x), Some(y)];
+        plot
     }
 
     /// Where `x` lies across the plot.
@@ -293,7 +288,7 @@ impl Plot {
         } else {
             String::new()
         };
-        let longest = self.left - 13.0 - CHARACTER * longest(&self.y_ticks());
+        let longest = self.left - 15.0 - CHARACTER * longest(&self.y_ticks());
         format!(
             "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{x}</text>\
              <text class=\"name\" transform=\"translate({} {}) rotate(-90)\" \
@@ -304,6 +299,19 @@ impl Plot {
             coordinate(half)
         )
     }
+}
+
+/// The ticks without the labels that begin before `free`, or before the end of the one before.
+fn thinned(mut ticks: Ticks, mut free: f64, reach: impl Fn(f64, &str) -> [f64; 2]) -> Ticks {
+    for (tick, text) in &mut ticks {
+        let [from, to] = reach(*tick, text);
+        if from < free {
+            text.clear();
+        } else {
+            free = to;
+        }
+    }
+    ticks
 }
 
 /// What stands at a tick; nothing where its label was left out.

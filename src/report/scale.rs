@@ -5,7 +5,7 @@ use super::span::Span;
 use super::text::{minus, number, shorten};
 
 /// Share of an axis that is left free at either end.
-const EDGE: f64 = 0.06;
+const EDGE: f64 = 0.08;
 /// Characters of a tick's label.
 const LABEL: usize = 7;
 
@@ -22,13 +22,14 @@ impl Scale {
         Self { log: false, span: Span { low, high } }
     }
 
-    /// Logarithmic if all values are positive, else linear; `None` without values.
+    /// Logarithmic if all values are positive, else from 0; `None` without values.
     pub(super) fn log(values: &[f64]) -> Option<Self> {
         let span = Span::of(values.iter().copied())?;
-        let log = span.low > 0.0;
-        let place = |value: f64| if log { value.log10() } else { value };
-        let span = Span { low: place(span.low), high: place(span.high) };
-        Some(Self { log, span: span.widened(EDGE) })
+        if span.low <= 0.0 {
+            return Self::from_zero(values);
+        }
+        let span = Span { low: span.low.log10(), high: span.high.log10() };
+        Some(Self { log: true, span: padded(span, 0.3) })
     }
 
     /// Logarithmic if the values span more than a decade, else linear; `None` without values.
@@ -37,7 +38,8 @@ impl Scale {
         if span.low > 0.0 && span.high > 10.0 * span.low {
             return Self::log(values);
         }
-        Some(Self { log: false, span: span.widened(EDGE) })
+        let lone = 0.5 * if span.low == 0.0 { 1.0 } else { span.low.abs() };
+        Some(Self { log: false, span: padded(span, lone) })
     }
 
     /// From 0 to a little above the largest value; `None` without values.
@@ -86,10 +88,18 @@ impl Scale {
             all.filter(|value| (low..=high).contains(value)).collect()
         };
         let enough = |ticks: &Vec<f64>| ticks.len() >= 3;
-        let linear = || Span { low, high }.ticks(4.0).0;
+        let linear = || Span { low, high }.ticks(6.0).0;
         let choices = [among(&[1]), among(&[1, 2, 5])].into_iter();
         choices.into_iter().find(enough).unwrap_or_else(linear)
     }
+}
+
+/// With room at both ends; `lone` of it where there is but one value.
+fn padded(span: Span, lone: f64) -> Span {
+    if span.width() > 1e-6 * lone {
+        return span.widened(EDGE);
+    }
+    Span { low: span.low - lone, high: span.high + lone }
 }
 
 /// `digit * 10^decade` to the last bit.
@@ -122,6 +132,18 @@ mod tests {
         assert_eq!(Scale::log(&[]), None);
         assert_eq!(Scale::from_zero(&[]), None);
         assert!(!Scale::log(&[0.0, 3.0]).expect("numbers").is_log());
+    }
+
+    #[test]
+    fn a_lone_value_has_room_around_it() {
+        let span = |scale: Option<Scale>| {
+            let span = scale.expect("a number").span();
+            [span.low, span.high]
+        };
+        assert_eq!(span(Scale::log(&[1.0, 1.0])), [-0.3, 0.3]);
+        assert_eq!(span(Scale::fitting(&[4.0])), [2.0, 6.0]);
+        assert_eq!(span(Scale::fitting(&[0.0])), [-0.5, 0.5]);
+        assert_eq!(span(Scale::log(&[0.0])), [0.0, 1.0]);
     }
 
     #[test]

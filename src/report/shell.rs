@@ -26,7 +26,7 @@ pub(super) const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>
     </defs></svg>\n";
 
 /// Which scripts a page allows to run.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 pub(super) enum Scripts {
     /// None at all.
     None,

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
+pub(crate) mod live;
+
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, Stdio};

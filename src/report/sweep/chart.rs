@@ -12,8 +12,8 @@ use crate::report::text::percent;
 
 /// Axes that a figure has room for: across, lines, panels.
 const DEPTH: usize = 3;
-/// Classes of the bands, the narrowest first.
-const BANDS: [&str; 2] = ["band inner", "band outer"];
+/// Classes of the intervals, the narrowest first.
+const REACHES: [&str; 2] = ["reach inner", "reach outer"];
 
 /// A chart: what it shows, and its scale.
 pub(super) struct Chart<'c, 'g, 'a> {
@@ -77,9 +77,8 @@ fn drawing(chart: &Chart<'_, '_, '_>) -> String {
     }
     let drawn = places
         .into_iter()
-        .flatten()
         .enumerate()
-        .map(|(number, place)| (chart.layout.panel_title(place), one(Some(place), number)));
+        .map(|(number, place)| (chart.panel_title(place), one(place, number)));
     panels(&drawn.collect::<Vec<_>>())
 }
 
@@ -96,11 +95,16 @@ impl Chart<'_, '_, '_> {
         self.layout.across.map_or_else(String::new, |axis| axes[axis].label())
     }
 
+    /// Title of a panel; empty for a lone one.
+    fn panel_title(&self, panel: Option<usize>) -> String {
+        self.layout.named(self.layout.panels.as_ref(), panel)
+    }
+
     /// What is read out in place of a panel.
     pub(super) fn description(&self, panel: Option<usize>) -> String {
-        let panel =
-            panel.map_or_else(String::new, |place| format!(", {}", self.layout.panel_title(place)));
-        format!("{} against {}{panel}", self.measure.title, self.across())
+        let comma = if panel.is_some() { ", " } else { "" };
+        let panel = self.panel_title(panel);
+        format!("{} against {}{comma}{panel}", self.measure.title, self.across())
     }
 
     /// The ceiling in the unit of the measure.
@@ -116,12 +120,10 @@ fn legend(chart: &Chart<'_, '_, '_>) -> Vec<(Swatch, String)> {
         false => Swatch::Mark(lines::mark(index)),
     });
     let filled = joined && chart.layout.line_places().len() <= curves::FILLED;
-    for (class, name) in BANDS.iter().zip(chart.measure.bands) {
-        let swatch = match filled {
-            true => Swatch::Area(class),
-            false => {
-                Swatch::Line(if *class == BANDS[0] { "reach inner hue" } else { "reach outer hue" })
-            }
+    for (class, name) in REACHES.iter().zip(chart.measure.bands) {
+        let swatch = match filled && *class == REACHES[0] {
+            true => Swatch::Area("band"),
+            false => Swatch::Line(class),
         };
         legend.push((swatch, (*name).to_owned()));
     }
@@ -137,7 +139,14 @@ fn caption(
     measure: &Measure,
     chart: Option<&Chart<'_, '_, '_>>,
 ) -> String {
-    let logarithmic = chart.is_some_and(|chart| chart.scale.is_log());
-    let logarithmic = if logarithmic { " The scale of the values is logarithmic." } else { "" };
-    format!("{}{logarithmic}{}", measure.caption, layout.left_out())
+    let mut caption = measure.caption.to_owned();
+    if let Some(chart) = chart {
+        if chart.scale.is_log() {
+            caption += " The scale of the values is logarithmic.";
+        }
+        if chart.over_numbers() && layout.line_places().len() > curves::FILLED {
+            caption += " What belongs to one value across stands side by side.";
+        }
+    }
+    caption + &layout.left_out()
 }

@@ -1,13 +1,13 @@
 //! Curves over an axis of numbers, with bands around them.
 
 use super::chart::Chart;
-use super::lines;
+use super::lines::{self, Shown};
 use super::readings::Reading;
 use crate::report::plot::{Labels, Plot};
 use crate::report::scale::Scale;
 use crate::report::sheet::WIDTH;
 use crate::report::span::Span;
-use crate::report::text::{escape, shorten};
+use crate::report::text::escape;
 
 /// Most lines whose bands are filled; those of more would hide each other.
 pub(super) const FILLED: usize = 3;
@@ -15,69 +15,73 @@ pub(super) const FILLED: usize = 3;
 const SIZES: [[f64; 2]; 2] = [[440.0, 280.0], [WIDTH, 210.0]];
 /// Most lines, and characters of each, that are named beside their end.
 const NAMED: [usize; 2] = [5, 9];
+/// Distance of two ticks upwards, about.
+const TICK: f64 = 40.0;
 /// Least distance of two names beside each other.
 const APART: f64 = 14.0;
-/// Shift between the intervals of neighbouring lines.
-const SHIFT: f64 = 3.0;
+/// Shift between neighbouring lines, where their intervals would hide each other.
+const SHIFT: f64 = 2.6;
 
 /// The curves of one panel.
 pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usize) -> String {
-    let names = names(chart);
-    let longest = names.iter().flatten().map(|name| name.chars().count()).max();
+    let (names, values) = (names(chart), values(chart));
+    let longest = names.iter().map(|name| name.chars().count()).max();
     let right = longest.map_or(0.0, |longest| 4.0 + 7.6 * longest as f64);
     let [width, height] = SIZES[usize::from(panel.is_some())];
-    let x = across(chart);
-    let values: Vec<f64> = numbers(chart);
-    let texts = values.iter().zip(texts(chart)).map(|(&value, text)| (value, text));
-    let axes = [x.axis_at(texts), chart.scale.axis(height / 46.0)];
+    let x = across(&values);
+    let axes = [x.axis_at(values.clone()), chart.scale.axis(height / TICK)];
     let id = format!("{}-{number}", chart.measure.id);
     let mut plot = Plot::ticked(&id, axes, height, [width, right]);
     let mut ends = Vec::new();
     for (index, line) in chart.layout.line_places().into_iter().enumerate() {
         let readings = chart.layout.readings(chart.measure, line, panel);
-        let places: Vec<f64> = values.iter().map(|&value| x.place(value)).collect();
-        let curve = Curve { chart, index, points: places.into_iter().zip(readings).collect() };
+        let shift = shift(chart, index) / plot.lengths(1.0)[0];
+        let places = values.iter().map(|(value, _)| x.place(*value) + shift);
+        let curve = Curve { chart, index, points: places.zip(readings).collect() };
         curve.draw(&mut plot);
-        if let (Some(name), Some(end)) = (names.get(index).cloned().flatten(), curve.end()) {
-            ends.push((plot.down(end), index, name));
+        if let (Some(name), Some(end)) = (names.get(index), curve.end()) {
+            ends.push((plot.down(end), index, name.as_str()));
         }
     }
-    ceiling(chart, &mut plot);
+    ceiling(chart, &mut plot, x.span());
     beside(&mut plot, ends, height);
     let (across, description) = (chart.across(), chart.description(panel));
     let labels = Labels { x: &across, y: chart.measure.label, whole: false };
     plot.finish(&labels, &description)
 }
 
-/// The values across.
-fn numbers(chart: &Chart<'_, '_, '_>) -> Vec<f64> {
+/// The values across, with their texts.
+fn values(chart: &Chart<'_, '_, '_>) -> Vec<(f64, String)> {
     let axes = &chart.layout.slice.grid.axes;
     let values = chart.layout.across.map_or(&[][..], |axis| &axes[axis].values);
-    values.iter().filter_map(|(_, number)| *number).collect()
-}
-
-/// The values across, as they were given.
-fn texts(chart: &Chart<'_, '_, '_>) -> Vec<String> {
-    let axes = &chart.layout.slice.grid.axes;
-    let values = chart.layout.across.map_or(&[][..], |axis| &axes[axis].values);
-    values.iter().map(|(text, _)| (*text).to_owned()).collect()
+    values.iter().filter_map(|(text, number)| Some(((*number)?, (*text).to_owned()))).collect()
 }
 
 /// The scale across: of all values of the axis.
-fn across(chart: &Chart<'_, '_, '_>) -> Scale {
-    Scale::fitting(&numbers(chart)).unwrap_or(Scale::linear(0.0, 1.0))
+fn across(values: &[(f64, String)]) -> Scale {
+    let numbers: Vec<f64> = values.iter().map(|(number, _)| *number).collect();
+    Scale::fitting(&numbers).unwrap_or(Scale::linear(0.0, 1.0))
 }
 
-/// Names of the lines, where they are few and short.
-fn names(chart: &Chart<'_, '_, '_>) -> Vec<Option<String>> {
-    let Some((axis, places)) = &chart.layout.lines else {
+/// Names of the lines, where they are few and short; else none.
+fn names(chart: &Chart<'_, '_, '_>) -> Vec<String> {
+    let Some(Shown { axis, places }) = &chart.layout.lines else {
         return Vec::new();
     };
     let axis = &chart.layout.slice.grid.axes[*axis];
-    let names: Vec<_> = places.iter().map(|&place| axis.value(place)).collect();
+    let mut names: Vec<_> = places.iter().map(|&place| axis.value(place)).collect();
     let [most, longest] = NAMED;
-    let few = names.len() <= most && names.iter().all(|name| name.chars().count() <= longest);
-    names.into_iter().map(|name| few.then_some(name)).collect()
+    if names.len() > most || names.iter().any(|name| name.chars().count() > longest) {
+        names.clear();
+    }
+    names
+}
+
+/// How far line `index` stands beside its values: nowhere, while the bands are filled.
+fn shift(chart: &Chart<'_, '_, '_>, index: usize) -> f64 {
+    let lines = chart.layout.line_places().len();
+    let middle = (lines - 1) as f64 / 2.0;
+    if lines <= FILLED { 0.0 } else { SHIFT * (index as f64 - middle) }
 }
 
 /// One line of a panel.
@@ -92,10 +96,10 @@ impl Curve<'_, '_, '_> {
     fn draw(&self, plot: &mut Plot) {
         let hue = format!("hue-{}", self.index);
         let filled = self.chart.layout.line_places().len() <= FILLED;
+        if filled {
+            self.fill(plot, &format!("band {hue}"));
+        }
         for (band, class) in ["inner", "outer"].into_iter().enumerate() {
-            if filled {
-                self.fill(plot, band, &format!("band {class} {hue}"));
-            }
             self.reach(plot, band, &format!("reach {class} {hue}"));
         }
         let scale = self.chart.scale;
@@ -109,12 +113,12 @@ impl Curve<'_, '_, '_> {
         }
     }
 
-    /// The band between neighbours that both have one.
-    fn fill(&self, plot: &mut Plot, band: usize, class: &str) {
+    /// The narrowest band between neighbours that both have one.
+    fn fill(&self, plot: &mut Plot, class: &str) {
         let mut data = String::new();
         for pair in self.points.windows(2) {
             let [(x0, left), (x1, right)] = pair else { continue };
-            if let (Some(left), Some(right)) = (self.band(left, band), self.band(right, band)) {
+            if let (Some(left), Some(right)) = (self.band(left, 0), self.band(right, 0)) {
                 let corners = [[*x0, left[0]], [*x1, right[0]], [*x1, right[1]], [*x0, left[1]]];
                 data += &plot.polygon(corners);
             }
@@ -122,17 +126,13 @@ impl Curve<'_, '_, '_> {
         plot.path(class, &data);
     }
 
-    /// Each interval as an upright line; those of several lines stand side by side.
+    /// Each interval as an upright line.
     fn reach(&self, plot: &mut Plot, band: usize, class: &str) {
-        let lines = self.chart.layout.line_places().len();
-        let shift = SHIFT * (self.index as f64 - (lines - 1) as f64 / 2.0);
-        let shift = if lines <= FILLED { 0.0 } else { shift / plot.lengths(1.0)[0] };
-        let mut data = String::new();
-        for (x, reading) in &self.points {
-            if let Some([low, high]) = self.band(reading, band) {
-                data += &plot.line([[x + shift, low], [x + shift, high]]);
-            }
-        }
+        let reaches = self.points.iter().filter_map(|(x, reading)| {
+            let [low, high] = self.band(reading, band)?;
+            Some(plot.line([[*x, low], [*x, high]]))
+        });
+        let data: String = reaches.collect();
         plot.path(class, &data);
     }
 
@@ -142,24 +142,23 @@ impl Curve<'_, '_, '_> {
         Some(band.map(|end| self.chart.scale.place(end)))
     }
 
-    /// The place of the last value.
+    /// The place of the last value, if the line goes that far.
     fn end(&self) -> Option<f64> {
-        let last = self.points.iter().rev().find_map(|(_, reading)| reading.as_ref())?;
-        Some(self.chart.scale.place(last.value))
+        let (_, last) = self.points.last()?;
+        last.as_ref().map(|last| self.chart.scale.place(last.value))
     }
 }
 
-fn ceiling(chart: &Chart<'_, '_, '_>, plot: &mut Plot) {
+fn ceiling(chart: &Chart<'_, '_, '_>, plot: &mut Plot, Span { low, high }: Span) {
     if let Some(limit) = chart.limit() {
         let place = chart.scale.place(limit);
-        let Span { low, high } = across(chart).span();
         let line = plot.line([[low, place], [high, place]]);
         plot.path("ceiling", &line);
     }
 }
 
 /// Names beside the ends of their lines, apart from each other.
-fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, String)>, height: f64) {
+fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, &str)>, height: f64) {
     ends.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
     let mut free = f64::NEG_INFINITY;
     for (down, ..) in &mut ends {
@@ -172,7 +171,7 @@ fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, String)>, height: f64) {
         free = *down - APART;
     }
     for (down, index, name) in ends {
-        let name = escape(&shorten(&name, NAMED[1]));
+        let name = escape(name);
         plot.beside(down + 4.0, &format!("<text class=\"end hue-{index}\">{name}</text>"));
     }
 }

@@ -43,10 +43,7 @@ fn panel(layout: &Layout<'_, '_>, line: Option<usize>) -> Option<(String, String
         Some(Row { name, judged: judged(grid.record, point)?, races: race(point)?.races })
     };
     let rows: Vec<_> = (0..layout.length()).filter_map(row).collect();
-    let title = match (&layout.lines, line) {
-        (Some((axis, _)), Some(place)) => grid.axes[*axis].named(place),
-        _ => String::new(),
-    };
+    let title = layout.named(layout.lines.as_ref(), line);
     let description = format!("Failure classes, {title}");
     (!rows.is_empty()).then(|| (title, losses::panel(rows.into_iter(), &description)))
 }

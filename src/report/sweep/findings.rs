@@ -6,7 +6,7 @@ use super::readings::{certificate, judged, race, share};
 use crate::experiment::record::JudgedRecord;
 use crate::experiment::sweep::record::CertificatePoint;
 use crate::report::shell::Headline;
-use crate::report::text::{count, interval, lower, number, percent, percents, upper};
+use crate::report::text::{count, lower, number, percent, percents, upper};
 
 /// What a sweep came to.
 pub(super) struct Findings {
@@ -20,46 +20,67 @@ pub(super) struct Findings {
 
 /// The findings of a sweep of races.
 pub(super) fn races(grid: &Grid<'_>, front: Option<&Front>) -> Findings {
-    let rated: Vec<Rated<'_, '_>> =
-        grid.points.iter().filter_map(|p| Rated::new(grid, p)).collect();
-    let best = grid.best.and_then(|best| Rated::new(grid, &grid.points[best]));
     let mut findings =
         Findings { headlines: Vec::new(), found: Vec::new(), limits: race_limits(grid) };
-    let Some(best) = best else {
+    let all: Vec<_> = grid.points.iter().filter_map(|point| Rated::new(grid, point)).collect();
+    let Some(best) = grid.best.and_then(|best| Rated::new(grid, &grid.points[best])) else {
         return findings;
     };
-    let mut add = |title: &str, of: &Rated<'_, '_>, found: String| {
-        findings.headlines.push(of.headline(grid, title));
-        findings.found.push(found);
-    };
-    if rated.iter().all(|one| one.judged.rate == best.judged.rate) && rated.len() > 1 {
-        let found = format!("All {} points won {}.", rated.len(), percent(best.judged.rate));
-        add("Every point", &best, found);
-    } else {
-        add("Best point", &best, best_of(grid, &best, rated.len()));
+    if all.len() > 1 && all.iter().all(|one| one.judged.rate == best.judged.rate) {
+        let rate = percent(best.judged.rate);
+        findings.add(
+            best.headline(grid, "Every point"),
+            format!("All {} points won {rate}.", all.len()),
+        );
+        return findings;
     }
-    let overlapping: Vec<_> = rated.iter().filter(|one| one.reaches(&best)).collect();
-    if let Some(axis) = grid.samples() {
-        let place = |one: &&&Rated<'_, '_>| one.point.places[axis];
-        let least = overlapping.iter().map(|one| one.point.places[axis]).min();
-        let fewest = overlapping.iter().filter(|one| Some(place(one)) == least);
-        if let Some(one) = fewest.max_by(|a, b| a.judged.rate.total_cmp(&b.judged.rate)) {
-            let name = format!("Fewest samples: {}", grid.axes[axis].value(one.point.places[axis]));
-            add(&name, one, overlap(grid, one, "The fewest samples"));
-        }
+    let title = if all.len() == 1 { "The one point" } else { "Best point" };
+    findings.add(best.headline(grid, title), best_of(grid, &best, all.len()));
+    if all.len() > 1 {
+        let overlapping: Vec<_> = all.iter().filter(|one| one.reaches(&best)).collect();
+        overlaps(grid, &overlapping, &mut findings);
     }
-    let fastest = overlapping.iter().min_by(|a, b| a.milliseconds().total_cmp(&b.milliseconds()));
-    if let Some(one) = fastest {
-        findings.found.push(overlap(grid, one, "The lowest latency"));
-    }
-    if let Some(knee) = front.and_then(|front| front.knee.as_ref()) {
-        if let Some(knee) = Rated::new(grid, &grid.points[knee.index]) {
-            let found = format!("The knee of the Pareto front is {}.", knee.said(grid));
-            findings.headlines.push(knee.headline(grid, "Knee of the front"));
-            findings.found.push(found);
-        }
+    let knee = front.and_then(|front| front.knee.as_ref());
+    if let Some(knee) = knee.and_then(|knee| Rated::new(grid, &grid.points[knee.index])) {
+        let found = format!("The knee of the Pareto front is {}.", knee.said(grid));
+        findings.add(knee.headline(grid, "Knee of the front"), found);
     }
     findings
+}
+
+impl Findings {
+    fn add(&mut self, headline: Headline, found: String) {
+        self.headlines.push(headline);
+        self.found.push(found);
+    }
+}
+
+/// The cheapest of the points whose interval overlaps that of the best: by samples, by latency.
+fn overlaps(grid: &Grid<'_>, all: &[&Rated<'_, '_>], findings: &mut Findings) {
+    let fastest = all.iter().min_by(|a, b| a.milliseconds().total_cmp(&b.milliseconds()));
+    let fewest = grid.samples().and_then(|axis| Some((axis, fewest(all, axis)?)));
+    let same = fewest.zip(fastest).is_some_and(|((_, few), fast)| few.is(fast));
+    let found = |which: &str, one: &Rated<'_, '_>| {
+        let said = one.said(grid);
+        format!("{which} whose interval overlaps that of the best point: {said}.")
+    };
+    if let Some((axis, one)) = fewest {
+        let also = if same { ", and the lowest latency," } else { "" };
+        let samples = grid.axes[axis].value(one.point.places[axis]);
+        let headline = one.headline(grid, &format!("Fewest samples: {samples}"));
+        findings.add(headline, found(&format!("The fewest samples{also}"), one));
+    }
+    if let Some(one) = fastest.filter(|_| !same) {
+        findings.found.push(found("The lowest latency", one));
+    }
+}
+
+/// The highest rate among those with the fewest samples.
+fn fewest<'r, 'p, 'a>(all: &[&'r Rated<'p, 'a>], axis: usize) -> Option<&'r Rated<'p, 'a>> {
+    let place = |one: &&Rated<'_, '_>| one.point.places[axis];
+    let least = all.iter().map(place).min()?;
+    let few = all.iter().filter(|one| place(one) == least);
+    few.copied().max_by(|a, b| a.judged.rate.total_cmp(&b.judged.rate))
 }
 
 /// A point with a verdict.
@@ -72,6 +93,11 @@ impl<'p, 'a> Rated<'p, 'a> {
     fn new(grid: &Grid<'_>, point: &'p Point<'a>) -> Option<Self> {
         let judged = judged(grid.record, point.record)?;
         judged.rate.is_finite().then_some(Self { point, judged })
+    }
+
+    /// Whether both are the same point.
+    fn is(&self, other: &Self) -> bool {
+        self.point.places == other.point.places
     }
 
     /// Median latency, ms.
@@ -119,10 +145,6 @@ fn best_of(grid: &Grid<'_>, best: &Rated<'_, '_>, count: usize) -> String {
     }
 }
 
-fn overlap(grid: &Grid<'_>, one: &Rated<'_, '_>, title: &str) -> String {
-    format!("{title} whose interval overlaps that of the best point: {}.", one.said(grid))
-}
-
 fn race_limits(grid: &Grid<'_>) -> Vec<String> {
     let record = grid.record;
     let starts = record.starts.as_ref().map_or(0, |starts| starts.count);
@@ -148,60 +170,58 @@ fn race_limits(grid: &Grid<'_>) -> Vec<String> {
     ]
 }
 
+/// A point with its certificate.
+type Certified<'p, 'a> = (&'p Point<'a>, &'a CertificatePoint);
+
 /// The findings of a sweep of certificates.
 pub(super) fn certificates(grid: &Grid<'_>) -> Findings {
-    let all: Vec<(&Point<'_>, &CertificatePoint)> =
-        grid.points.iter().filter_map(|point| Some((point, certificate(point.record)?))).collect();
-    let mut headlines = Vec::new();
-    let mut found = Vec::new();
-    if let Some(best) = grid.best {
-        let point = &grid.points[best];
-        if let Some(certificate) = certificate(point.record) {
-            let [low, high] = certificate.share_interval.map(|end| 100.0 * end);
-            let name = grid.name(point);
-            found.push(format!(
-                "The largest share of the box is certified at {name}: {}\u{a0}% ({}\u{a0}%).",
-                number(100.0 * share(certificate)),
-                interval([low, high])
-            ));
-            headlines.push(Headline {
-                title: "Largest certified share".to_owned(),
-                value: format!("{}\u{a0}%", number(100.0 * share(certificate))),
-                details: vec![
-                    format!("At {name}."),
-                    format!("Interval: {}\u{a0}%.", interval([low, high])),
-                ],
-            });
-        }
-    }
-    let balls = all.iter().filter(|(_, one)| one.radius > 0.0);
-    if let Some((point, one)) = balls.max_by(|(_, a), (_, b)| a.radius.total_cmp(&b.radius)) {
-        let (name, radius) = (grid.name(point), lower(one.radius));
-        found.push(format!("The largest verified ball has radius {radius}, at {name}."));
-        headlines.push(Headline {
-            title: "Largest verified ball".to_owned(),
-            value: format!("radius {radius}"),
-            details: vec![format!("At {name}.")],
-        });
-    } else if !all.is_empty() {
-        found.push("Local growth verified no ball at any point.".to_owned());
-    }
-    if !all.is_empty() {
-        let held = all.iter().filter(|(_, one)| one.holds).count();
-        found.push(format!(
-            "At {held} of {} points every claim that was asked for was obtained.",
-            all.len()
-        ));
-        headlines.push(Headline {
-            title: "Every claim obtained".to_owned(),
-            value: format!("{held} of {}", all.len()),
-            details: vec!["Points whose certificate holds as a whole.".to_owned()],
-        });
-    }
+    let all: Vec<Certified<'_, '_>> = grid.points.iter().filter_map(certified).collect();
+    let best = grid.best.and_then(|best| certified(&grid.points[best]));
+    let parts = [best.map(|best| largest_share(grid, best)), largest_ball(grid, &all), held(&all)];
+    let (headlines, found) = parts.into_iter().flatten().unzip();
     Findings { headlines, found, limits: certificate_limits(&all) }
 }
 
-fn certificate_limits(all: &[(&Point<'_>, &CertificatePoint)]) -> Vec<String> {
+fn certified<'p, 'a>(point: &'p Point<'a>) -> Option<Certified<'p, 'a>> {
+    Some((point, certificate(point.record)?))
+}
+
+fn largest_share(grid: &Grid<'_>, (point, best): Certified<'_, '_>) -> (Headline, String) {
+    let (name, value) = (grid.name(point), percent(share(best)));
+    let interval = percents(best.share_interval);
+    let found =
+        format!("The largest share of the box is certified at {name}: {value} ({interval}).");
+    let details = vec![format!("At {name}."), format!("Interval: {interval}.")];
+    (Headline { title: "Largest certified share".to_owned(), value, details }, found)
+}
+
+fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
+    let balls = all.iter().filter(|(_, one)| one.radius > 0.0);
+    let largest = balls.max_by(|(_, a), (_, b)| a.radius.total_cmp(&b.radius));
+    let title = "Largest verified ball".to_owned();
+    let Some((point, one)) = largest else {
+        let found = "Local growth verified no ball at any point.".to_owned();
+        let headline = Headline { title, value: "none".to_owned(), details: Vec::new() };
+        return (!all.is_empty()).then_some((headline, found));
+    };
+    let (name, radius) = (grid.name(point), lower(one.radius));
+    let found = format!("The largest verified ball has radius {radius}, at {name}.");
+    let details = vec![format!("At {name}.")];
+    Some((Headline { title, value: format!("radius {radius}"), details }, found))
+}
+
+fn held(all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
+    let (held, count) = (all.iter().filter(|(_, one)| one.holds).count(), all.len());
+    let found = format!("At {held} of {count} points every claim that was asked for was obtained.");
+    let headline = Headline {
+        title: "Every claim obtained".to_owned(),
+        value: format!("{held} of {count}"),
+        details: vec!["Points whose certificate holds as a whole.".to_owned()],
+    };
+    (count > 0).then_some((headline, found))
+}
+
+fn certificate_limits(all: &[Certified<'_, '_>]) -> Vec<String> {
     let total: f64 = all.iter().map(|(_, one)| one.beta_total).sum();
     let together = if total < 1.0 {
         format!(

@@ -1,7 +1,7 @@
 //! The Pareto front of a sweep, and its knee.
 
 use super::grid::Grid;
-use super::readings::{LATENCY, SUCCESS};
+use super::readings::{LATENCY, Measure, SUCCESS};
 use crate::report::scale::Scale;
 
 /// A point with what it costs and what it gains.
@@ -32,9 +32,8 @@ impl Front {
     pub(super) fn new(grid: &Grid<'_>) -> Option<Self> {
         let candidate = |index: usize| {
             let point = grid.points[index].record;
-            let value = |measure: &super::readings::Measure| {
-                (measure.read)(grid.record, point).map(|reading| reading.value)
-            };
+            let value =
+                |measure: &Measure| (measure.read)(grid.record, point).map(|reading| reading.value);
             Some(Candidate { index, cost: value(&LATENCY)?, gain: value(&SUCCESS)? })
         };
         let candidates: Vec<_> = (0..grid.points.len()).filter_map(candidate).collect();
@@ -84,7 +83,8 @@ mod tests {
     use super::{Candidate, knee, undominated};
 
     fn candidates(values: &[[f64; 2]]) -> Vec<Candidate> {
-        let candidate = |(index, &[cost, gain]): (usize, &[f64; 2])| Candidate { index, cost, gain };
+        let candidate =
+            |(index, &[cost, gain]): (usize, &[f64; 2])| Candidate { index, cost, gain };
         values.iter().enumerate().map(candidate).collect()
     }
 

@@ -134,11 +134,15 @@ impl<'a> Grid<'a> {
         Slice { grid: self, shown: shown.to_vec(), base }
     }
 
-    /// The varying values of a point in words.
+    /// The values of a point in words: of the axes that vary, if any does.
     pub(super) fn name(&self, point: &Point<'_>) -> String {
-        let values = self.varying().map(|axis| self.axes[axis].named(point.places[axis]));
+        let mut axes: Vec<_> = self.varying().collect();
+        if axes.is_empty() {
+            axes = (0..self.axes.len()).collect();
+        }
+        let values = axes.into_iter().map(|axis| self.axes[axis].named(point.places[axis]));
         let values: Vec<_> = values.collect();
-        if values.is_empty() { "the one point".to_owned() } else { values.join(", ") }
+        if values.is_empty() { "the configuration as it is".to_owned() } else { values.join(", ") }
     }
 }
 

@@ -11,15 +11,19 @@ use crate::report::text::shorten;
 /// Width of the drawing.
 const WIDTH: f64 = 440.0;
 /// Height of a row, at most, and of all rows, at least and at most.
-const HEIGHTS: [f64; 3] = [40.0, 90.0, 330.0];
+const HEIGHTS: [f64; 3] = [44.0, 130.0, 330.0];
 /// Room for the colour bar.
-const FOOT: f64 = 52.0;
+const FOOT: f64 = 62.0;
 /// Height of the colour bar.
 const BAR: f64 = 12.0;
+/// Values closer than this are one colour, percent.
+const EQUAL: f64 = 1e-3;
 /// Characters of a value beside a row.
 const NAME: usize = 8;
+/// Characters of a name in the title.
+const TITLE: usize = 40;
 /// Width of a character, at most, and least height of a cell with a number in it.
-const TEXT: [f64; 2] = [7.4, 15.0];
+const TEXT: [f64; 2] = [7.4, 16.2];
 
 /// The figure, for a grid with two numeric parameters of at least two values each.
 pub(super) fn figure(grid: &Grid<'_>, measure: &Measure) -> Option<Figure> {
@@ -33,7 +37,7 @@ pub(super) fn figure(grid: &Grid<'_>, measure: &Measure) -> Option<Figure> {
     let drawn = map.limits().map(|limits| map.drawing(limits));
     Some(Figure {
         id: "figure-heat",
-        title: format!("{} over {} and {}", measure.title, map.x.label(), map.y.label()),
+        title: format!("{} over {} and {}", measure.title, named(map.x), named(map.y)),
         drawing: drawn.ok_or_else(|| "No point of this slice was measured.".to_owned()),
         legend,
         caption: format!(
@@ -42,6 +46,11 @@ pub(super) fn figure(grid: &Grid<'_>, measure: &Measure) -> Option<Figure> {
             map.slice.held()
         ),
     })
+}
+
+/// The name of an axis, short enough for a title.
+fn named(axis: &Axis<'_>) -> String {
+    shorten(axis.name, TITLE)
 }
 
 /// Two axes and what is shown of their points.
@@ -66,11 +75,7 @@ impl Map<'_, '_> {
 
     /// What the colours end at: round values around those shown.
     fn limits(&self) -> Option<Span> {
-        let span = Span::of(self.cells().into_iter().filter_map(|(_, value)| value))?;
-        let step =
-            if span.high > 5.0 { 5.0 } else { 10_f64.powf(span.high.max(1e-6).log10().floor()) };
-        let low = (span.low / step).floor() * step;
-        Some(Span { low, high: ((span.high / step).ceil() * step).max(low + step) })
+        Span::of(self.cells().into_iter().filter_map(|(_, value)| value)).map(outward)
     }
 
     fn drawing(&self, limits: Span) -> String {
@@ -100,6 +105,16 @@ impl Map<'_, '_> {
         let description = format!("{} over {x} and {y}", self.measure.title);
         plot.finish(&Labels { x: &x, y: &y, whole: false }, &description)
     }
+}
+
+/// The span up to the next round values; a whole one, up to its value, where all are equal.
+fn outward(span: Span) -> Span {
+    if span.width() < EQUAL {
+        return Span { low: (span.low - 1.0).max(0.0), high: span.low.max(1.0) };
+    }
+    let (ticks, _) = span.ticks(5.0);
+    let step = ticks.windows(2).next().map_or(span.width(), |pair| pair[1] - pair[0]);
+    Span { low: (span.low / step).floor() * step, high: (span.high / step).ceil() * step }
 }
 
 /// An axis with one place per value.
@@ -134,7 +149,7 @@ fn bar(width: f64, limits: Span, label: &str) -> String {
             low + 17.0
         );
     }
-    let (middle, base) = (coordinate(width / 2.0), 4.0 + BAR + 34.0);
+    let (middle, base) = (coordinate(width / 2.0), 4.0 + BAR + 36.0);
     bar + &format!(
         "<text class=\"name\" x=\"{middle}\" y=\"{base}\" text-anchor=\"middle\">{label}</text>"
     )

@@ -1,11 +1,11 @@
-//! The lines of a figure: one per value of an axis, each with a colour and a mark of its own.
+//! How a figure lays the points out: along an axis, as lines with colours and marks, in panels.
 
 use super::grid::{Grid, Slice, spread};
 use super::readings::{Measure, Reading};
 use crate::report::figure::Swatch;
 
 /// Most lines of a figure, and most panels.
-pub(super) const MOST: usize = 6;
+const MOST: usize = 6;
 
 /// Classes of the lines.
 const LINES: [&str; MOST] =
@@ -31,42 +31,49 @@ pub(super) fn mark(index: usize) -> String {
     format!("<path class=\"spot hue-{index}\" d=\"{}\"/>", MARKS[index])
 }
 
-/// Which axes a figure shows, and which of their values: across, as lines, as panels.
+/// An axis and the places along it that are shown.
+pub(super) struct Shown {
+    /// The axis.
+    pub(super) axis: usize,
+    /// The places.
+    pub(super) places: Vec<usize>,
+}
+
+/// Which axes a figure shows: across, as lines, as panels.
 pub(super) struct Layout<'g, 'a> {
     /// The points.
     pub(super) slice: Slice<'g, 'a>,
     /// The axis across; none for a sweep without axes.
     pub(super) across: Option<usize>,
-    /// The axis of the lines, with the places shown.
-    pub(super) lines: Option<(usize, Vec<usize>)>,
-    /// The axis of the panels, with the places shown.
-    pub(super) panels: Option<(usize, Vec<usize>)>,
+    /// The axis of the lines.
+    pub(super) lines: Option<Shown>,
+    /// The axis of the panels.
+    pub(super) panels: Option<Shown>,
 }
 
 impl<'g, 'a> Layout<'g, 'a> {
     /// Up to `depth` axes of the grid.
     pub(super) fn new(grid: &'g Grid<'a>, depth: usize) -> Self {
-        let order = grid.order();
-        let shown = &order[..order.len().min(depth)];
-        let slice = grid.slice(shown);
-        let some = |index: usize| {
-            let axis = *shown.get(index)?;
-            Some((axis, spread(grid.axes[axis].values.len(), MOST, slice.base(axis))))
+        let mut order = grid.order();
+        order.truncate(depth);
+        let slice = grid.slice(&order);
+        let shown = |index: usize| {
+            let axis = *order.get(index)?;
+            let places = spread(grid.axes[axis].values.len(), MOST, slice.base(axis));
+            Some(Shown { axis, places })
         };
-        let (lines, panels) = (some(1), some(2));
-        Self { across: shown.first().copied(), lines, panels, slice }
+        let (lines, panels) = (shown(1), shown(2));
+        Self { across: order.first().copied(), lines, panels, slice }
     }
 
     /// Places of the lines; one line where no axis has any.
     pub(super) fn line_places(&self) -> Vec<Option<usize>> {
-        let places = |(_, places): &(usize, Vec<usize>)| places.iter().copied().map(Some).collect();
-        self.lines.as_ref().map_or_else(|| vec![None], places)
+        places(self.lines.as_ref())
     }
 
     /// Places of the panels; one panel where no axis has any.
     pub(super) fn panel_places(&self) -> Vec<Option<usize>> {
-        let places = |(_, places): &(usize, Vec<usize>)| places.iter().copied().map(Some).collect();
-        self.panels.as_ref().map_or_else(|| vec![None], places)
+        places(self.panels.as_ref())
     }
 
     /// Number of places across.
@@ -98,33 +105,36 @@ impl<'g, 'a> Layout<'g, 'a> {
         (0..self.length()).map(read).collect()
     }
 
-    /// Title of a panel.
-    pub(super) fn panel_title(&self, place: usize) -> String {
-        let named = |(axis, _): &(usize, Vec<usize>)| self.slice.grid.axes[*axis].named(place);
-        self.panels.as_ref().map_or_else(String::new, named)
+    /// Name and value of a place along an axis that is shown; empty without one.
+    pub(super) fn named(&self, shown: Option<&Shown>, place: Option<usize>) -> String {
+        match (shown, place) {
+            (Some(shown), Some(place)) => self.slice.grid.axes[shown.axis].named(place),
+            _ => String::new(),
+        }
     }
 
     /// A swatch for each line; none for a lone one.
     pub(super) fn legend(&self, swatch: impl Fn(usize) -> Swatch) -> Vec<(Swatch, String)> {
-        let Some((axis, places)) = &self.lines else {
-            return Vec::new();
+        let lines = self.line_places().into_iter().enumerate();
+        let entry = |(index, place): (usize, Option<usize>)| {
+            place.map(|_| (swatch(index), self.named(self.lines.as_ref(), place)))
         };
-        let axis = &self.slice.grid.axes[*axis];
-        let names = places.iter().map(|&place| axis.named(place));
-        names.enumerate().map(|(index, name)| (swatch(index), name)).collect()
+        lines.filter_map(entry).collect()
     }
 
     /// What the layout leaves out, in sentences.
     pub(super) fn left_out(&self) -> String {
-        let some = |shown: &Option<(usize, Vec<usize>)>| {
-            let (axis, places) = shown.as_ref()?;
+        let some = |shown: &Option<Shown>| {
+            let Shown { axis, places } = shown.as_ref()?;
             let axis = &self.slice.grid.axes[*axis];
-            let count = axis.values.len();
-            (places.len() < count).then(|| {
-                format!(" Of the {count} values of {}, {} are shown.", axis.label(), places.len())
-            })
+            let (count, name, few) = (axis.values.len(), axis.label(), places.len());
+            (few < count).then(|| format!(" Of the {count} values of {name}, {few} are shown."))
         };
         let parts = [some(&self.lines), some(&self.panels)];
         parts.into_iter().flatten().collect::<String>() + &self.slice.held()
     }
+}
+
+fn places(shown: Option<&Shown>) -> Vec<Option<usize>> {
+    shown.map_or_else(|| vec![None], |shown| shown.places.iter().copied().map(Some).collect())
 }

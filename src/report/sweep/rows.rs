@@ -11,6 +11,8 @@ use crate::report::text::shorten;
 const WIDTHS: [f64; 2] = [440.0, WIDTH];
 /// Characters of a row's name in either.
 const NAMES: [usize; 2] = [18, 12];
+/// Least height of the axes, for the name beside them.
+const LEAST: f64 = 66.0;
 /// Height of a row, and of each line in it.
 const ROW: [f64; 2] = [16.0, 12.0];
 
@@ -18,7 +20,7 @@ const ROW: [f64; 2] = [16.0, 12.0];
 pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usize) -> String {
     let layout = chart.layout;
     let (count, places) = (layout.length(), layout.line_places());
-    let height = (ROW[0] + ROW[1] * places.len() as f64) * count as f64;
+    let height = ((ROW[0] + ROW[1] * places.len() as f64) * count as f64).max(LEAST);
     let width = WIDTHS[usize::from(panel.is_some())];
     let name = |row: usize| {
         let value = layout.across.map(|axis| layout.slice.grid.axes[axis].value(row));
@@ -33,7 +35,7 @@ pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usi
     let mut plot = Plot::ticked(&id, [chart.scale.axis(5.0), rows], height, [width, 0.0]);
     for (index, line) in places.iter().enumerate() {
         let shift = (places.len() as f64 - 1.0) / 2.0 - index as f64;
-        let shift = shift * ROW[1] / (ROW[0] + ROW[1] * places.len() as f64);
+        let shift = shift * ROW[1] / plot.lengths(1.0)[1];
         for (row, reading) in layout.readings(chart.measure, *line, panel).iter().enumerate() {
             let Some(reading) = reading else { continue };
             let up = middle(row) + shift;
