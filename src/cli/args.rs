@@ -26,6 +26,7 @@ Examples:
   reachcast check reachcast-out
   reachcast race configs/race.toml
   reachcast scenarios --epsilon 0.1 --beta 1e-3
+  reachcast bench --quick
 
 Exit codes:
   0  done
@@ -165,6 +166,18 @@ Examples:
   reachcast scenarios --epsilon 0.1 --beta 1e-3 --rounds 5
   reachcast scenarios --epsilon 0.01 --beta 1e-6 --failures 3")]
     Scenarios(ScenarioArguments),
+    /// Measure this machine's limits, then how near the workloads come to them
+    ///
+    /// Runs on the CPU and on a hardware GPU if there is one; --backend or --device names one of them,
+    /// and may name a software adapter, which gets the small workloads only. Rates are medians of
+    /// repeated calls after a warm-up. With --out DIR the record goes to DIR/bench.json as well.
+    #[command(after_help = "\
+Examples:
+  reachcast bench --quick
+  reachcast bench --workload rollout/3x64 --threads 1
+  reachcast bench --json --out bench-out
+  reachcast bench --export exported        # networks, starts and results for other programs")]
+    Bench(BenchArguments),
     /// List the devices that can run rollouts
     Devices,
 }
@@ -183,6 +196,20 @@ pub(super) struct RaceArguments {
     /// Runs of each controller, with the noise seeds SEED, SEED + 1, ...
     #[arg(long, value_name = "M", default_value_t = 1)]
     pub(super) noise_seeds: u64,
+}
+
+/// What `bench` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(super) struct BenchArguments {
+    /// Fewer calls, no large work: about a quarter of a minute
+    #[arg(long)]
+    pub(super) quick: bool,
+    /// Only the workloads whose names contain this
+    #[arg(long, value_name = "FILTER")]
+    pub(super) workload: Option<String>,
+    /// Measure nothing; write what the workloads run on, and what they must come to, to this folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["quick", "workload"])]
+    pub(super) export: Option<PathBuf>,
 }
 
 /// The claim that `scenarios` is asked about.
