@@ -162,11 +162,13 @@ pub fn mppi_spec(samples: u32) -> Result<MppiSpec<3>> {
 
 /// Problem `number`: from [`PLAN_START`] at [`SPEED`], with noise of its own.
 pub fn mppi_problem(seed: u64, number: u32) -> MppiProblem<12, 3, RACE_CONTEXT> {
-    let reference = RaceReference { speed: SPEED, ..RaceReference::default() };
+    let context = |t| {
+        RaceReference { speed: SPEED, last: t + 1 == PLAN, ..RaceReference::default() }.context()
+    };
     MppiProblem {
         start: PLAN_START,
         plan: vec![[0.0; 3]; PLAN as usize],
-        context: vec![reference.context(); PLAN as usize],
+        context: (0..PLAN).map(context).collect(),
         stream: Stream::new(seed, Purpose::ControlNoise, number),
     }
 }

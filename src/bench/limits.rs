@@ -53,6 +53,18 @@ impl HostLimits {
             threads,
         })
     }
+
+    /// The better of two measurements of the same machine: others use it too, and a limit is what
+    /// it does undisturbed.
+    #[must_use]
+    pub fn better(self, other: &Self) -> Self {
+        Self {
+            gemm_one_flops: self.gemm_one_flops.max(other.gemm_one_flops),
+            gemm_all_flops: self.gemm_all_flops.max(other.gemm_all_flops),
+            triad_bytes: self.triad_bytes.max(other.triad_bytes),
+            ..self
+        }
+    }
 }
 
 /// Operations per second of the best call.
@@ -190,6 +202,18 @@ mod tests {
         let mut y = [0.0; 4];
         multiply(&mut y, &w, &x, [2, 3, 2]);
         assert_eq!(y, [22.0, 28.0, 49.0, 64.0]);
+    }
+
+    #[test]
+    fn the_better_of_two_limits_counts() {
+        let of = |one, all, triad| HostLimits {
+            gemm_one_flops: one,
+            gemm_all_flops: all,
+            triad_bytes: triad,
+            triad_array_bytes: 1,
+            threads: 2,
+        };
+        assert_eq!(of(1.0, 5.0, 3.0).better(&of(2.0, 4.0, 6.0)), of(2.0, 5.0, 6.0));
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub struct BenchRecord {
     pub machine: MachineRecord,
     /// How long each workload was repeated.
     pub protocol: Protocol,
-    /// Limits of the processor and its memory.
+    /// Limits of the processor and its memory: the better of before and after the workloads.
     pub limits: HostLimits,
     /// The backends, in the order in which they ran.
     pub backends: Vec<BackendRecord>,
@@ -86,7 +86,8 @@ pub struct WorkloadRecord {
     pub steps_per_second: f64,
     /// Floating-point operations per second, at the median.
     pub flops_per_second: f64,
-    /// Share of the matrix products' rate that this is; none where that was not measured.
+    /// Rate of the best call over that of matrix products, both undisturbed; none where the latter
+    /// was not measured.
     pub share: Option<f64>,
 }
 

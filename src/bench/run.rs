@@ -1,4 +1,5 @@
-//! A benchmark from its start to its record: limits, workloads on each backend, scaling.
+//! A benchmark from its start to its record: limits before and after, workloads on each backend,
+//! scaling.
 
 use super::data::Data;
 use super::limits::{AdapterLimits, HostLimits};
@@ -98,23 +99,28 @@ pub fn run(asked: &Asked, backends: &[Backend], watch: &dyn Watch) -> Result<Ben
         scaling: Vec::new(),
     };
     for backend in backends {
-        let limits = record.add_backend(backend)?;
+        record.add_backend(backend)?;
         for workload in &workloads {
             match asked.leaves_out(workload, backend) {
                 Some(reason) => record.leave_out(&workload.name, backend, reason),
-                None => record.add_workload(workload, backend, limits, watch)?,
+                None => record.add_workload(workload, backend, watch)?,
             }
         }
         if asked.names(SCALING) {
             record.add_scaling(asked, backend, &data, watch)?;
         }
     }
+    watch.begin("limits", 1);
+    let again = HostLimits::measure(&protocol, host.threads())?;
+    watch.advance(1)?;
+    record.limits = record.limits.better(&again);
+    record.hold_against_limits();
     Ok(record)
 }
 
 impl BenchRecord {
-    /// Measures and notes a backend; the rate that its workloads are held against, if there is one.
-    fn add_backend(&mut self, backend: &Backend) -> Result<Option<f64>> {
+    /// Measures and notes a backend.
+    fn add_backend(&mut self, backend: &Backend) -> Result<()> {
         let adapter = match backend {
             Backend::Cpu(_) => None,
             Backend::Gpu(_) => Some(AdapterLimits::measure(&self.protocol, backend)?),
@@ -124,10 +130,16 @@ impl BenchRecord {
             device: backend.device(),
             adapter,
         });
-        Ok(match backend {
-            Backend::Cpu(_) => Some(self.limits.gemm_all_flops),
-            Backend::Gpu(_) => None,
-        })
+        Ok(())
+    }
+
+    /// The share of the matrix products' rate that each workload reaches, where that is known.
+    fn hold_against_limits(&mut self) {
+        for workload in &mut self.workloads {
+            let limit = (workload.backend == "cpu").then_some(self.limits.gemm_all_flops);
+            let flops = workload.flops_per_unit * workload.units as f64;
+            workload.share = limit.map(|limit| flops / workload.timing.best_seconds / limit);
+        }
     }
 
     /// Times a workload.
@@ -135,14 +147,12 @@ impl BenchRecord {
         &mut self,
         workload: &Workload,
         backend: &Backend,
-        limit: Option<f64>,
         watch: &dyn Watch,
     ) -> Result<()> {
         watch.begin(&workload.name, 1);
         let timing = measure(&self.protocol, || workload.call(backend))?;
         watch.advance(1)?;
         let units_per_second = workload.units as f64 / timing.median_seconds;
-        let flops_per_second = workload.flops * units_per_second;
         self.workloads.push(WorkloadRecord {
             name: workload.name.clone(),
             backend: backend.name().to_owned(),
@@ -153,8 +163,8 @@ impl BenchRecord {
             timing,
             units_per_second,
             steps_per_second: workload.steps * units_per_second,
-            flops_per_second,
-            share: limit.map(|limit| flops_per_second / limit),
+            flops_per_second: workload.flops * units_per_second,
+            share: None,
         });
         Ok(())
     }

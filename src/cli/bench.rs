@@ -94,7 +94,7 @@ fn head(record: &BenchRecord) -> String {
     let mut text = format!(
         "machine  {}, {} cores, {}, {}; reachcast {}, seed {}\n\
          method   {} s of warm-up, then calls for {} s, {} at least; rates at the median call; \
-         share: of the matrix products' rate\n\
+         share: best call over best matrix products\n\
          limits   f32 matrix products {} GFLOP/s on one thread, {} on {}; \
          memory {:.1} GB/s (a = b + s c)\n",
         machine.cpu,
