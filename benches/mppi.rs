@@ -1,4 +1,7 @@
-//! MPPI: plans per second with and without the value network, on one thread and on all.
+//! MPPI: plans per second with and without the value network, on one thread and on all, beside a
+//! plain loop.
+
+mod scalar;
 
 use std::hint::black_box;
 use std::path::Path;
@@ -6,55 +9,22 @@ use std::path::Path;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
+use reachcast::bench::data::{self, PLAN};
 use reachcast::config::{Config, Overrides, Profile};
-use reachcast::cost::{
-    Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
-};
+use reachcast::cost::{Fence, RACE_CONTEXT, RaceCost, RecoveryCost, Safety};
 use reachcast::policy::Mlp;
-use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Plant, Purpose, Query, Sigma, Stream,
-    ValueTerm,
-};
+use reachcast::rollout::{CostQuery, MppiProblem, MppiSpec, MppiTask, Plant, Query, ValueTerm};
 use reachcast::scenario::global::{check_margins, slice_through};
 use reachcast::scenario::growth_batch::{Request, grow_each};
 use reachcast::scenario::{Context, Unwatched, tightened};
 use reachcast::system::{DroneRace, System};
 
-/// Steps of a plan.
-const HORIZON: u32 = 20;
-
 fn problems(count: u32) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
-    let reference = RaceReference { speed: 0.7, ..RaceReference::default() };
-    let start = [0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.3, 0.0, -1.6, 0.4, 0.0, 0.0];
-    let problem = |number| MppiProblem {
-        start,
-        plan: vec![[0.0; 3]; HORIZON as usize],
-        context: vec![reference.context(); HORIZON as usize],
-        stream: Stream::new(1, Purpose::ControlNoise, number),
-    };
-    (0..count).map(problem).collect()
+    (0..count).map(|number| data::mppi_problem(1, number)).collect()
 }
 
 fn spec(samples: u32) -> MppiSpec<3> {
-    let settings = MppiSettings {
-        temperature: 10.0,
-        sigma: Sigma::PerControl([0.4; 3]),
-        ..MppiSettings::new(&DroneRace::default(), samples, HORIZON)
-    };
-    MppiSpec::new(settings).expect("settings")
-}
-
-fn lane() -> RaceCost {
-    RaceCost::Lane(LaneCost {
-        lane: 25e3,
-        speed: 2.0,
-        control: 0.001,
-        away: 5e4,
-        wide: 5e4,
-        last: 1e4,
-        safety: Safety::NONE,
-        fence: Fence::NONE,
-    })
+    data::mppi_spec(samples).expect("settings")
 }
 
 fn recovery() -> RaceCost {
@@ -84,10 +54,17 @@ fn plain(criterion: &mut Criterion) {
                 costs,
             };
             let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
-            group.throughput(Throughput::Elements(u64::from(samples * HORIZON)));
+            group.throughput(Throughput::Elements(u64::from(samples * PLAN)));
             group.bench_with_input(BenchmarkId::new(name, samples), &task, |bencher, task| {
-                bencher.iter(|| black_box(backend.mppi(&system, &lane(), task).expect("a plan")));
+                bencher.iter(|| {
+                    black_box(backend.mppi(&system, &data::lane(), task).expect("a plan"))
+                });
             });
+            if samples == 1024 && threads.is_some() {
+                group.bench_with_input("scalar loop/1024", &task, |bencher, task| {
+                    bencher.iter(|| black_box(scalar::plan(&system, &data::lane(), task)));
+                });
+            }
         }
     }
     group.finish();
@@ -107,7 +84,7 @@ fn with_value(criterion: &mut Criterion) {
         let task =
             MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
         let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
-        group.throughput(Throughput::Elements(u64::from(500 * HORIZON * count)));
+        group.throughput(Throughput::Elements(u64::from(500 * PLAN * count)));
         group.bench_with_input(BenchmarkId::new(name, count), &task, |bencher, task| {
             bencher.iter(|| black_box(backend.mppi(&system, &recovery(), task).expect("plans")));
         });

@@ -1,25 +1,25 @@
-//! Rollouts per second of each backend, beside bare matrix products of the same layers.
+//! Rollouts per second of each backend, beside a plain loop and bare products of the same layers.
 //!
 //! `gemm` runs the layers of as many rollouts through the crate of that name, without bias,
 //! activation or physics, on the same number of threads: `reach_avoid` over `gemm` is the share
 //! of a good library's speed that the whole rollout keeps.
 
+mod scalar;
+
 use std::hint::black_box;
-use std::path::Path;
 use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{
     BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main,
 };
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Choice, Gpu};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
-use reachcast::real::Real;
+use reachcast::bench::data::{self, Data, HORIZON};
+use reachcast::bench::limits::multiply;
+use reachcast::policy::{Mlp, Policy};
 use reachcast::rollout::{
     DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts,
     Stream, Tightening,
@@ -29,17 +29,13 @@ use reachcast::scenario::settings::{Settings, SliceAxis};
 use reachcast::scenario::{Context, Unwatched, global, growth};
 use reachcast::system::DroneRace;
 
-/// Steps of each rollout.
-const HORIZON: u32 = 30;
+use scalar::Damping;
+
 /// Trajectories that `gemm` gets at a time, where it is fast at every width.
 const TILE: usize = 192;
 
-/// Hidden layers, and the batches they run; 4x512 takes seconds for 65,536.
-const NETWORKS: [(&str, &[usize], &[u64]); 3] = [
-    ("3x64", &[12, 64, 64, 64, 3], &[158, 4096, 65_536]),
-    ("3x128", &[12, 128, 128, 128, 3], &[158, 4096, 65_536]),
-    ("4x512", &[12, 512, 512, 512, 512, 3], &[158, 4096, 65_536]),
-];
+/// Batches; 4x512 takes seconds for 65,536.
+const COUNTS: [u64; 3] = [158, 4096, 65_536];
 
 fn backends() -> Vec<(&'static str, Backend)> {
     let cpu = Cpu::new(None).expect("threads can be started");
@@ -51,66 +47,20 @@ fn backends() -> Vec<(&'static str, Backend)> {
     all
 }
 
-/// A network with random weights that keep the size of its activations.
-fn network(widths: &[usize]) -> Mlp {
-    let mut rng = StdRng::seed_from_u64(1);
-    let mut layer = |inputs: usize, outputs: usize| {
-        let scale = (6.0 / inputs as f32).sqrt();
-        Layer {
-            weight: (0..inputs * outputs).map(|_| rng.random_range(-scale..scale)).collect(),
-            bias: vec![0.1; outputs],
-            inputs,
-            outputs,
-        }
-    };
-    let layers = widths.windows(2).map(|pair| layer(pair[0], pair[1])).collect();
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a valid network")
-}
-
-/// 65,536 starts within 5 cm of the study's 500.
-fn race_starts() -> Vec<[f32; 12]> {
-    let text = include_str!("../configs/race_starts_500.csv");
-    let rows = text.lines().filter(|line| !line.starts_with('#'));
-    let number = |cell: &str| cell.parse::<f32>().expect("a number");
-    let row = |line: &str| {
-        let mut cells = line.split(',').map(number);
-        std::array::from_fn(|_| cells.next().expect("12 states"))
-    };
-    let study: Vec<[f32; 12]> = rows.map(row).collect();
-    let mut rng = StdRng::seed_from_u64(2);
-    let near = |i: usize| study[i % study.len()].map(|x| x + rng.random_range(-0.05..0.05));
-    (0..65_536).map(near).collect()
-}
-
-/// Damping of the ego's velocities: physics without a network.
-struct Damping;
-
-impl Policy<12, 3> for Damping {
-    fn name(&self) -> String {
-        "damping".to_owned()
-    }
-
-    #[inline(always)]
-    fn control<R: Real>(&self, x: [R; 12]) -> [R; 3] {
-        let gain = R::lit(-0.5);
-        [gain * x[1], gain * x[3], gain * x[5]]
-    }
-}
-
 /// What all benches share.
 struct Bench {
     backends: Vec<(&'static str, Backend)>,
-    starts: Vec<[f32; 12]>,
+    data: Data,
     spec: RolloutSpec,
     tightening: Tightening,
 }
 
 impl Bench {
     fn new() -> Self {
-        let spec = RolloutSpec::new(HORIZON, 0.95).expect("a valid specification");
+        let spec = data::rollout_spec().expect("a valid specification");
         Self {
             backends: backends(),
-            starts: race_starts(),
+            data: Data::new(1).expect("the data are whole"),
             spec,
             tightening: Tightening::none(&spec),
         }
@@ -126,7 +76,7 @@ impl Bench {
         let system = DroneRace::default();
         let plant = Plant { system: &system, policy };
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&self.starts),
+            starts: Starts::Listed(&self.data.starts),
             range: 0..count,
             spec: self.spec,
             tightening: &self.tightening,
@@ -157,7 +107,7 @@ impl Bench {
         let plant = Plant { system: &system, policy };
         let task = DeviationTask {
             pairs: Pairs {
-                nominal: Starts::Listed(&self.starts),
+                nominal: Starts::Listed(&self.data.starts),
                 radius: 0.1,
                 stream: Stream::new(1, Purpose::User, 0),
             },
@@ -185,10 +135,9 @@ impl Bench {
 fn reach_avoid(criterion: &mut Criterion) {
     let bench = Bench::new();
     let mut group = criterion.benchmark_group("reach_avoid");
-    for (name, widths, counts) in NETWORKS {
-        let policy = network(widths);
-        for &count in counts {
-            bench.reach_avoid(&mut group, (name, &policy), count, Query::Measure);
+    for (name, policy) in &bench.data.networks {
+        for count in COUNTS {
+            bench.reach_avoid(&mut group, (name, &**policy), count, Query::Measure);
         }
     }
     bench.reach_avoid(&mut group, ("formula", &Damping), 65_536, Query::Measure);
@@ -196,24 +145,41 @@ fn reach_avoid(criterion: &mut Criterion) {
 
 fn sign(criterion: &mut Criterion) {
     let bench = Bench::new();
-    let file = "configs/policies/race_policy.safetensors";
-    let policy = Mlp::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(file));
-    let policy = policy.expect("the race policy is there");
+    let policy = &*bench.data.policy;
     let mut group = criterion.benchmark_group("sign");
     for count in [158, 65_536] {
-        bench.reach_avoid(&mut group, ("dense", &policy), count, Query::Measure);
-        bench.reach_avoid(&mut group, ("sign", &policy), count, Query::Sign);
+        bench.reach_avoid(&mut group, ("dense", policy), count, Query::Measure);
+        bench.reach_avoid(&mut group, ("sign", policy), count, Query::Sign);
     }
 }
 
 fn deviation(criterion: &mut Criterion) {
     let bench = Bench::new();
-    let policy = network(NETWORKS[0].1);
+    let (name, policy) = &bench.data.networks[0];
     let mut group = criterion.benchmark_group("deviation");
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
-        bench.deviation(&mut group, ("3x64", &policy), 16_384, control);
+        bench.deviation(&mut group, (name, &**policy), 16_384, control);
         bench.deviation(&mut group, ("formula", &Damping), 16_384, control);
     }
+}
+
+/// A plain loop on one thread over the first starts, the rival of `reach_avoid`.
+fn scalar_loop(criterion: &mut Criterion) {
+    let bench = Bench::new();
+    let system = DroneRace::default();
+    let starts = &bench.data.starts[..158];
+    let (name, policy) = &bench.data.networks[0];
+    let mut group = criterion.benchmark_group("scalar loop");
+    group.throughput(Throughput::Elements(starts.len() as u64));
+    let plant = Plant { system: &system, policy: &Damping };
+    group.bench_function("formula", |b| {
+        b.iter(|| black_box(scalar::measures(plant, starts, bench.spec)));
+    });
+    let plant = Plant { system: &system, policy: &**policy };
+    group.bench_function(*name, |b| {
+        b.iter(|| black_box(scalar::measures(plant, starts, bench.spec)));
+    });
+    group.finish();
 }
 
 /// What a controller does between two steps: the slice of 468 states, and a growth whose five rounds
@@ -221,11 +187,8 @@ fn deviation(criterion: &mut Criterion) {
 fn growth_round(criterion: &mut Criterion) {
     let bench = Bench::new();
     let system = DroneRace::default();
-    let file = "configs/policies/race_policy.safetensors";
-    let policy = Mlp::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(file));
-    let policy = policy.expect("the race policy is there");
-    let plant = Plant { system: &system, policy: &policy };
-    let mut settings = Settings::new(&system, bench.starts[0], bench.spec);
+    let plant = Plant { system: &system, policy: &*bench.data.policy };
+    let mut settings = Settings::new(&system, bench.data.starts[0], bench.spec);
     let axis = |state, low: f32, cells: u8| SliceAxis {
         state,
         values: (0..cells).map(|i| low + 0.1 * f32::from(i)).collect(),
@@ -233,7 +196,7 @@ fn growth_round(criterion: &mut Criterion) {
     settings.slice = [axis(0, -0.9, 18), axis(2, -2.6, 26)];
     settings.growth.rounds = 5;
     // A start beside the fence, whose neighbourhood fails however small the ball.
-    let mut point = bench.starts[0];
+    let mut point = bench.data.starts[0];
     (point[0], point[2]) = (0.6, -0.55);
     let boundary = Boundary { point, distance: 0.0 };
     let mut group = criterion.benchmark_group("growth");
@@ -254,23 +217,22 @@ fn growth_round(criterion: &mut Criterion) {
 /// The layers alone, by the `gemm` crate; one element is the layers of one rollout.
 fn gemm(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("gemm");
-    for (name, widths, counts) in NETWORKS {
-        let policy = network(widths);
-        for &count in counts {
+    let data = Data::new(1).expect("the data are whole");
+    for (name, policy) in &data.networks {
+        for count in COUNTS {
             let count = count as usize;
             let tile = TILE.min(count.div_ceil(rayon::current_num_threads()));
             let starts = (0..count).step_by(tile);
             let tiles: Vec<usize> = starts.map(|first| tile.min(count - first)).collect();
             group.throughput(Throughput::Elements(count as u64));
-            group.bench_function(BenchmarkId::new(name, count), |b| {
-                b.iter(|| tiles.par_iter().for_each(|lanes| layers(&policy, *lanes)));
+            group.bench_function(BenchmarkId::new(*name, count), |b| {
+                b.iter(|| tiles.par_iter().for_each(|lanes| layers(policy, *lanes)));
             });
         }
     }
 }
 
 /// The layers of `policy` for a tile of `lanes` trajectories, `HORIZON` times.
-#[allow(unsafe_code, reason = "the crate's interface takes pointers")]
 fn layers(policy: &Mlp, lanes: usize) {
     let widest = policy.widths().into_iter().max().unwrap_or(0);
     let mut x = vec![0.5_f32; widest * lanes];
@@ -278,31 +240,7 @@ fn layers(policy: &Mlp, lanes: usize) {
     for _ in 0..HORIZON {
         for layer in policy.layers() {
             let (inputs, outputs) = (layer.inputs, layer.outputs);
-            // SAFETY: x is `[inputs, lanes]` and y `[outputs, lanes]`, both of at least that
-            // size; the weights are `[outputs, inputs]`.
-            unsafe {
-                gemm::gemm(
-                    lanes,
-                    outputs,
-                    inputs,
-                    y.as_mut_ptr(),
-                    lanes as isize,
-                    1,
-                    false,
-                    x.as_ptr(),
-                    lanes as isize,
-                    1,
-                    layer.weight.as_ptr(),
-                    inputs as isize,
-                    1,
-                    0.0,
-                    1.0,
-                    false,
-                    false,
-                    false,
-                    gemm::Parallelism::None,
-                );
-            }
+            multiply(&mut y, &layer.weight, &x, [outputs, inputs, lanes]);
         }
     }
     black_box((&mut x, &mut y));
@@ -318,6 +256,6 @@ fn short() -> Criterion {
 criterion_group! {
     name = benches;
     config = short();
-    targets = reach_avoid, sign, deviation, growth_round, gemm
+    targets = reach_avoid, scalar_loop, sign, deviation, growth_round, gemm
 }
 criterion_main!(benches);

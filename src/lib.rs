@@ -2,11 +2,12 @@
 //! that they support.
 //!
 //! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
-//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`experiment`]; [`report`]; the
-//! command line.
+//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`experiment`] and [`bench`];
+//! [`report`]; the command line.
 //! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
 
 pub mod backend;
+pub mod bench;
 pub mod cli;
 pub mod config;
 pub mod control;

@@ -352,7 +352,7 @@ fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
 }
 
 /// Layer of each top-level module; a file may name its own layer and those above it.
-const LAYERS: [(&str, u32); 17] = [
+const LAYERS: [(&str, u32); 18] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -365,6 +365,7 @@ const LAYERS: [(&str, u32); 17] = [
     ("scenario", 5),
     ("control", 5),
     ("experiment", 7),
+    ("bench", 7),
     ("report", 8),
     ("cli", 9),
     ("config", 9),

@@ -85,7 +85,8 @@ fn a_point_is_what_race_flies() {
         };
         let set: Vec<String> =
             sections.iter().map(|section| format!("--set={section}.samples={samples}")).collect();
-        let mut arguments = vec!["race", CONFIG, "--starts", sweep_run::STARTS, "--noise-seeds", "2"];
+        let mut arguments =
+            vec!["race", CONFIG, "--starts", sweep_run::STARTS, "--noise-seeds", "2"];
         arguments.extend(["--set", sweep_run::STEPS, "--controllers", name]);
         arguments.extend(set.iter().map(String::as_str));
         let text = printed(&arguments, &folder.path(&format!("race{i}")));

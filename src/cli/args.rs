@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::sweep::SweepArguments;
 use crate::config::{Overrides, Profile};
 
 /// Batch rollouts and the probabilistic reach-avoid certificates that they support.
@@ -27,6 +28,7 @@ Examples:
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
   reachcast scenarios --epsilon 0.1 --beta 1e-3
+  reachcast bench --quick
 
 Exit codes:
   0  done
@@ -189,6 +191,18 @@ Examples:
   reachcast scenarios --epsilon 0.1 --beta 1e-3 --rounds 5
   reachcast scenarios --epsilon 0.01 --beta 1e-6 --failures 3")]
     Scenarios(ScenarioArguments),
+    /// Measure this machine's limits, then how near the workloads come to them
+    ///
+    /// Runs on the CPU and on a hardware GPU if there is one; --backend or --device names one of them,
+    /// and may name a software adapter, which gets the small workloads only. Rates are medians of
+    /// repeated calls after a warm-up. With --out DIR the record goes to DIR/bench.json as well.
+    #[command(after_help = "\
+Examples:
+  reachcast bench --quick
+  reachcast bench --workload rollout/3x64 --threads 1
+  reachcast bench --json --out bench-out
+  reachcast bench --export exported        # networks, starts and results for other programs")]
+    Bench(BenchArguments),
     /// List the devices that can run rollouts
     Devices,
 }
@@ -209,82 +223,18 @@ pub(super) struct RaceArguments {
     pub(super) noise_seeds: u64,
 }
 
-/// What `sweep` is asked for.
+/// What `bench` is asked for.
 #[derive(Args, Clone, Debug)]
-pub(super) struct SweepArguments {
-    /// Configuration (TOML)
-    pub(super) config: PathBuf,
-    /// What each point is
-    #[arg(long, value_enum, default_value_t = Of::Race)]
-    pub(super) of: Of,
-    /// Any key of the configuration and its values; repeatable
-    #[arg(long, value_name = "KEY=LIST")]
-    pub(super) vary: Vec<String>,
-    /// Steps of a plan (races), or of a rollout (certificates)
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) horizon: Option<String>,
-    #[command(flatten, next_help_heading = "Races")]
-    pub(super) race: RaceAxes,
-    #[command(flatten, next_help_heading = "Certificates")]
-    pub(super) certificate: CertificateAxes,
-}
-
-/// What the points of a sweep are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Of {
-    /// Races of one controller
-    Race,
-    /// Certificates
-    Certificate,
-}
-
-/// Axes and options of a sweep of races.
-#[derive(Args, Clone, Debug)]
-pub(super) struct RaceAxes {
-    /// Controllers [default: mppi]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) controllers: Option<String>,
-    /// Samples K of a plan
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) samples: Option<String>,
-    /// Temperatures lambda of a plan, in units of cost
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) temperature: Option<String>,
-    /// Standard deviations of the noise; a list in brackets has one for each control
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) sigma: Option<String>,
-    /// How the noise hangs together over the steps
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) noise: Option<String>,
-    /// Improvements of a plan at each control step
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) iterations: Option<String>,
-    /// Starts: how many to draw from race.start_box, or a file, .npy or .csv [default: race.starts]
-    #[arg(long, value_name = "N|FILE")]
-    pub(super) starts: Option<String>,
-    /// Runs of each point, with the noise seeds SEED, SEED + 1, ... [default: 1]
-    #[arg(long, value_name = "M")]
-    pub(super) noise_seeds: Option<u64>,
-}
-
-/// Axes of a sweep of certificates.
-#[derive(Args, Clone, Debug)]
-pub(super) struct CertificateAxes {
-    /// Risks epsilon of deviation bound and growth
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) epsilon: Option<String>,
-    /// One minus the confidence of each claim
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) beta: Option<String>,
-    /// Radii eps_x of the perturbation
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) radius: Option<String>,
-    /// Deviation bounds: fixed-shape, variables, bonferroni, separate, exact
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) bound: Option<String>,
-    /// Where the scenario counts come from: simple, exact (bounds), config [default: simple]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) count: Option<String>,
+pub(super) struct BenchArguments {
+    /// Fewer calls, no large work: about a quarter of a minute
+    #[arg(long)]
+    pub(super) quick: bool,
+    /// Only the workloads whose names contain this
+    #[arg(long, value_name = "FILTER")]
+    pub(super) workload: Option<String>,
+    /// Measure nothing; write what the workloads run on, and what they must come to, to this folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["quick", "workload"])]
+    pub(super) export: Option<PathBuf>,
 }
 
 /// The claim that `scenarios` is asked about.

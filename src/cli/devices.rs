@@ -31,6 +31,22 @@ pub(super) fn open(global: &Global) -> Result<Backend> {
     }
 }
 
+/// Opens every backend that the flags ask for: with `auto` the CPU, and a hardware adapter if there
+/// is one; else the one that [`open`] takes.
+///
+/// # Errors
+/// [`Error::Device`] if there is none of that name or kind.
+pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
+    if global.backend != BackendName::Auto || global.device.is_some() {
+        return Ok(vec![open(global)?]);
+    }
+    let mut all = vec![cpu(global)?];
+    if let found @ Backend::Gpu(_) = open(global)? {
+        all.push(found);
+    }
+    Ok(all)
+}
+
 /// The CPU with the threads asked for.
 fn cpu(global: &Global) -> Result<Backend> {
     Cpu::new(global.threads.map(usize::from)).map(Backend::Cpu)

@@ -1,6 +1,7 @@
 //! The command line: reads arguments, runs a command, says what came of it by its exit code.
 
 mod args;
+mod bench;
 mod certify;
 mod devices;
 mod progress;
@@ -67,6 +68,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Race(asked) => race::run(global, asked),
         Command::Sweep(asked) => sweep::run(global, asked),
         Command::Scenarios(asked) => scenarios::run(global, *asked),
+        Command::Bench(asked) => bench::run(global, asked),
         Command::Devices => devices::list(global),
     }
 }

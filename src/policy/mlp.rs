@@ -23,6 +23,15 @@ pub enum Activation {
 }
 
 impl Activation {
+    /// Its name in files.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Relu => "relu",
+            Self::Tanh => "tanh",
+            Self::Silu => "silu",
+        }
+    }
+
     /// The activation at `x`; NaN stays NaN.
     #[inline(always)]
     pub fn apply<R: Real>(self, x: R) -> R {
@@ -49,6 +58,14 @@ pub enum OutputActivation {
 }
 
 impl OutputActivation {
+    /// Its name in files.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Tanh => "tanh",
+            Self::Identity => "identity",
+        }
+    }
+
     /// The activation at `x`.
     #[inline(always)]
     pub fn apply<R: Real>(self, x: R) -> R {
@@ -143,6 +160,32 @@ impl Mlp {
         let mlp = Self { layers: layers.into(), activation, output, state_order };
         mlp.validate()?;
         Ok(mlp)
+    }
+
+    /// The bytes of its safetensors file, which [`Self::from_bytes`] reads.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the library refuses to write them.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let mut tensors = Vec::new();
+        for (i, layer) in self.layers.iter().enumerate() {
+            let weight = (vec![layer.outputs, layer.inputs], le_bytes(&layer.weight));
+            tensors.push((format!("layers.{i}.weight"), weight));
+            tensors
+                .push((format!("layers.{i}.bias"), (vec![layer.outputs], le_bytes(&layer.bias))));
+        }
+        let mut words = HashMap::from([
+            ("activation".to_owned(), self.activation.name().to_owned()),
+            ("output".to_owned(), self.output.name().to_owned()),
+        ]);
+        words.extend(self.state_order.iter().map(|order| ("state_order".into(), order.join(","))));
+        let refused = |e: safetensors::SafeTensorError| Error::invalid("network", e.to_string());
+        let mut views = Vec::new();
+        for (name, (shape, bytes)) in &tensors {
+            let view = TensorView::new(Dtype::F32, shape.clone(), bytes).map_err(refused)?;
+            views.push((name, view));
+        }
+        safetensors::serialize(views, Some(words)).map_err(refused)
     }
 
     /// The layers, input side first.
@@ -302,4 +345,9 @@ fn floats(name: &str, tensor: &TensorView<'_>) -> std::result::Result<Vec<f32>, 
     }
     let float = |bytes: &[u8]| bytes.try_into().map(f32::from_le_bytes).unwrap_or(f32::NAN);
     Ok(tensor.data().chunks_exact(4).map(float).collect())
+}
+
+/// The numbers as a file holds them.
+fn le_bytes(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }

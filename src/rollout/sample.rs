@@ -41,6 +41,8 @@ pub enum Purpose {
     ControlNoise,
     /// Starts of races.
     RaceStart,
+    /// Weights and starts of benchmarks.
+    Bench,
 }
 
 /// A sequence of random samples, addressed by index.

@@ -76,7 +76,22 @@ impl Cpu {
     /// The processor in words: model and instruction set. Not the number of threads: nothing that a
     /// certificate says depends on it.
     pub fn device(&self) -> String {
-        format!("{}, {}", self.model, self.instructions.name())
+        format!("{}, {}", self.model, self.instructions())
+    }
+
+    /// The processor's name as the system knows it, else its architecture.
+    pub fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// The instruction set that the rollouts run with, in words.
+    pub fn instructions(&self) -> &'static str {
+        self.instructions.name()
+    }
+
+    /// Threads that the rollouts run on.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
     }
 
     /// See [`super::Backend::reach_avoid`].

@@ -1,7 +1,7 @@
 //! From the options of `sweep` to its axes.
 
+use super::arguments::{CertificateAxes, Of, RaceAxes, SweepArguments};
 use super::grid::{Axis, Grid, Kind, Target, varied};
-use crate::cli::args::{CertificateAxes, Of, RaceAxes, SweepArguments};
 use crate::cli::race_input::names;
 use crate::error::{Error, Result};
 

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::Backend;
-use crate::cli::args::{Global, SweepArguments};
+use crate::cli::args::Global;
 use crate::cli::folder_of;
 use crate::cli::progress::Progress;
 use crate::config::{Config, Job, Overrides, PolicySource};

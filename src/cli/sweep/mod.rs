@@ -1,5 +1,6 @@
 //! The command `sweep`: a grid of settings, raced or certified point by point.
 
+mod arguments;
 mod axes;
 mod certificate;
 mod grid;
@@ -8,11 +9,14 @@ mod text;
 
 use std::path::PathBuf;
 
-use super::args::{Global, Of, SweepArguments};
+use super::args::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::error::Result;
 use crate::report::sweep_html;
+use arguments::Of;
+
+pub(super) use arguments::SweepArguments;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-sweep";

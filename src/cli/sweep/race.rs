@@ -4,9 +4,10 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
+use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::Backend;
-use crate::cli::args::{Global, SweepArguments};
+use crate::cli::args::Global;
 use crate::cli::progress::Progress;
 use crate::cli::race_input::{RaceInput, noise_seeds};
 use crate::config::Overrides;

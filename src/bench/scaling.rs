@@ -1,0 +1,93 @@
+//! Batches of growing size in one process: time should grow linearly, memory not at all.
+
+use std::hint::black_box;
+
+use super::data::{self, Data};
+use super::measure::{Protocol, measure};
+use super::record::ScalingRecord;
+use crate::backend::Backend;
+use crate::error::Result;
+use crate::policy::Mlp;
+use crate::rollout::{Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
+use crate::scenario::Watch;
+use crate::system::{DroneRace, System};
+
+/// Sizes of the batches.
+pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
+/// Number of the stream of the starts.
+const STREAM: u32 = 1 << 17;
+
+/// Rolls out the batches of `sizes`, one after the other, under the first network of `data`.
+///
+/// # Errors
+/// Those of the backend, and interruption.
+pub fn scaling(
+    backend: &Backend,
+    data: &Data,
+    sizes: &[u64],
+    protocol: &Protocol,
+    watch: &dyn Watch,
+) -> Result<Vec<ScalingRecord>> {
+    let (_, network) = &data.networks[0];
+    let batch = |&rollouts: &u64| {
+        reset_peak();
+        watch.begin(&format!("{rollouts} rollouts"), rollouts);
+        let timing = measure(protocol, || roll(backend, network, data.seed, rollouts, watch))?;
+        Ok(ScalingRecord {
+            backend: backend.name().to_owned(),
+            rollouts,
+            timing,
+            rollouts_per_second: rollouts as f64 / timing.median_seconds,
+            peak_bytes: peak_bytes(),
+        })
+    };
+    sizes.iter().map(batch).collect()
+}
+
+/// Rolls out `count` starts drawn from the default box of the race.
+fn roll(backend: &Backend, network: &Mlp, seed: u64, count: u64, watch: &dyn Watch) -> Result<()> {
+    let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
+    let axes = system.states();
+    let low = axes.each_ref().map(|axis| axis.low);
+    let region = Region::new_box(low, axes.each_ref().map(|axis| axis.high))?;
+    let task = ReachAvoidTask {
+        starts: Starts::Drawn { region, stream: Stream::new(seed, Purpose::Bench, STREAM) },
+        range: 0..count,
+        spec,
+        tightening: &Tightening::none(&spec),
+        query: Query::Measure,
+    };
+    backend.reach_avoid(Plant { system: &system, policy: network }, &task, &mut |_, measures| {
+        black_box(measures);
+        watch.advance(measures.len() as u64)
+    })
+}
+
+/// Starts the count of [`peak_bytes`] anew, where the system lets a process do that (Linux).
+/// Elsewhere it goes on from the start of the process, which hides no growth.
+fn reset_peak() {
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// Most memory that the process held since the last reset, bytes; where the system tells.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kibibytes| kibibytes << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_peak_sees_what_was_held() {
+        reset_peak();
+        let before = peak_bytes().unwrap();
+        let held = black_box(vec![1_u8; 64 << 20]);
+        let during = peak_bytes().unwrap();
+        drop(held);
+        assert!(during >= before + (60 << 20), "{before} to {during}");
+    }
+}

@@ -1,0 +1,83 @@
+//! The arguments of `sweep`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+/// What `sweep` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(in crate::cli) struct SweepArguments {
+    /// Configuration (TOML)
+    pub(in crate::cli) config: PathBuf,
+    /// What each point is
+    #[arg(long, value_enum, default_value_t = Of::Race)]
+    pub(in crate::cli) of: Of,
+    /// Any key of the configuration and its values; repeatable
+    #[arg(long, value_name = "KEY=LIST")]
+    pub(in crate::cli) vary: Vec<String>,
+    /// Steps of a plan (races), or of a rollout (certificates)
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) horizon: Option<String>,
+    #[command(flatten, next_help_heading = "Races")]
+    pub(in crate::cli) race: RaceAxes,
+    #[command(flatten, next_help_heading = "Certificates")]
+    pub(in crate::cli) certificate: CertificateAxes,
+}
+
+/// What the points of a sweep are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum Of {
+    /// Races of one controller
+    Race,
+    /// Certificates
+    Certificate,
+}
+
+/// Axes and options of a sweep of races.
+#[derive(Args, Clone, Debug)]
+pub(in crate::cli) struct RaceAxes {
+    /// Controllers [default: mppi]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) controllers: Option<String>,
+    /// Samples K of a plan
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) samples: Option<String>,
+    /// Temperatures lambda of a plan, in units of cost
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) temperature: Option<String>,
+    /// Standard deviations of the noise; a list in brackets has one for each control
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) sigma: Option<String>,
+    /// How the noise hangs together over the steps
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) noise: Option<String>,
+    /// Improvements of a plan at each control step
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) iterations: Option<String>,
+    /// Starts: how many to draw from race.start_box, or a file, .npy or .csv [default: race.starts]
+    #[arg(long, value_name = "N|FILE")]
+    pub(in crate::cli) starts: Option<String>,
+    /// Runs of each point, with the noise seeds SEED, SEED + 1, ... [default: 1]
+    #[arg(long, value_name = "M")]
+    pub(in crate::cli) noise_seeds: Option<u64>,
+}
+
+/// Axes of a sweep of certificates.
+#[derive(Args, Clone, Debug)]
+pub(in crate::cli) struct CertificateAxes {
+    /// Risks epsilon of deviation bound and growth
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) epsilon: Option<String>,
+    /// One minus the confidence of each claim
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) beta: Option<String>,
+    /// Radii eps_x of the perturbation
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) radius: Option<String>,
+    /// Deviation bounds: fixed-shape, variables, bonferroni, separate, exact
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) bound: Option<String>,
+    /// Where the scenario counts come from: simple, exact (bounds), config [default: simple]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(in crate::cli) count: Option<String>,
+}
