@@ -8,8 +8,8 @@ use super::mlp::{Evaluator, Packed};
 use super::mppi_update::Softmin;
 use super::tile::is_finite;
 use crate::backend::softmin::Partial;
-use crate::cost::Cost;
-use crate::real::{Lanes, Real};
+use crate::cost::{Cost, CostMap};
+use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{HUGE, MppiProblem, MppiSpec, MppiTask, Noise, Stream};
 use crate::system::System;
 
@@ -252,6 +252,9 @@ where
             if let Some(penalty) = self.spec.penalty() {
                 total = total + noise_cost(penalty, plan, &u);
             }
+            if let Some((map, place)) = self.cost.map(x) {
+                total = total + map_cost(map, place);
+            }
             x = self.system.step(x, u);
         }
         (*self.x, *self.total) = (x, total);
@@ -274,6 +277,15 @@ fn noise_cost<const N: usize, const NU: usize>(
         cost = cost + Lanes::lit(row) * (u[i] - Lanes::lit(plan[i]));
     }
     cost
+}
+
+/// The costs of the cells at `place`.
+#[inline(always)]
+fn map_cost<const N: usize>(map: &CostMap, place: [Lanes<N>; 2]) -> Lanes<N> {
+    let cell = map.cell(place);
+    let cells = map.cells();
+    // NaN becomes the first cell, one of the border.
+    Lanes(per_lane!(N, i => cells[(cell.0[i] as usize).min(cells.len() - 1)]))
 }
 
 /// What the networks, evaluated at the state before the step, add to cost and state.
