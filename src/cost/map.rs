@@ -82,13 +82,8 @@ impl CostMap {
     /// of the border outside the grid, NaN where a coordinate is.
     #[inline(always)]
     pub fn cell<R: Real>(&self, [x, y]: [R; 2]) -> R {
-        let Grid { origin, resolution, size: [columns, rows] } = self.grid;
-        let per_metre = R::lit(1.0 / resolution);
-        let place = |x: R, origin: f32, count: usize| {
-            let from_border = ((x - R::lit(origin)) * per_metre).floor() + R::lit(1.0);
-            from_border.clamp(R::lit(0.0), R::lit((count + 1) as f32))
-        };
-        place(y, origin[1], rows) * R::lit((columns + 2) as f32) + place(x, origin[0], columns)
+        let row = self.grid.cell_along(1, y);
+        row * R::lit((self.grid.size[0] + 2) as f32) + self.grid.cell_along(0, x)
     }
 
     /// The costs of the cells, the border's included, in order of their numbers.
@@ -122,6 +117,15 @@ impl Grid {
             );
             Error::invalid("grid of the map", problem)
         })
+    }
+
+    /// The number of the cell at `x` along an axis, counted from the border before the grid and
+    /// clamped to the borders.
+    #[inline(always)]
+    fn cell_along<R: Real>(&self, axis: usize, x: R) -> R {
+        let cells = (x - R::lit(self.origin[axis])) * R::lit(1.0 / self.resolution);
+        let from_border = cells.floor() + R::lit(1.0);
+        from_border.clamp(R::lit(0.0), R::lit((self.size[axis] + 1) as f32))
     }
 
     /// Centre of the cell in column and row, m.

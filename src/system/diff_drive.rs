@@ -19,8 +19,7 @@ impl Disc {
     /// Distance of a point from the rim, m: negative inside.
     #[inline(always)]
     pub fn clearance<R: Real>(&self, x: R, y: R) -> R {
-        let [center_x, center_y] = self.center.map(R::lit);
-        (x - center_x).hypot(y - center_y) - R::lit(self.radius)
+        (x - R::lit(self.center[0])).hypot(y - R::lit(self.center[1])) - R::lit(self.radius)
     }
 }
 
@@ -79,8 +78,15 @@ impl DiffDrive {
     #[inline(always)]
     pub fn wheel_speeds<R: Real>(&self, [speed, turn_rate]: [R; 2]) -> [R; 2] {
         let across = R::lit(0.5 * self.wheel_separation) * turn_rate;
-        [speed - across, speed + across].map(|rim| rim / R::lit(self.wheel_radius))
+        let radius = R::lit(self.wheel_radius);
+        [(speed - across) / radius, (speed + across) / radius]
     }
+}
+
+/// Distance from the nearer end of an interval, m: negative outside.
+#[inline(always)]
+fn within<R: Real>(x: R, low: f32, high: f32) -> R {
+    (x - R::lit(low)).min(R::lit(high) - x)
 }
 
 impl System<3, 2> for DiffDrive {
@@ -107,7 +113,7 @@ impl System<3, 2> for DiffDrive {
 
     #[inline(always)]
     fn step<R: Real>(&self, [x, y, yaw]: [R; 3], [speed, turn_rate]: [R; 2]) -> [R; 3] {
-        let [slowest, fastest] = self.speed.map(R::lit);
+        let (slowest, fastest) = (R::lit(self.speed[0]), R::lit(self.speed[1]));
         let fastest_turn = R::lit(self.turn_rate);
         let dt = R::lit(DT);
         let ahead = dt * speed.clamp(slowest, fastest);
@@ -125,9 +131,8 @@ impl System<3, 2> for DiffDrive {
 
     #[inline(always)]
     fn constraint<R: Real>(&self, [x, y, _]: [R; 3]) -> R {
-        let within = |x: R, low: f32, high: f32| (x - R::lit(low)).min(R::lit(high) - x);
-        let mut margin =
-            within(x, self.low[0], self.high[0]).min(within(y, self.low[1], self.high[1]));
+        let [low, high] = [self.low, self.high];
+        let mut margin = within(x, low[0], high[0]).min(within(y, low[1], high[1]));
         for obstacle in &self.obstacles {
             margin = margin.min(obstacle.clearance(x, y));
         }

@@ -69,6 +69,12 @@ where
     }
 }
 
+/// 2^23: added to a whole number below it, it leaves that number in the mantissa. A conversion to
+/// an integer would be several instructions, for the numbers that have none.
+const WHOLE: f32 = 8_388_608.0;
+/// The mantissa.
+const WHOLE_MASK: u32 = 0x7f_ffff;
+
 /// The costs of a group, infinite where they are not finite.
 fn write<const N: usize>(cost: &Lanes<N>, out: &mut [f32]) {
     for (out, cost) in out.iter_mut().zip(cost.0) {
@@ -279,13 +285,15 @@ fn noise_cost<const N: usize, const NU: usize>(
     cost
 }
 
-/// The costs of the cells at `place`.
+/// The costs of the cells at `place`; of NaN the last cell's, one of the border.
 #[inline(always)]
 fn map_cost<const N: usize>(map: &CostMap, place: [Lanes<N>; 2]) -> Lanes<N> {
-    let cell = map.cell(place);
     let cells = map.cells();
-    // NaN becomes the first cell, one of the border.
-    Lanes(per_lane!(N, i => cells[(cell.0[i] as usize).min(cells.len() - 1)]))
+    // Lets the compiler leave out the test of each index.
+    assert!(!cells.is_empty(), "a map has cells");
+    let cell = map.cell(place) + Lanes::lit(WHOLE);
+    let number = |i: usize| (cell.0[i].to_bits() & WHOLE_MASK) as usize;
+    Lanes(per_lane!(N, i => cells[number(i).min(cells.len() - 1)]))
 }
 
 /// What the networks, evaluated at the state before the step, add to cost and state.
