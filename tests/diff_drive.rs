@@ -18,7 +18,7 @@ use reachcast::control::mppi::shifted;
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, MAX_CELLS};
 use reachcast::real::Real;
 use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Purpose, Stream,
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NoiseKind, Purpose, Stream,
 };
 use reachcast::system::{Axis, DiffDrive, Disc, System};
 
@@ -271,14 +271,14 @@ fn the_same_bits_on_any_number_of_threads() {
     assert!(one == run(2) && one == run(5));
 }
 
-/// The least clearance from the obstacles on the way to the goal, m; none if it is not reached.
-/// The yaw to keep is the direction to the goal, as a route would give it.
-fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> Option<f32> {
+/// The least clearance from the obstacles on a way of 30 s at most, m, and whether it ends at the
+/// goal. The yaw to keep is the direction to the goal, as a route would give it.
+fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> (f32, bool) {
     let (backend, system) = (cpu(2), &benchmark.system);
     let mut problems = [MppiProblem { start, ..benchmark.problem.clone() }];
     let [goal_x, goal_y] = system.goal.center;
     let mut least = f32::INFINITY;
-    for step in 0..2500 {
+    for step in 0..1500 {
         let [problem] = &mut problems;
         let [x, y, _] = problem.start;
         problem.context.fill([goal_x, goal_y, (goal_y - y).atan2(goal_x - x)]);
@@ -291,24 +291,42 @@ fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> Opti
         let clearances = system.obstacles.iter().map(|obstacle| obstacle.clearance(x, y));
         least = clearances.fold(least, f32::min);
         if system.target(problem.start) > 0.0 {
-            return Some(least);
+            return (least, true);
         }
     }
-    None
+    (least, false)
+}
+
+/// The benchmark with 512 samples, noise that turns the drive for longer than a step, and a weight
+/// on the yaw below what two seconds of another direction can win.
+fn agile() -> DriveBenchmark {
+    let mut benchmark = DriveBenchmark::new(512).unwrap();
+    let noise = NoiseKind::Colored { time: 10.0 };
+    let settings = MppiSettings { noise, ..*benchmark.planner.spec.settings() };
+    benchmark.planner.spec = MppiSpec::new(settings).unwrap();
+    benchmark.planner.cost.angle = 1.0;
+    benchmark
 }
 
 /// With the map the drive goes around the obstacle on its way; without, through it.
 #[test]
-fn the_benchmark_drives_around_an_obstacle_to_its_goal() {
-    let benchmark = DriveBenchmark::new(512).unwrap();
-    let start = [1.0, 2.0, 0.0];
-    for seed in [1, 2] {
-        let clearance = drive_to_goal(&benchmark, start, seed).expect("the goal is reached");
-        assert!(clearance > 0.0, "touches an obstacle: {clearance} m");
+fn the_drive_goes_around_an_obstacle_to_its_goal() {
+    for (start, seed) in [([1.0, 1.0, 0.0], 1), ([1.0, 2.0, 0.0], 1), ([1.0, 2.0, 0.0], 2)] {
+        let (clearance, arrived) = drive_to_goal(&agile(), start, seed);
+        assert!(arrived && clearance > 0.05, "{start:?}: {arrived}, {clearance} m");
     }
-    let mut blind = benchmark;
+    let mut blind = agile();
     let free = Grid { origin: [0.0; 2], resolution: 11.0, size: [1; 2] };
     blind.planner.cost.map = CostMap::new(free, &[0.0], 0.0).unwrap();
-    let clearance = drive_to_goal(&blind, start, 1).expect("the goal is reached");
-    assert!(clearance < 0.0, "the obstacle is not on the way: {clearance} m");
+    let (clearance, arrived) = drive_to_goal(&blind, [1.0, 2.0, 0.0], 1);
+    assert!(arrived && clearance < 0.0, "the obstacle is not on the way: {clearance} m");
+}
+
+/// As published, a turn away from the goal costs more than two seconds win: the drive stops short
+/// of the obstacle.
+#[test]
+fn the_benchmark_as_published_stops_short_of_an_obstacle() {
+    let benchmark = DriveBenchmark::new(512).unwrap();
+    let (clearance, arrived) = drive_to_goal(&benchmark, [1.0, 1.0, 0.0], 1);
+    assert!(!arrived && (0.05..0.3).contains(&clearance), "{arrived}, {clearance} m");
 }

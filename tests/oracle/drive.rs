@@ -28,9 +28,10 @@ fn cost() -> GoalCost {
     GoalCost { distance: 1.5, angle: 2.5, map }
 }
 
-/// A problem that starts near a corner of the map, or in the middle.
+/// A problem that starts in the middle of the map, or on its way across a border.
 fn problem(number: u32) -> MppiProblem<3, 2, 3> {
-    let start = [[0.31, 0.23, 0.5], [1.9, 1.2, 0.9], [-0.9, -0.5, -2.3]][number as usize];
+    let starts = [[0.31, 0.23, 0.5], [1.83, 1.17, 0.1], [0.63, 1.31, 1.5], [-0.93, -0.53, -2.3]];
+    let start = starts[number as usize];
     let wave = |t: u32| (0.3 * (t + 5 * number) as f32).sin();
     MppiProblem {
         start,
@@ -50,7 +51,7 @@ pub(crate) fn disagreement(backend: &Backend, host: &Backend) -> Result<(), Stri
         ..MppiSettings::new(&system, 70, HORIZON)
     };
     let spec = MppiSpec::new(settings).expect("settings");
-    let problems: Vec<_> = (0..3).map(problem).collect();
+    let problems: Vec<_> = (0..4).map(problem).collect();
     let task = MppiTask {
         spec: &spec,
         problems: &problems,
