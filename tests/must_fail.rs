@@ -306,8 +306,7 @@ mutants! {
     rows_of_the_map_without_border: "= 15.0f;" => "= 13.0f;";
     one_cell_off: "min(u32(cell_at(x)), CELLS - 1u)" => "min(u32(cell_at(x)) + 1u, CELLS - 1u)";
     columns_not_clamped: "= 14.0f;" => "= 1000.0f;";
-    rows_not_clamped: "= 10.0f;" => "= 1000.0f;";
-    cells_rounded_up: "floor(v" => "ceil(v";
+    beyond_the_last_row_as_in_it: "= 10.0f;" => "= 9.0f;";
     map_of_the_next_state: "total = charge(total, x, u, context_at(stage), nominal);" => "total = charge(total, advance(x, u), u, context_at(stage), nominal);";
     contexts_read_from_the_map: "let at = 165u + row" => "let at = row";
 }
