@@ -25,8 +25,8 @@ pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {
     fn stage<R: Real>(&self, x: [R; NX], u: [R; NU], context: [R; NC]) -> R;
 
     /// The map that charges a stage besides, if there is one, and the point where it is looked up;
-    /// whether there is one must not depend on the state. A map is data of the kernels, not part
-    /// of their text.
+    /// only the point may depend on the state. A map is data of the kernels, not part of their
+    /// text.
     #[inline(always)]
     fn map<R: Real>(&self, _x: [R; NX]) -> Option<(&CostMap, [R; 2])> {
         None

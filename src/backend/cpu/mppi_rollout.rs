@@ -69,12 +69,6 @@ where
     }
 }
 
-/// 2^23: added to a whole number below it, it leaves that number in the mantissa. A conversion to
-/// an integer would be several instructions, for the numbers that have none.
-const WHOLE: f32 = 8_388_608.0;
-/// The mantissa.
-const WHOLE_MASK: u32 = 0x7f_ffff;
-
 /// The costs of a group, infinite where they are not finite.
 fn write<const N: usize>(cost: &Lanes<N>, out: &mut [f32]) {
     for (out, cost) in out.iter_mut().zip(cost.0) {
@@ -285,7 +279,14 @@ fn noise_cost<const N: usize, const NU: usize>(
     cost
 }
 
-/// The costs of the cells at `place`; of NaN the last cell's, one of the border.
+/// 2^23: added to a whole number below it, it leaves that number in the mantissa. A conversion to
+/// an integer takes more instructions, for the sake of numbers that no integer holds.
+const WHOLE: f32 = 8_388_608.0;
+/// The mantissa.
+const WHOLE_MASK: u32 = 0x7f_ffff;
+
+/// The costs of the cells at `place`; of NaN, whose mantissa is above any cell's number, that of the
+/// last cell, one of the border.
 #[inline(always)]
 fn map_cost<const N: usize>(map: &CostMap, place: [Lanes<N>; 2]) -> Lanes<N> {
     let cells = map.cells();

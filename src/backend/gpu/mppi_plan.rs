@@ -259,6 +259,15 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_map_takes_room_from_the_problems() {
+        // Contexts of 640 bytes for each problem, behind the cells: room for ten.
+        let cells = ((1 << 22) - 10 * 640) / 4;
+        let size = Size { cells, ..size(3, 20, 64, 100) };
+        let plan = MppiPlan::new(&Adapter::made_up(1 << 22), &size).expect("a plan that fits");
+        assert_eq!(plan.problems, 10);
+    }
+
     fn check(size: &Size<'_>, plan: &MppiPlan, binding: u64) {
         let stride = u64::from(plan.stride);
         assert_eq!(plan.width % (WORKGROUP * plan.rounds), 0, "{plan:?}");
@@ -300,6 +309,9 @@ mod tests {
     fn what_cannot_run_is_refused() {
         let small = MppiPlan::new(&Adapter::made_up(1 << 10), &size(3, 20, 500, 1));
         assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
+        let mapped = Size { cells: 1 << 25, ..size(3, 20, 500, 1) };
+        let mapped = MppiPlan::new(&Adapter::made_up(1 << 27), &mapped);
+        assert!(mapped.expect_err("no room for contexts").to_string().contains("the map"));
         let wide = MppiPlan::new(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));
         assert!(wide.expect_err("too wide").to_string().contains("65 controls"));
         let long = most_steps(4, |steps| steps * MAX_TRIPS * 2);
