@@ -7,7 +7,7 @@
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
 // [problems, H, NU]
 @group(0) @binding(18) var<storage, read> plans: array<f32>;
-// [problems, H, NC]
+// The cells of the map where there is one, then [problems, H, NC]
 @group(0) @binding(19) var<storage, read> contexts: array<f32>;
 @group(0) @binding(21) var<storage, read_write> totals: array<f32>;
 

@@ -4,6 +4,8 @@
 //! reference to see it; the comparison itself passes on the kernels as they are.
 
 mod common;
+#[path = "oracle/drive.rs"]
+mod drive;
 #[path = "oracle/mppi.rs"]
 mod oracle;
 
@@ -211,6 +213,11 @@ fn plans_agree(backend: &Backend, task: &MppiTask<'_, 2, 1, 3>) -> bool {
     })
 }
 
+/// Whether the adapter agrees with f64 on plans across a cost map.
+fn map_parity(gpu: Gpu) -> bool {
+    drive::disagreement(&Backend::Gpu(gpu), &common::cpu(1)).is_ok()
+}
+
 /// Requires that `parity` fails once `old` is replaced by `new`, and that the text had `old`.
 fn caught(parity: fn(Gpu) -> bool, old: &'static str, new: &'static str) {
     let Some(gpu) = adapter() else { return };
@@ -231,6 +238,9 @@ fn kernels_as_they_are_agree() {
     }
     if let Some(gpu) = adapter() {
         assert!(mppi_parity(gpu));
+    }
+    if let Some(gpu) = adapter() {
+        assert!(map_parity(gpu));
     }
 }
 
@@ -286,4 +296,17 @@ mutants! {
     noise_not_correlated: "correlated = recurrence(correlated, fresh);" => "correlated = fresh;";
     correlation_lost_between_dispatches: "if params.step > 0u {" => "if params.step > params.horizon {";
     a_knot_too_far: "next_knot < row.first + SUPPORT" => "next_knot <= row.first + SUPPORT";
+}
+
+// The map has 13 columns and 9 rows: with its border, 15 and 11.
+mutants! {
+    map_parity:
+    map_forgotten: " + contexts[cell]" => "";
+    rows_and_columns_swapped: "cell_at(x)" => "cell_at(State(x[1], x[0], x[2]))";
+    rows_of_the_map_without_border: "= 15.0f;" => "= 13.0f;";
+    one_cell_off: "min(u32(cell_at(x)), CELLS - 1u)" => "min(u32(cell_at(x)) + 1u, CELLS - 1u)";
+    columns_not_clamped: "= 14.0f;" => "= 1000.0f;";
+    beyond_the_last_row_as_in_it: "= 10.0f;" => "= 9.0f;";
+    map_of_the_next_state: "total = charge(total, x, u, context_at(stage), nominal);" => "total = charge(total, advance(x, u), u, context_at(stage), nominal);";
+    contexts_read_from_the_map: "let at = 165u + row" => "let at = row";
 }

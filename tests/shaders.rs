@@ -9,13 +9,15 @@ use naga::{AddressSpace, StorageAccess, TypeInner};
 use reachcast::backend::gpu::Params;
 use reachcast::backend::gpu::compose::{Access, Kernel, MppiText, Shape, Slot, compose};
 use reachcast::backend::physics;
-use reachcast::cost::{Cost, Fence, Quadratic, RaceCost, RecoveryCost, Safety};
+use reachcast::cost::{
+    Cost, CostMap, Fence, GoalCost, Grid, Quadratic, RaceCost, RecoveryCost, Safety,
+};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiSettings, MppiSpec, MppiTask, NoiseKind, Plant, ValueTerm,
 };
-use reachcast::system::{Axis, BangBang, Cone, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, BangBang, Cone, DiffDrive, DoubleIntegrator, DroneRace, System};
 
 /// One state, one control: the recorded functions take and return plain numbers.
 struct Scalar;
@@ -84,6 +86,7 @@ fn plants<S: System<NX, NU>, const NX: usize, const NU: usize>(
 fn all_plants() -> Vec<(String, Shape, String)> {
     let mut all = plants(&Scalar);
     all.extend(plants(&DoubleIntegrator::default()));
+    all.extend(plants(&DiffDrive::default()));
     let integrator = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
     let text = physics(Plant { system: &integrator, policy: &policy });
@@ -150,6 +153,12 @@ impl Cost<1, 1, 1> for Scalar {
     }
 }
 
+/// A map of three columns and two rows.
+fn map(costs: &[f32]) -> CostMap {
+    let grid = Grid { origin: [0.0; 2], resolution: 1.0, size: [3, 2] };
+    CostMap::new(grid, costs, 1.0).expect("a map")
+}
+
 fn mppi_texts() -> Vec<(String, MppiText)> {
     let mut all = Vec::new();
     mppi_texts_of(&Scalar, &Scalar, &mut all);
@@ -166,6 +175,8 @@ fn mppi_texts() -> Vec<(String, MppiText)> {
         fence,
     });
     mppi_texts_of(&DroneRace::default(), &cost, &mut all);
+    let goal = GoalCost { distance: 1.0, angle: 1.0, map: map(&[0.0; 6]) };
+    mppi_texts_of(&DiffDrive::default(), &goal, &mut all);
     all
 }
 
@@ -339,6 +350,22 @@ fn uniform_block_has_the_layout_of_params() {
             assert_eq!(*inner, TypeInner::Scalar(scalar), "{name}");
         }
     });
+}
+
+/// What a map costs is data: another map of the same size compiles no kernel anew.
+#[test]
+fn a_map_is_not_part_of_the_text() {
+    let text = |costs: &[f32]| {
+        let mut all = Vec::new();
+        let goal = GoalCost { distance: 1.0, angle: 1.0, map: map(costs) };
+        mppi_texts_of(&DiffDrive::default(), &goal, &mut all);
+        all
+    };
+    assert_eq!(text(&[0.0; 6]), text(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+    for (name, text) in mppi_texts() {
+        let rollout = text.compose(Kernel::MppiRollout);
+        assert_eq!(rollout.contains("cell_at"), name.starts_with("diff-drive"), "{name}");
+    }
 }
 
 #[test]

@@ -7,18 +7,20 @@
 mod common;
 
 use std::array::from_fn;
+use std::sync::LazyLock;
 
 use common::backends;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::backend::Backend;
+use reachcast::cost::{Cost, CostMap, GoalCost, Grid};
 use reachcast::policy::Policy;
 use reachcast::real::record::record;
 use reachcast::real::{Lanes, Real};
 use reachcast::rollout::{
     Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening, normal_pair,
 };
-use reachcast::system::{Axis, Cone, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, Cone, DiffDrive, DoubleIntegrator, DroneRace, System};
 
 /// Inputs of every formula: twelve states and three controls of the race; others use the first.
 const INPUTS: usize = 15;
@@ -29,6 +31,19 @@ const FAR: f32 = 1.0e9;
 /// What an adapter may be farther from f64 than the host's own f32.
 const FACTOR: f64 = 8.0;
 
+static DRIVE: LazyLock<DiffDrive> = LazyLock::new(DiffDrive::default);
+static GOAL: LazyLock<GoalCost> = LazyLock::new(|| {
+    // Sides of cells at numbers that `inputs` favours.
+    let grid = Grid { origin: [-1.5, -1.25], resolution: 0.25, size: [11, 9] };
+    let map = CostMap::new(grid, &[0.0; 99], 1.0).expect("a map");
+    GoalCost { distance: 1.5, angle: 2.5, map }
+});
+
+/// A pose between the obstacles of the drive.
+fn among_obstacles<R: Real>(x: [R; INPUTS]) -> [R; 3] {
+    [R::lit(6.0) + R::lit(2.0) * x[0], R::lit(6.5) + R::lit(1.5) * x[1], x[2]]
+}
+
 /// A formula under test, the same source for every evaluator.
 #[derive(Clone, Copy, Debug)]
 enum Formula {
@@ -36,6 +51,11 @@ enum Formula {
     RaceTarget,
     RaceConstraint(Cone),
     IntegratorStep(usize),
+    DriveStep(usize),
+    DriveTarget,
+    DriveConstraint,
+    GoalStage,
+    MapCell,
     Sine,
     Cosine,
     Tangent,
@@ -55,6 +75,14 @@ impl Formula {
             Self::RaceTarget => race(Cone::Distance).target(state),
             Self::RaceConstraint(cone) => race(cone).constraint(state),
             Self::IntegratorStep(i) => DoubleIntegrator::default().step([x[0], x[1]], [x[2]])[i],
+            Self::DriveStep(i) => DRIVE.step([x[0], x[1], R::lit(2.0) * x[2]], [x[3], x[4]])[i],
+            Self::DriveTarget => DRIVE.target(among_obstacles(x)),
+            Self::DriveConstraint => DRIVE.constraint(among_obstacles(x)),
+            Self::GoalStage => {
+                let (pose, goal) = ([x[0], x[1], R::lit(5.0) * x[2]], [x[3], x[4], x[5]]);
+                <GoalCost as Cost<3, 2, 3>>::stage(&GOAL, pose, [x[6], x[7]], goal)
+            }
+            Self::MapCell => GOAL.map.cell([x[0], x[1]]),
             Self::Sine => (R::lit(4.0) * x[0]).sin(),
             Self::Cosine => (R::lit(4.0) * x[0]).cos(),
             Self::Tangent => (R::lit(5.0) * x[0]).tanh(),
@@ -222,6 +250,10 @@ suite! {
     race_squared_cone: Formula::RaceConstraint(Cone::Squared);
     race_root_cone: Formula::RaceConstraint(Cone::Root);
     double_integrator: Formula::IntegratorStep(0), Formula::IntegratorStep(1);
+    drive_steps: Formula::DriveStep(0), Formula::DriveStep(1), Formula::DriveStep(2);
+    drive_margins: Formula::DriveTarget, Formula::DriveConstraint;
+    goal_cost: Formula::GoalStage;
+    map_cells: Formula::MapCell;
     sine_and_cosine: Formula::Sine, Formula::Cosine;
     hyperbolic_tangent: Formula::Tangent;
     logarithm_and_normals: Formula::Logarithm, Formula::Normal(0), Formula::Normal(1);

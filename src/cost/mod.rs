@@ -1,8 +1,12 @@
 //! Costs: what a plan pays at each stage, written once over `Real`.
 
+mod goal;
+mod map;
 mod quadratic;
 mod race;
 
+pub use goal::GoalCost;
+pub use map::{CostMap, Grid, MAX_CELLS};
 pub use quadratic::{Obstacle, Quadratic};
 pub use race::{
     CenterlineCost, Fence, LaneCost, QuadraticCost, RACE_CONTEXT, RaceCost, RaceReference,
@@ -19,6 +23,14 @@ use crate::real::Real;
 pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {
     /// The cost of the stage; lower is better.
     fn stage<R: Real>(&self, x: [R; NX], u: [R; NU], context: [R; NC]) -> R;
+
+    /// The map that charges a stage besides, if there is one, and the point where it is looked up;
+    /// only the point may depend on the state. A map is data of the kernels, not part of their
+    /// text.
+    #[inline(always)]
+    fn map<R: Real>(&self, _x: [R; NX]) -> Option<(&CostMap, [R; 2])> {
+        None
+    }
 }
 
 /// `x^2`.

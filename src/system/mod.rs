@@ -1,8 +1,10 @@
 //! Systems: dynamics, target and constraint, written once over `Real`.
 
+mod diff_drive;
 mod double_integrator;
 mod drone_race;
 
+pub use diff_drive::{DiffDrive, Disc};
 pub use double_integrator::{BangBang, DoubleIntegrator};
 pub use drone_race::{Cone, DroneRace};
 

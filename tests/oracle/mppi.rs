@@ -1,7 +1,7 @@
 //! MPPI in f64, one sample after the other, and how far an adapter may lie from it.
 
 use nalgebra::DMatrix;
-use reachcast::cost::Cost;
+use reachcast::cost::{Cost, CostMap};
 use reachcast::rollout::{MppiResult, MppiTask, Sigma};
 use reachcast::system::System;
 
@@ -28,6 +28,25 @@ fn penalty<const NX: usize, const NU: usize, const NC: usize>(
     settings.noise_cost.then_some(inverse)
 }
 
+/// Distance within which rounding may decide which cell a place is in, m.
+const NEAR: f64 = 4e-6;
+
+/// What a map costs at a place, found by comparing with the sides of its cells.
+fn charged(map: &CostMap, [x, y]: [f64; 2]) -> f64 {
+    let grid = map.grid();
+    let along = |axis: usize, place: f64| {
+        let side =
+            |cell: usize| f64::from(grid.origin[axis]) + cell as f64 * f64::from(grid.resolution);
+        (0..=grid.size[axis]).filter(|cell| side(*cell) <= place).count()
+    };
+    let at = |x: f64, y: f64| map.cells()[along(1, y) * (grid.size[0] + 2) + along(0, x)];
+    let near = [(-NEAR, -NEAR), (-NEAR, NEAR), (NEAR, -NEAR), (NEAR, NEAR)];
+    let cost = at(x, y);
+    let same = near.iter().all(|(dx, dy)| at(x + dx, y + dy) == cost);
+    assert!(same, "rounding decides the cell of ({x}, {y}): take another seed");
+    f64::from(cost)
+}
+
 /// The cost of a sample.
 fn cost_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
     (system, cost): (&S, &C),
@@ -48,6 +67,9 @@ where
         let value = task.value.map(|term| term.network.forward(&x)[0]);
         let push = task.disturbance.map(|asked| asked.network.forward(&x));
         total += cost.stage(x, u, problem.context[t].map(f64::from));
+        if let Some((map, place)) = cost.map(x) {
+            total += charged(map, place);
+        }
         if let Some(penalty) = &penalty {
             let nominal = problem.plan[t].map(f64::from);
             for i in 0..NU {

@@ -8,8 +8,8 @@ use super::mlp::{Evaluator, Packed};
 use super::mppi_update::Softmin;
 use super::tile::is_finite;
 use crate::backend::softmin::Partial;
-use crate::cost::Cost;
-use crate::real::{Lanes, Real};
+use crate::cost::{Cost, CostMap};
+use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{HUGE, MppiProblem, MppiSpec, MppiTask, Noise, Stream};
 use crate::system::System;
 
@@ -252,6 +252,9 @@ where
             if let Some(penalty) = self.spec.penalty() {
                 total = total + noise_cost(penalty, plan, &u);
             }
+            if let Some((map, place)) = self.cost.map(x) {
+                total = total + map_cost(map, place);
+            }
             x = self.system.step(x, u);
         }
         (*self.x, *self.total) = (x, total);
@@ -274,6 +277,24 @@ fn noise_cost<const N: usize, const NU: usize>(
         cost = cost + Lanes::lit(row) * (u[i] - Lanes::lit(plan[i]));
     }
     cost
+}
+
+/// 2^23: added to a whole number below it, it leaves that number in the mantissa. A conversion to
+/// an integer takes more instructions, for the sake of numbers that no integer holds.
+const WHOLE: f32 = 8_388_608.0;
+/// The mantissa.
+const WHOLE_MASK: u32 = 0x7f_ffff;
+
+/// The costs of the cells at `place`; of NaN, whose mantissa is above any cell's number, that of the
+/// last cell, one of the border.
+#[inline(always)]
+fn map_cost<const N: usize>(map: &CostMap, place: [Lanes<N>; 2]) -> Lanes<N> {
+    let cells = map.cells();
+    // Lets the compiler leave out the test of each index.
+    assert!(!cells.is_empty(), "a map has cells");
+    let cell = map.cell(place) + Lanes::lit(WHOLE);
+    let number = |i: usize| (cell.0[i].to_bits() & WHOLE_MASK) as usize;
+    Lanes(per_lane!(N, i => cells[number(i).min(cells.len() - 1)]))
 }
 
 /// What the networks, evaluated at the state before the step, add to cost and state.

@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use super::Gpu;
 use super::buffer::{Buffer, Params};
-use super::compose::{Kernel, MppiText, PARTIAL_HEADER, Slot};
+use super::compose::{Kernel, MppiText, PARTIAL_HEADER, Slot, map_of};
 use super::kernel::Bound;
 use super::mppi_plan::{MppiPlan, Size};
 use super::network::Network;
 use super::run::{Batch, Call};
 use crate::backend::softmin::Partial;
-use crate::cost::Cost;
+use crate::cost::{Cost, CostMap};
 use crate::error::Result;
 use crate::policy::Mlp;
 use crate::rollout::{
@@ -33,12 +33,14 @@ where
     C: Cost<NX, NU, NC>,
 {
     let settings = task.spec.settings();
+    let cells = map_of(cost).map_or(&[][..], CostMap::cells);
     let networks =
         [task.value.map(|term| term.network), task.disturbance.map(|asked| asked.network)];
     let size = Size {
         states: NX,
         controls: NU,
         contexts: NC,
+        cells: cells.len(),
         horizon: settings.horizon,
         samples: settings.samples,
         problems: task.problems.len(),
@@ -49,7 +51,7 @@ where
     let call = Call::new(gpu, DISPATCHES + layers + 1);
     let buffers = Buffers::new(&call, &size, &plan, task.spec.noise());
     let kernels = buffers.bind(&call, &MppiText::new(system, cost, task))?;
-    let chunks = Chunks { call: &call, plan, buffers: &buffers, kernels, task };
+    let chunks = Chunks { call: &call, plan, buffers: &buffers, kernels, task, cells };
     let mut results = Vec::with_capacity(task.problems.len());
     for problems in task.problems.chunks(plan.problems as usize) {
         results.extend(chunks.improve(problems)?);
@@ -92,7 +94,8 @@ impl Buffers {
             streams: words(4),
             starts: words(size.states),
             plans: words(horizon * size.controls),
-            contexts: words(horizon * size.contexts),
+            contexts: call
+                .storage(4 * (size.cells as u64 + problems * (horizon * size.contexts) as u64)),
             spline,
             state: call.storage(16 * size.states.div_ceil(4) as u64 * stride),
             totals: call.storage(4 * stride),
@@ -148,6 +151,8 @@ struct Chunks<'a, const NX: usize, const NU: usize, const NC: usize> {
     buffers: &'a Buffers,
     kernels: Kernels,
     task: &'a MppiTask<'a, NX, NU, NC>,
+    /// The costs of the map's cells; none without a map.
+    cells: &'a [f32],
 }
 
 impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
@@ -183,7 +188,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
         let plans = problems.iter().flat_map(|problem| problem.plan.iter().flatten());
         let plans: Vec<f32> = plans.copied().collect();
         let contexts = problems.iter().flat_map(|problem| problem.context.iter().flatten());
-        let contexts: Vec<f32> = contexts.copied().collect();
+        let contexts: Vec<f32> = self.cells.iter().chain(contexts).copied().collect();
         let device = self.call.device;
         self.buffers.streams.write(device, &streams);
         self.buffers.starts.write(device, &starts);

@@ -25,6 +25,8 @@ pub(super) struct Size<'a> {
     pub(super) controls: usize,
     /// Numbers of context per stage.
     pub(super) contexts: usize,
+    /// Cells of the cost's map, which lie in front of the contexts; 0 without one.
+    pub(super) cells: usize,
     /// Steps of a plan.
     pub(super) horizon: u32,
     /// Samples of each problem.
@@ -65,8 +67,9 @@ impl MppiPlan {
         let networks = || size.networks.into_iter().flatten();
         let parameters = networks().map(|mlp| 16 * parameter_quads(mlp) as u64).max().unwrap_or(0);
         let columns = most_columns(size, binding);
-        let problems = (binding / problem_row_bytes(size))
-            .min(MEMORY_BYTES / 4 / problem_bytes(size))
+        let cells = 4 * size.cells as u64;
+        let problems = (binding.saturating_sub(cells) / problem_row_bytes(size))
+            .min((MEMORY_BYTES / 4).saturating_sub(cells) / problem_bytes(size))
             .min(size.problems.max(1) as u64);
         if columns == 0 || problems == 0 || parameters > binding {
             return Err(too_large(adapter, binding));
@@ -200,8 +203,8 @@ fn too_long(trips: u64) -> Error {
 
 fn too_large(adapter: &Adapter, binding: u64) -> Error {
     Error::Device(format!(
-        "{}: the networks, one problem or the smallest chunk of samples do not fit the adapter's \
-         limit of {binding} bytes per binding; use the native CPU backend",
+        "{}: the networks, the map, one problem or the smallest chunk of samples do not fit the \
+         adapter's limit of {binding} bytes per binding; use the native CPU backend",
         adapter.name
     ))
 }
@@ -212,7 +215,7 @@ mod tests {
 
     fn size(controls: usize, horizon: u32, samples: u32, problems: usize) -> Size<'static> {
         let networks = [None; 2];
-        Size { states: 12, controls, contexts: 8, horizon, samples, problems, networks }
+        Size { states: 12, controls, contexts: 8, cells: 0, horizon, samples, problems, networks }
     }
 
     /// Blocks of Philox that `steps` draws of `controls` numbers touch, from the worst place on.
@@ -256,6 +259,15 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_map_takes_room_from_the_problems() {
+        // Contexts of 640 bytes for each problem, behind the cells: room for ten.
+        let cells = ((1 << 22) - 10 * 640) / 4;
+        let size = Size { cells, ..size(3, 20, 64, 100) };
+        let plan = MppiPlan::new(&Adapter::made_up(1 << 22), &size).expect("a plan that fits");
+        assert_eq!(plan.problems, 10);
+    }
+
     fn check(size: &Size<'_>, plan: &MppiPlan, binding: u64) {
         let stride = u64::from(plan.stride);
         assert_eq!(plan.width % (WORKGROUP * plan.rounds), 0, "{plan:?}");
@@ -297,6 +309,9 @@ mod tests {
     fn what_cannot_run_is_refused() {
         let small = MppiPlan::new(&Adapter::made_up(1 << 10), &size(3, 20, 500, 1));
         assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
+        let mapped = Size { cells: 1 << 25, ..size(3, 20, 500, 1) };
+        let mapped = MppiPlan::new(&Adapter::made_up(1 << 27), &mapped);
+        assert!(mapped.expect_err("no room for contexts").to_string().contains("the map"));
         let wide = MppiPlan::new(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));
         assert!(wide.expect_err("too wide").to_string().contains("65 controls"));
         let long = most_steps(4, |steps| steps * MAX_TRIPS * 2);

@@ -5,7 +5,7 @@ mod mppi;
 mod plant;
 
 pub use mppi::MppiText;
-pub(super) use mppi::tile_steps;
+pub(super) use mppi::{map_of, tile_steps};
 pub use plant::{Shape, compose};
 
 /// Threads of a workgroup, one trajectory or pair each.
@@ -97,7 +97,7 @@ pub enum Slot {
     Streams = 17,
     /// `plans`: nominal controls, `[problems, H, NU]`.
     Plans = 18,
-    /// `contexts`: what the cost wants to know, `[problems, H, NC]`.
+    /// `contexts`: the cells of the cost's map, then what the cost wants to know, `[problems, H, NC]`.
     Contexts = 19,
     /// `starts`: `[problems, NX]`.
     Starts = 20,

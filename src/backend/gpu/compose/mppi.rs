@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
 use super::{Access, Kernel, PARTIAL_HEADER, Slot};
-use crate::cost::Cost;
+use crate::cost::{Cost, CostMap};
 use crate::real::Real;
 use crate::real::record::{Expr, Graph, record};
 use crate::real::wgsl::function;
@@ -16,6 +16,7 @@ const INDEPENDENT: &str = include_str!("../../../../shaders/noise_independent.wg
 const COLORED: &str = include_str!("../../../../shaders/noise_colored.wgsl");
 const SPLINE: &str = include_str!("../../../../shaders/noise_spline.wgsl");
 const START: &str = include_str!("../../../../shaders/mppi_start.wgsl");
+const MAP: &str = include_str!("../../../../shaders/mppi_map.wgsl");
 const ROLLOUT: &str = include_str!("../../../../shaders/mppi_rollout.wgsl");
 const UPDATE: &str = include_str!("../../../../shaders/mppi_update.wgsl");
 
@@ -64,8 +65,7 @@ impl MppiText {
             noise: noise_text(task.spec),
             rollout: [
                 recorded_step::<_, NX, NU>(system),
-                recorded_charge::<_, NX, NU, NC>(cost, task.spec),
-                loader("context_at", "Context", "contexts", NC),
+                charge_text::<_, NX, NU, NC>(cost, task.spec),
                 value_text(task.value.as_ref()),
                 push_text::<NX>(task.disturbance.as_ref()),
             ]
@@ -98,7 +98,9 @@ impl MppiText {
     pub fn compose(&self, kernel: Kernel) -> String {
         let state = state_glue(self.states);
         let parts = match kernel {
-            Kernel::MppiStart => vec![loader("start_of", "State", "starts", self.states), state],
+            Kernel::MppiStart => {
+                vec![loader("start_of", "State", ("starts", 0), self.states), state]
+            }
             Kernel::MppiRollout => vec![state, self.noise.clone(), self.rollout.clone()],
             Kernel::MppiUpdate => {
                 vec![FINITE.to_owned(), self.noise.clone(), update_text(self.controls)]
@@ -132,7 +134,7 @@ fn noise_text<const NU: usize>(spec: &MppiSpec<NU>) -> String {
         draw(NU),
         recorded,
         shape.to_owned(),
-        loader("plan_at", "Control", "plans", NU),
+        loader("plan_at", "Control", ("plans", 0), NU),
         recorded_control(spec),
     ]
     .join("\n")
@@ -154,16 +156,18 @@ fn draw(controls: usize) -> String {
     text + &format!("    return Control({});\n}}\n", all.join(", "))
 }
 
-/// A function that loads row `row` of a table of rows of `length` numbers.
-fn loader(name: &str, kind: &str, table: &str, length: usize) -> String {
+/// A function that loads row `row` of a table of rows of `length` numbers, which `ahead` others
+/// precede.
+fn loader(name: &str, kind: &str, (table, ahead): (&str, usize), length: usize) -> String {
     let alias = if kind == "Context" {
         format!("alias Context = array<f32, {length}>;\n")
     } else {
         String::new()
     };
     let all: Vec<String> = (0..length).map(|i| format!("{table}[at + {i}u]")).collect();
+    let ahead = if ahead > 0 { format!("{ahead}u + ") } else { String::new() };
     format!(
-        "{alias}fn {name}(row: u32) -> {kind} {{\n    let at = row * {length}u;\n    \
+        "{alias}fn {name}(row: u32) -> {kind} {{\n    let at = {ahead}row * {length}u;\n    \
          return {kind}({});\n}}\n",
         all.join(", ")
     )
@@ -228,8 +232,48 @@ where
     both("advance", "plant_step", &arguments, ("State", NX), &graph)
 }
 
-/// `charge`: the cost so far with that of a stage, and of its noise where noise costs.
+/// `charge` and the contexts that it wants: the cost so far with that of a stage and of its place
+/// on the map where there is one.
+fn charge_text<C, const NX: usize, const NU: usize, const NC: usize>(
+    cost: &C,
+    spec: &MppiSpec<NU>,
+) -> String
+where
+    C: Cost<NX, NU, NC>,
+{
+    let cells = map_of(cost).map_or(0, |map| map.cells().len());
+    let contexts = loader("context_at", "Context", ("contexts", cells), NC);
+    if cells == 0 {
+        return [recorded_charge("charge", cost, spec), contexts].concat();
+    }
+    let constants = format!("const CELLS: u32 = {cells}u;\n");
+    let staged = recorded_charge("charge_stage", cost, spec);
+    [constants, staged, contexts, recorded_cell(cost), MAP.to_owned()].concat()
+}
+
+/// The map of a cost.
+pub(in super::super) fn map_of<C, const NX: usize, const NU: usize, const NC: usize>(
+    cost: &C,
+) -> Option<&CostMap>
+where
+    C: Cost<NX, NU, NC>,
+{
+    cost.map([0.0_f32; NX]).map(|(map, _)| map)
+}
+
+/// `cell_at`: the number of the map's cell at a state.
+fn recorded_cell<C, const NX: usize, const NU: usize, const NC: usize>(cost: &C) -> String
+where
+    C: Cost<NX, NU, NC>,
+{
+    let looked_up = |x: &[Expr]| cost.map::<Expr>(from_fn(|i| x[i])).map(|(map, at)| map.cell(at));
+    let graph = record(NX, |x| looked_up(x).into_iter().collect());
+    both("cell_at", "map_cell", &[("x", "State", NX)], ("f32", 1), &graph)
+}
+
+/// The function `name`: the cost so far with that of a stage, and of its noise where noise costs.
 fn recorded_charge<C, const NX: usize, const NU: usize, const NC: usize>(
+    name: &str,
     cost: &C,
     spec: &MppiSpec<NU>,
 ) -> String
@@ -254,7 +298,7 @@ where
         ("context", "Context", NC),
         ("nominal", "Control", NU),
     ];
-    both("charge", "stage_cost", &arguments, ("f32", 1), &graph)
+    both(name, "stage_cost", &arguments, ("f32", 1), &graph)
 }
 
 /// `lambda plan' Sigma^-1 (u - plan)`.
