@@ -1,5 +1,7 @@
 //! Policies: a formula over `Real`, or a trained network.
 
+mod file;
+pub mod import;
 mod mlp;
 
 pub use mlp::{Activation, Layer, Mlp, OutputActivation};
