@@ -3,6 +3,7 @@
 mod args;
 mod certify;
 mod devices;
+mod policy;
 mod progress;
 mod race;
 mod race_input;
@@ -20,7 +21,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::files::json;
-use args::{Arguments, Command, Global};
+use args::{Arguments, Command, Global, PolicyCommand};
 
 /// What a command that ran to its end came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +65,10 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Query { folder, states } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
         Command::Race(asked) => race::run(global, asked),
+        Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
+        Command::Policy(PolicyCommand::Inspect { file, config }) => {
+            policy::inspect(global, file, config.as_deref())
+        }
         Command::Scenarios(asked) => scenarios::run(global, *asked),
         Command::Devices => devices::list(global),
     }

@@ -117,7 +117,8 @@ impl Mlp {
         let twice = (1..names.len()).any(|i| names[..i].contains(&names[i]));
         if names.len() != inputs || twice || !names.iter().all(plain) {
             let given = names.join(",");
-            let problem = format!("`{given}`; expected {inputs} names, one per input, all different");
+            let problem =
+                format!("`{given}`; expected {inputs} names, one per input, all different");
             return Err(Error::invalid("state order", problem));
         }
         self.state_order = Some(names);

@@ -2,7 +2,9 @@
 
 mod file;
 pub mod import;
+pub mod inspect;
 mod mlp;
+mod spectral;
 
 pub use mlp::{Activation, Layer, Mlp, OutputActivation};
 

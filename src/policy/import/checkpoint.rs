@@ -125,8 +125,9 @@ impl Tensor {
 /// All tensors of the dictionaries in `root`, with the keys that lead to them.
 fn tensors(pickle: &Pickle<'_>, root: Value<'_>) -> Result<Vec<Tensor>, String> {
     let Value::Dict(root) = root else {
-        return Err("no dictionary of tensors; save one: torch.save(module.state_dict(), FILE)"
-            .to_owned());
+        return Err(
+            "no dictionary of tensors; save one: torch.save(module.state_dict(), FILE)".to_owned()
+        );
     };
     let mut found = Vec::new();
     collect(pickle, root, &mut Vec::new(), &mut 0, &mut found)?;

@@ -151,7 +151,9 @@ impl<'a> Walk<'a> {
     fn product(&self, node: &Node, at: &str, order: Order) -> Result<Dense, String> {
         let name = match node.inputs.as_slice() {
             [value, weight, ..] if value == at => weight,
-            _ => return Err(format!("a `{}` of which `{at}` is not the left side", node.operation)),
+            _ => {
+                return Err(format!("a `{}` of which `{at}` is not the left side", node.operation));
+            }
         };
         let (shape, numbers) = self.numbers(name)?;
         let &[rows, columns] = shape.as_slice() else {
@@ -227,7 +229,9 @@ fn network(mut steps: Vec<Step>) -> Result<(Mlp, Vec<String>), String> {
                 let first = *hidden.get_or_insert(activation);
                 if first != activation {
                     let (first, other) = (first.name(), activation.name());
-                    return Err(format!("both {first} and {other} between layers; one is supported"));
+                    return Err(format!(
+                        "both {first} and {other} between layers; one is supported"
+                    ));
                 }
             }
             _ => return Err("layers and activations do not take turns".to_owned()),

@@ -109,7 +109,8 @@ fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Impor
         });
     }
     let names: Vec<String> = chosen.iter().map(|layer| layer.name.to_owned()).collect();
-    let usual = match names.iter().any(|name| name.split('.').any(|key| key.starts_with("critic"))) {
+    let usual = match names.iter().any(|name| name.split('.').any(|key| key.starts_with("critic")))
+    {
         true => OutputActivation::Identity,
         false => OutputActivation::Tanh,
     };

@@ -88,8 +88,7 @@ impl Graph {
     /// # Errors
     /// A sentence about bytes that are no such file.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, String> {
-        let model =
-            Model::decode(bytes).map_err(|e| format!("damaged, or no ONNX file ({e})"))?;
+        let model = Model::decode(bytes).map_err(|e| format!("damaged, or no ONNX file ({e})"))?;
         model.graph.ok_or_else(|| "no graph in it: damaged, or no ONNX file".to_owned())
     }
 
@@ -167,8 +166,9 @@ impl Tensor {
     /// does not allow it.
     pub(super) fn numbers(&self, cast: Cast) -> Result<(Vec<usize>, Vec<f32>), String> {
         if self.location != 0 {
-            return Err("its numbers are in another file; export with external_data=False"
-                .to_owned());
+            return Err(
+                "its numbers are in another file; export with external_data=False".to_owned()
+            );
         }
         let kind = Kind::of_onnx(self.data_type);
         let (size, number) = kind.reader(cast)?;
@@ -181,11 +181,7 @@ impl Tensor {
         let count = |shape: &Vec<usize>| shape.iter().try_fold(1, |n: usize, &l| n.checked_mul(l));
         match shape {
             Some(shape) if count(&shape) == Some(numbers.len()) => Ok((shape, numbers)),
-            _ => Err(format!(
-                "{} numbers do not fill the shape {:?}",
-                numbers.len(),
-                self.lengths
-            )),
+            _ => Err(format!("{} numbers do not fill the shape {:?}", numbers.len(), self.lengths)),
         }
     }
 }
