@@ -74,19 +74,29 @@ pub struct Imported {
 /// [`Error::Invalid`] for a request that does not go with the file.
 pub fn read(path: &Path, request: &Request) -> Result<Imported> {
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-    let onnx = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("onnx"));
-    let found = match bytes.first() {
-        _ if bytes.starts_with(ZIP) => from_checkpoint(&bytes, request),
-        _ if onnx => {
-            let found = graph::read(&bytes, request.cast).map_err(|e| Error::file(path, e))?;
-            return as_stated(found, request);
+    from_bytes(path, &bytes, request)
+}
+
+/// Reads a network from the content of the file `path`.
+///
+/// # Errors
+/// As [`read`].
+pub fn from_bytes(path: &Path, bytes: &[u8], request: &Request) -> Result<Imported> {
+    let refused = |problem: String| Error::file(path, problem);
+    if bytes.starts_with(ZIP) {
+        return from_checkpoint(bytes, request).map_err(refused);
+    }
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("onnx")) {
+        return as_stated(graph::read(bytes, request.cast).map_err(refused)?, request);
+    }
+    let problem = match bytes.first() {
+        Some(&PICKLE) => {
+            "the format of PyTorch before 1.6; load it and save it again: \
+             torch.save(torch.load(FILE, weights_only=True), OTHER)"
         }
-        Some(&PICKLE) => Err("the format of PyTorch before 1.6; load it and save it again: \
-                              torch.save(torch.load(FILE, weights_only=True), OTHER)"
-            .to_owned()),
-        _ => Err("neither a checkpoint of PyTorch (a zip archive) nor called .onnx".to_owned()),
+        _ => "neither a checkpoint of PyTorch (a zip archive) nor called .onnx",
     };
-    found.map_err(|problem| Error::file(path, problem))
+    Err(refused(problem.to_owned()))
 }
 
 /// The network of a checkpoint.
