@@ -29,7 +29,12 @@ impl Mlp {
     /// # Errors
     /// A sentence about the first fault found.
     pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let damaged = |e| format!("not a whole safetensors file ({e})");
+        let damaged = |e| {
+            format!(
+                "not a whole safetensors file ({e}); files of PyTorch and ONNX are converted by \
+                 `reachcast policy import`"
+            )
+        };
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(damaged)?;
         let empty = HashMap::new();

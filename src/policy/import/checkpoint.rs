@@ -4,7 +4,8 @@ use std::collections::HashSet;
 use std::io::Cursor;
 
 use super::kind::{Cast, Kind};
-use super::pickle::{self, Pickle, Value, View};
+use super::pickle;
+use super::value::{Pickle, Value, View};
 use crate::files::Archive;
 
 /// How deep dictionaries may lie in one another.

@@ -8,6 +8,7 @@ mod kind;
 mod layers;
 mod onnx;
 mod pickle;
+mod value;
 
 use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! The part of Python's pickle format that describes tensors; nothing in a file is ever executed.
 //!
 //! A pickle is a program for a stack machine that names Python functions and calls them. This one
-//! knows the five kinds of names in [`Global`], calls none of them, and refuses every other name.
+//! knows the names in [`Global`], calls none of them, and refuses every other name.
 
 use std::collections::HashMap;
 
-use super::kind::Kind;
+use super::value::{Global, Pickle, Storage, Value, View};
 
 /// Longest pickle, bytes: some 100,000 tensors.
 const LONGEST: usize = 1 << 24;
@@ -17,72 +17,6 @@ const LONGEST_KEY: usize = 32;
 const MOST_DIMENSIONS: usize = 64;
 /// What is wrong where an instruction finds too little on the stack.
 const EMPTY: &str = "a value is needed where there is none";
-
-/// A value as far as it matters for a network. Texts lie in the pickle, containers in [`Pickle`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Value<'a> {
-    /// A string.
-    Text(&'a str),
-    /// An integer of at most 64 bits.
-    Int(i64),
-    /// A name that may be used.
-    Global(Global),
-    /// Number of a tuple.
-    Tuple(usize),
-    /// Number of a dictionary.
-    Dict(usize),
-    /// Numbers in an entry of their own.
-    Storage(Storage<'a>),
-    /// Number of a tensor.
-    Tensor(usize),
-    /// What no network is made of: None, a truth value, a float, a list, a long integer.
-    Other,
-}
-
-/// The names that a state dict may use.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Global {
-    /// `collections.OrderedDict`: a dictionary.
-    OrderedDict,
-    /// `torch._utils._rebuild_tensor_v2`: a tensor as a view of a storage.
-    Tensor,
-    /// `torch._utils._rebuild_parameter`: the tensor that is its first argument.
-    Parameter,
-    /// `torch.FloatStorage` and the like.
-    Storage(Kind),
-}
-
-/// A run of numbers of one kind.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Storage<'a> {
-    /// What the numbers are.
-    pub(super) kind: Kind,
-    /// Name of the entry that holds them.
-    pub(super) key: &'a str,
-}
-
-/// A tensor as a view of a storage.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct View<'a> {
-    /// The storage.
-    pub(super) storage: Storage<'a>,
-    /// Element of the storage that the tensor begins at.
-    pub(super) offset: usize,
-    /// Length of each dimension.
-    pub(super) shape: Vec<usize>,
-    /// Elements of the storage from one index to the next, for each dimension.
-    pub(super) strides: Vec<usize>,
-}
-
-/// A pickle that has been read.
-#[derive(Debug, Default)]
-pub(super) struct Pickle<'a> {
-    /// Entries of each dictionary, in the order in which they were put in.
-    pub(super) dicts: Vec<Vec<(Value<'a>, Value<'a>)>>,
-    /// Tensors.
-    pub(super) tensors: Vec<View<'a>>,
-    tuples: Vec<Vec<Value<'a>>>,
-}
 
 /// Reads a pickle: its containers, and the value that it stands for.
 ///
@@ -142,7 +76,7 @@ impl<'a> Machine<'a> {
             }
             b'c' => {
                 let (module, name) = (self.line()?, self.line()?);
-                self.push(Value::Global(global(module, name)?))?;
+                self.push(Value::Global(Global::find(module, name)?))?;
             }
             b'q' => self.remember::<1>()?,
             b'r' => self.remember::<4>()?,
@@ -402,21 +336,4 @@ impl<'a> Machine<'a> {
             _ => Err("attributes of something else than a dictionary".to_owned()),
         }
     }
-}
-
-/// The name `module.name`, if it may be used.
-fn global(module: &str, name: &str) -> Result<Global, String> {
-    let storage = Kind::of_storage(name).filter(|_| module == "torch").map(Global::Storage);
-    let known = match (module, name) {
-        ("collections", "OrderedDict") => Some(Global::OrderedDict),
-        ("torch._utils", "_rebuild_tensor_v2") => Some(Global::Tensor),
-        ("torch._utils", "_rebuild_parameter") => Some(Global::Parameter),
-        _ => storage,
-    };
-    known.ok_or_else(|| {
-        format!(
-            "names `{module}.{name}`, which no state dict needs; nothing was executed. Save \
-             tensors alone: torch.save(module.state_dict(), FILE)"
-        )
-    })
 }
