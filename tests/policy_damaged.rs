@@ -86,7 +86,7 @@ fn names_of_functions_are_refused_and_nothing_is_executed() {
 #[test]
 fn shapes_that_do_not_fit() {
     let fits = "does not fit the 96 numbers";
-    changed(b"K\x08K\x0c\x86", b"K\x0aK\x0c\x86", &["`0.weight`", "[10, 12]", fits]);
+    changed(b"K\x08K\x0c\x86", b"K\x08K\x0d\x86", &["`0.weight`", "[8, 13]", fits]);
     changed(b"K\x0cK\x01\x86", b"K\x0dK\x01\x86", &["`0.weight`", "[13, 1]", fits]);
     changed(b"QK\x00K\x08K\x0c", b"QK\x01K\x08K\x0c", &["from element 1", fits]);
     let far = [b"Q\x8a\x08".as_slice(), &i64::MAX.to_le_bytes(), b"K\x08K\x0c"].concat();
@@ -265,8 +265,17 @@ fn graphs_that_are_no_plain_network() {
     changed(b"\x08\x08\x08\x03\x10\x01", b"\x08\x03\x08\x08\x10\x01", &["[3]", "8 outputs"]);
     changed(b"\x08\x08\x08\x03\x10\x01", b"\x08\x08\x08\x04\x10\x01", &["24 numbers", "[8, 4]"]);
     changed(b"\x08\x08\x08\x03\x10\x01", b"\x08\x08\x08\x03\x10\x07", &["`4.weight`", "no floats"]);
-    // A length of 2^63 and one below zero.
-    changed(b"\x08\x08\x08\x03\x10\x01", b"\x08\x08\x08\xff\x10\x01", &["`4.weight`"]);
+    let vast = b"\x08\xff\xff\x7f\x10\x01";
+    changed(b"\x08\x08\x08\x03\x10\x01", vast, &["24 numbers", "[2097151]"]);
     changed(b"\x0a\x01i\x12\x01y\"\x04Tanh", b"\x0a\x01i\x12\x01y\"\x04Relu", &["ends in relu"]);
     changed(b"2.weightJ", b"2.heavysJ", &["`2.weight` is no tensor"]);
+    let other = |name: &str, old: &[u8], new: &[u8], words: &[&str]| {
+        let content = replaced(&bytes(name), old, new);
+        refused_bytes(ONNX, &content, &Request::default(), words);
+    };
+    let half = b"alpha\x15\x00\x00\x00\x3f";
+    other("relu.onnx", b"alpha\x15\x00\x00\x80\x3f", half, &["`Gemm` with alpha"]);
+    // A product with something else than the sigmoid.
+    let (share, else_) = (b"\n\x13/1/Sigmoid_output_0", b"\n\x13/1/Sigmoid_output_X");
+    other("silu.onnx", share, else_, &["branches into Sigmoid, Mul"]);
 }
