@@ -192,6 +192,7 @@ fn files_that_hold_something_else() {
     refused("softmax.onnx", &plain, &["`Softmax`", "Gemm"]);
     refused("mixed.onnx", &plain, &["both relu and tanh"]);
     refused("residual.onnx", &plain, &["branches into"]);
+    refused("gated.onnx", &plain, &["branches into Sigmoid, Mul"]);
     refused("external.onnx", &plain, &["another file", "external_data=False"]);
     let at = |name: &str, content: &[u8], words: &[&str]| {
         let error = import(Path::new(name), content, &plain).unwrap_err().to_string();
