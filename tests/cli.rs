@@ -124,7 +124,9 @@ fn npy<T: npyz::AutoSerialize + Copy>(values: &[T], shape: &[u64], order: npyz::
 #[test]
 fn usage_is_explained() {
     let help = done(&["--help"]);
-    for word in ["certify", "rollout", "query", "check", "scenarios", "devices", "Exit codes"] {
+    for word in
+        ["certify", "rollout", "query", "check", "policy", "scenarios", "devices", "Exit codes"]
+    {
         assert!(help.contains(word), "{word}");
     }
     // Only what is built is offered.

@@ -60,7 +60,7 @@ pub fn export(backend: &Backend, seed: u64, folder: &Path) -> Result<Vec<PathBuf
     let networks = data.networks.iter().map(|(name, network)| (*name, &**network));
     let networks: Vec<_> = networks.chain([("race", &*data.policy)]).collect();
     for (name, network) in &networks {
-        staged.add(&format!("{name}.safetensors"), &network.to_bytes()?)?;
+        staged.add(&format!("{name}.safetensors"), &network.to_bytes())?;
         let measures = measures(backend, &data, network)?;
         let bytes = npy_bytes(&measures, [measures.len(), 1]);
         staged.add(&format!("{name}_measures.npy"), &bytes)?;

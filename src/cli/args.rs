@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::sweep::SweepArguments;
 use crate::config::{Overrides, Profile};
+use crate::policy::{Activation, OutputActivation};
 
 /// Batch rollouts and the probabilistic reach-avoid certificates that they support.
 #[derive(Debug, Parser)]
@@ -27,6 +28,7 @@ Examples:
   reachcast check reachcast-out
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
+  reachcast policy import trained.pth --out policy.safetensors
   reachcast scenarios --epsilon 0.1 --beta 1e-3
   reachcast bench --quick
 
@@ -57,7 +59,7 @@ pub(super) struct Global {
     /// Override a key of the configuration, for instance rollout.horizon=40; repeatable
     #[arg(long, global = true, value_name = "SECTION.KEY=VALUE")]
     pub(super) set: Vec<String>,
-    /// Folder for the results [default of certify: reachcast-out]
+    /// Folder for the results [default of certify: reachcast-out]; the file, for policy import
     #[arg(long, global = true, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
     /// Print one JSON document on standard output and nothing else
@@ -184,6 +186,9 @@ Examples:
   reachcast sweep configs/race.toml --of certificate --epsilon 0.05,0.1,0.2 --radius 0.02,0.05,0.1
   reachcast sweep configs/race.toml --of certificate --bound fixed-shape,variables,exact")]
     Sweep(SweepArguments),
+    /// Import a policy from PyTorch or ONNX, or tell what is in a policy file
+    #[command(subcommand)]
+    Policy(PolicyCommand),
     /// Tell how many scenarios a claim needs
     #[command(after_help = "\
 Examples:
@@ -235,6 +240,70 @@ pub(super) struct BenchArguments {
     /// Measure nothing; write what the workloads run on, and what they must come to, to this folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["quick", "workload"])]
     pub(super) export: Option<PathBuf>,
+}
+
+/// What is done with a policy file.
+#[derive(Debug, Subcommand)]
+pub(super) enum PolicyCommand {
+    /// Write a dense network of a PyTorch checkpoint or an ONNX graph as a policy file
+    ///
+    /// Nothing in the file is executed. A checkpoint (.pth, .pt) holds a state dict, or dictionaries
+    /// with state dicts in them; its layers are applied in the order of the file. It does not say
+    /// what lies between them: --activation and --output do. An ONNX graph (.onnx) says it: Gemm,
+    /// MatMul and Add, Relu, Tanh, Sigmoid and Mul (SiLU).
+    #[command(after_help = "\
+A network is what stands before the layers' own names: `actor` of `actor.0.weight`, and of
+`actor.preprocess.model.model.0.weight` and `actor.last.model.0.weight` as tianshou names them. If
+there are several, they are listed, and --network names one. A critic takes the state and then the
+controls of both players.
+
+Examples:
+  reachcast policy import trained.pth --out policy.safetensors --config configs/race.toml
+  reachcast policy import policy.pth --network actor1_old --out policy.safetensors
+  reachcast policy import ppo.pt --network net.body,net.mean --activation tanh --out ppo.safetensors
+  reachcast policy import policy.onnx --out policy.safetensors")]
+    Import(ImportArguments),
+    /// Tell widths, parameters, a Lipschitz bound and the range of actions of a policy file
+    #[command(after_help = "\
+The Lipschitz bound is the product of the layers' spectral norms, never below the true constant.
+The range of each action is that of interval arithmetic, which holds for every state of the box
+but may be wide, beside the range of random states of the box, which is seen but may be narrow. The
+box is that of the configuration, or from -1 to 1 without one.
+
+Example:
+  reachcast policy inspect configs/policies/race_policy.safetensors --config configs/race.toml")]
+    Inspect {
+        /// Policy (.safetensors)
+        file: PathBuf,
+        /// Configuration (TOML) with the names of the states and their box
+        #[arg(long, value_name = "CONFIG")]
+        config: Option<PathBuf>,
+    },
+}
+
+/// What `policy import` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(super) struct ImportArguments {
+    /// Checkpoint (.pth, .pt) or graph (.onnx)
+    pub(super) file: PathBuf,
+    /// Prefix of the names of the network's layers; several, separated by commas, are joined
+    #[arg(long, value_name = "PREFIX", value_delimiter = ',')]
+    pub(super) network: Vec<String>,
+    /// Activation of the hidden layers of a checkpoint [default: relu]
+    #[arg(long, value_enum)]
+    pub(super) activation: Option<Activation>,
+    /// Activation of its last layer [default: tanh; identity for a critic]
+    #[arg(long, value_enum)]
+    pub(super) output: Option<OutputActivation>,
+    /// Names of the inputs, separated by commas
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "config")]
+    pub(super) state_order: Option<Vec<String>>,
+    /// Configuration (TOML) whose system names the inputs, and has to fit the network
+    #[arg(long, value_name = "CONFIG")]
+    pub(super) config: Option<PathBuf>,
+    /// Convert weights in float64, float16 or bfloat16 to float32 instead of refusing them
+    #[arg(long)]
+    pub(super) cast: bool,
 }
 
 /// The claim that `scenarios` is asked about.

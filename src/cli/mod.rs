@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod certify;
 mod devices;
+mod policy;
 mod progress;
 mod race;
 mod race_input;
@@ -22,7 +23,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::files::json;
-use args::{Arguments, Command, Global};
+use args::{Arguments, Command, Global, PolicyCommand};
 
 /// What a command that ran to its end came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +68,10 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Check { folder } => stored::check(global, folder),
         Command::Race(asked) => race::run(global, asked),
         Command::Sweep(asked) => sweep::run(global, asked),
+        Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
+        Command::Policy(PolicyCommand::Inspect { file, config }) => {
+            policy::inspect(global, file, config.as_deref())
+        }
         Command::Scenarios(asked) => scenarios::run(global, *asked),
         Command::Bench(asked) => bench::run(global, asked),
         Command::Devices => devices::list(global),

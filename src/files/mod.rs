@@ -1,10 +1,12 @@
 //! Files: results that appear whole or not at all, and states and measures as arrays.
 
+mod archive;
 mod array;
 mod npz;
 mod states;
 mod table;
 
+pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
 pub use npz::{Array, Data, npz_bytes, read_npz};
 pub use states::StateReader;

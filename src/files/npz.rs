@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read, Write};
+use std::io::{BufReader, Cursor, Write};
 use std::path::Path;
 
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
+use super::archive::Archive;
 use super::array::{NpyHeader, header};
 use crate::error::{Error, Result};
 
@@ -169,36 +170,17 @@ pub fn read_npz(path: &Path) -> Result<BTreeMap<String, Array>> {
     let file = File::open(path).map_err(|e| Error::file(path, e))?;
     let size = file.metadata().map_err(|e| Error::file(path, e))?.len();
     let damaged = |e: ZipError| at(format!("not a whole .npz file ({e})"));
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(damaged)?;
-    // No entry twice, none inside another, none left out: what is read is no more than the file.
-    archive.validate_header_consistency().map_err(damaged)?;
+    let mut archive = Archive::open(BufReader::new(file), size).map_err(damaged)?;
     let mut arrays = BTreeMap::new();
-    for index in 0..archive.len() {
-        let (name, array) = entry(&mut archive, index, size).map_err(at)?;
-        arrays.insert(name, array);
+    for (index, full) in archive.names().map_err(damaged)?.into_iter().enumerate() {
+        let Some(name) = full.strip_suffix(ENDING) else {
+            return Err(at(format!("entry `{full}` is no {ENDING} file")));
+        };
+        let array = archive.read(index).and_then(|bytes| parse(&bytes));
+        let array = array.map_err(|problem| at(format!("entry `{full}`: {problem}")))?;
+        arrays.insert(name.to_owned(), array);
     }
     Ok(arrays)
-}
-
-/// Name and array of an entry, in an archive of `size` bytes.
-fn entry(
-    archive: &mut ZipArchive<BufReader<File>>,
-    index: usize,
-    size: u64,
-) -> std::result::Result<(String, Array), String> {
-    let mut file = archive.by_index(index).map_err(|e| format!("entry {index}: {e}"))?;
-    let full = file.name().map_err(|e| format!("entry {index}: {e}"))?.into_owned();
-    let Some(name) = full.strip_suffix(ENDING) else {
-        return Err(format!("entry `{full}` is no {ENDING} file"));
-    };
-    if file.compression() != CompressionMethod::Stored || file.size() > size {
-        return Err(format!("entry `{full}` is compressed, which is not supported, or damaged"));
-    }
-    // The end is read as well: only there is the checksum compared.
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(|e| format!("entry `{full}`: {e}"))?;
-    let array = parse(&bytes).map_err(|problem| format!("entry `{full}`: {problem}"))?;
-    Ok((name.to_owned(), array))
 }
 
 /// The array of a .npy file in memory.
@@ -219,6 +201,10 @@ fn parse(mut bytes: &[u8]) -> std::result::Result<Array, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
+
+    use zip::ZipArchive;
+
     use super::*;
 
     fn array(shape: &[usize], data: Data) -> Array {

@@ -1,18 +1,13 @@
-//! Multi-layer perceptrons and their safetensors file.
+//! Multi-layer perceptrons.
 
-use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
-
-use safetensors::tensor::TensorView;
-use safetensors::{Dtype, SafeTensors};
 
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
 /// Activation of the hidden layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Activation {
     /// `max(0, x)`.
     Relu,
@@ -23,8 +18,8 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// Its name in files.
-    fn name(self) -> &'static str {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Relu => "relu",
             Self::Tanh => "tanh",
@@ -49,7 +44,7 @@ impl Activation {
 }
 
 /// Activation of the last layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum OutputActivation {
     /// Hyperbolic tangent: controls in `[-1, 1]`.
     Tanh,
@@ -58,8 +53,8 @@ pub enum OutputActivation {
 }
 
 impl OutputActivation {
-    /// Its name in files.
-    fn name(self) -> &'static str {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Tanh => "tanh",
             Self::Identity => "identity",
@@ -90,17 +85,13 @@ pub struct Layer {
 }
 
 /// A dense network.
-///
-/// File format: safetensors, f32, tensors `layers.{i}.weight` `[out, in]` and `layers.{i}.bias`
-/// `[out]`, metadata `activation` (relu, tanh, silu), `output` (tanh, identity) and
-/// `state_order` (names separated by commas).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mlp {
     /// Shared by copies of the network.
-    layers: Arc<[Layer]>,
-    activation: Activation,
-    output: OutputActivation,
-    state_order: Option<Vec<String>>,
+    pub(super) layers: Arc<[Layer]>,
+    pub(super) activation: Activation,
+    pub(super) output: OutputActivation,
+    pub(super) state_order: Option<Vec<String>>,
 }
 
 impl Mlp {
@@ -119,73 +110,22 @@ impl Mlp {
         Ok(mlp)
     }
 
-    /// Reads a safetensors file.
+    /// The same network with the names of its inputs.
     ///
     /// # Errors
-    /// [`Error::File`] naming the tensor or metadata that is missing, of the wrong type or shape,
-    /// or not finite.
-    pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-        Self::from_bytes(&bytes).map_err(|problem| Error::file(path, problem))
-    }
-
-    /// Reads the bytes of a safetensors file; the error says what is wrong with them.
-    ///
-    /// # Errors
-    /// A sentence about the first fault found.
-    pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let damaged = |e| format!("not a whole safetensors file ({e})");
-        let (_, header) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
-        let tensors = SafeTensors::deserialize(bytes).map_err(damaged)?;
-        let empty = HashMap::new();
-        let metadata = header.metadata().as_ref().unwrap_or(&empty);
-        let activation = match word(metadata, "activation", "relu, tanh or silu")? {
-            "relu" => Activation::Relu,
-            "tanh" => Activation::Tanh,
-            "silu" => Activation::Silu,
-            other => return Err(format!("activation `{other}` is none of relu, tanh, silu")),
-        };
-        let output = match word(metadata, "output", "tanh or identity")? {
-            "tanh" => OutputActivation::Tanh,
-            "identity" => OutputActivation::Identity,
-            other => return Err(format!("output `{other}` is neither tanh nor identity")),
-        };
-        let state_order = metadata
-            .get("state_order")
-            .map(|names| names.split(',').map(|name| name.trim().to_owned()).collect());
-        let mut layers = Vec::new();
-        while tensors.tensor(&format!("layers.{}.weight", layers.len())).is_ok() {
-            layers.push(read_layer(&tensors, layers.len())?);
+    /// [`Error::Invalid`] if they are not one name per input, all different and without commas.
+    pub fn with_state_order(mut self, names: Vec<String>) -> Result<Self> {
+        let inputs = self.widths()[0];
+        let plain = |name: &String| !name.is_empty() && !name.contains(',') && name.trim() == name;
+        let twice = (1..names.len()).any(|i| names[..i].contains(&names[i]));
+        if names.len() != inputs || twice || !names.iter().all(plain) {
+            let given = names.join(",");
+            let problem =
+                format!("`{given}`; expected {inputs} names, one per input, all different");
+            return Err(Error::invalid("state order", problem));
         }
-        let mlp = Self { layers: layers.into(), activation, output, state_order };
-        mlp.validate()?;
-        Ok(mlp)
-    }
-
-    /// The bytes of its safetensors file, which [`Self::from_bytes`] reads.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if the library refuses to write them.
-    pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        let mut tensors = Vec::new();
-        for (i, layer) in self.layers.iter().enumerate() {
-            let weight = (vec![layer.outputs, layer.inputs], le_bytes(&layer.weight));
-            tensors.push((format!("layers.{i}.weight"), weight));
-            tensors
-                .push((format!("layers.{i}.bias"), (vec![layer.outputs], le_bytes(&layer.bias))));
-        }
-        let mut words = HashMap::from([
-            ("activation".to_owned(), self.activation.name().to_owned()),
-            ("output".to_owned(), self.output.name().to_owned()),
-        ]);
-        words.extend(self.state_order.iter().map(|order| ("state_order".into(), order.join(","))));
-        let refused = |e: safetensors::SafeTensorError| Error::invalid("network", e.to_string());
-        let mut views = Vec::new();
-        for (name, (shape, bytes)) in &tensors {
-            let view = TensorView::new(Dtype::F32, shape.clone(), bytes).map_err(refused)?;
-            views.push((name, view));
-        }
-        safetensors::serialize(views, Some(words)).map_err(refused)
+        self.state_order = Some(names);
+        Ok(self)
     }
 
     /// The layers, input side first.
@@ -207,6 +147,11 @@ impl Mlp {
     /// Activation of the last layer.
     pub fn output(&self) -> OutputActivation {
         self.output
+    }
+
+    /// Names of the inputs, where the file has them.
+    pub fn state_order(&self) -> Option<&[String]> {
+        self.state_order.as_deref()
     }
 
     /// Input width, then the output width of each layer.
@@ -274,7 +219,8 @@ impl Mlp {
         x
     }
 
-    fn validate(&self) -> std::result::Result<(), String> {
+    /// Refuses a network without layers, with shapes that do not fit, or a weight not finite.
+    pub(super) fn validate(&self) -> std::result::Result<(), String> {
         if self.layers.is_empty() {
             return Err("no tensor `layers.0.weight`: the network has no layer".to_owned());
         }
@@ -308,46 +254,4 @@ impl Mlp {
         }
         Ok(())
     }
-}
-
-/// The metadata entry `key`; the error names what it may be.
-fn word<'a>(
-    metadata: &'a HashMap<String, String>,
-    key: &str,
-    choices: &str,
-) -> std::result::Result<&'a str, String> {
-    metadata
-        .get(key)
-        .map(String::as_str)
-        .ok_or_else(|| format!("metadata has no `{key}`, expected {choices}"))
-}
-
-/// Layer `i` of the file.
-fn read_layer(tensors: &SafeTensors<'_>, i: usize) -> std::result::Result<Layer, String> {
-    let named = |kind: &str| {
-        let name = format!("layers.{i}.{kind}");
-        let tensor = tensors.tensor(&name).map_err(|_| format!("no tensor `{name}`"))?;
-        let values = floats(&name, &tensor)?;
-        Ok::<_, String>((values, tensor.shape().to_vec()))
-    };
-    let (weight, shape) = named("weight")?;
-    let &[outputs, inputs] = shape.as_slice() else {
-        return Err(format!("layers.{i}.weight has shape {shape:?}, expected [out, in]"));
-    };
-    let (bias, _) = named("bias")?;
-    Ok(Layer { weight, bias, inputs, outputs })
-}
-
-/// The tensor's numbers.
-fn floats(name: &str, tensor: &TensorView<'_>) -> std::result::Result<Vec<f32>, String> {
-    if tensor.dtype() != Dtype::F32 {
-        return Err(format!("{name} is {:?}, expected F32", tensor.dtype()));
-    }
-    let float = |bytes: &[u8]| bytes.try_into().map(f32::from_le_bytes).unwrap_or(f32::NAN);
-    Ok(tensor.data().chunks_exact(4).map(float).collect())
-}
-
-/// The numbers as a file holds them.
-fn le_bytes(values: &[f32]) -> Vec<u8> {
-    values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }

@@ -1,6 +1,10 @@
 //! Policies: a formula over `Real`, or a trained network.
 
+mod file;
+pub mod import;
+pub mod inspect;
 mod mlp;
+mod spectral;
 
 pub use mlp::{Activation, Layer, Mlp, OutputActivation};
 

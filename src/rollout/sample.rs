@@ -85,6 +85,23 @@ impl Stream {
         philox(counter, self.key())
     }
 
+    /// The samples `first..first + N` of the uniform distribution in a box: those of
+    /// [`Region::Box`], for any number of coordinates.
+    ///
+    /// # Panics
+    /// If the corners have not the same number of coordinates.
+    pub fn in_box<const N: usize>(&self, low: &[f32], high: &[f32], first: u64) -> Vec<Lanes<N>> {
+        assert_eq!(low.len(), high.len(), "both corners have the same coordinates");
+        let mut words = [[0; N]; 4];
+        let coordinate = |i: usize| {
+            if i.is_multiple_of(4) {
+                words = self.words(first, (i / 4) as u32);
+            }
+            Lanes::lit(low[i]) + unit(words[i % 4]) * Lanes::lit(high[i] - low[i])
+        };
+        (0..low.len()).map(coordinate).collect()
+    }
+
     /// Number `word` of the uniform draws in `[0, 1)` of each sample `first..first + N`.
     ///
     /// 23 bits, exactly representable: the bits do not depend on the device.

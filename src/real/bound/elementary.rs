@@ -49,7 +49,7 @@ pub(super) fn cos(x: Interval) -> Interval {
 }
 
 /// Hyperbolic tangents of `x`.
-pub(super) fn tanh(x: Interval) -> Interval {
+pub(crate) fn tanh(x: Interval) -> Interval {
     let range = rising(x, f64::tanh);
     Interval::new(range.low.max(-1.0), range.high.min(1.0))
 }

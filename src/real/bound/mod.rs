@@ -13,6 +13,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
 
 use super::Real;
+pub(crate) use elementary::tanh;
 pub use interval::Interval;
 pub use pieces::{Caveats, Enclosure, Piece};
 

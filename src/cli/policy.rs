@@ -1,0 +1,283 @@
+//! The commands `policy import` and `policy inspect`: policy files made and looked at.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::args::{Global, ImportArguments};
+use super::{Outcome, folder_of, report};
+use crate::config::{Config, Job, PolicySource};
+use crate::error::{Error, Result};
+use crate::files::Staged;
+use crate::policy::import::{self, Cast, Imported, Origin, Request};
+use crate::policy::inspect::{Inspection, output_intervals, output_ranges};
+use crate::policy::{Mlp, Policy};
+use crate::real::bound::Interval;
+use crate::rollout::{Plant, Purpose, Stream};
+use crate::system::System;
+
+/// Ending of policy files.
+const ENDING: &str = "safetensors";
+/// Random states that the range of actions is seen over.
+const SAMPLES: u64 = 16_384;
+/// States that are evaluated side by side.
+const LANES: usize = 16;
+
+/// Which states and controls a configuration has, and the box of the states.
+struct Frame {
+    states: Vec<String>,
+    controls: Vec<String>,
+    low: Vec<f32>,
+    high: Vec<f32>,
+}
+
+/// The frame of a configuration, as a job for its plant.
+struct Look<'a>(&'a Config);
+
+impl Job for Look<'_> {
+    type Output = Frame;
+
+    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Frame>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let states = plant.system.states();
+        let settings = self.0.settings(&states)?;
+        Ok(Frame {
+            states: states.map(|axis| axis.name).to_vec(),
+            controls: plant.system.controls().map(|axis| axis.name).to_vec(),
+            low: settings.low.to_vec(),
+            high: settings.high.to_vec(),
+        })
+    }
+}
+
+/// The frame of the configuration at `path`, which the network of `file` has to fit.
+fn frame(global: &Global, path: &Path, file: &Path, network: &Mlp) -> Result<(Config, Frame)> {
+    let config = Config::load(path, &global.overrides())?;
+    let (path, network) = (file.to_owned(), network.clone());
+    let source = PolicySource::Network { path, bytes: Vec::new(), network };
+    let frame = config.with_plant(&source, Look(&config))?;
+    Ok((config, frame))
+}
+
+/// What `policy import --json` prints.
+#[derive(Serialize)]
+struct Import {
+    file: String,
+    out: String,
+    /// Names of the layers in the file.
+    layers: Vec<String>,
+    widths: Vec<usize>,
+    activation: &'static str,
+    activation_from: Origin,
+    output: &'static str,
+    output_from: Origin,
+    state_order: Option<Vec<String>>,
+    parameter_count: usize,
+    digest: String,
+}
+
+/// Writes a network of a checkpoint or a graph as a policy file.
+pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome> {
+    let missing = || Error::invalid("--out", "missing; name the policy file, OUT.safetensors");
+    let out = global.out.as_deref().ok_or_else(missing)?;
+    let name = out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    if out.extension().is_none_or(|ending| ending != ENDING) {
+        let problem = format!("{}: the name has to end in .{ENDING}", out.display());
+        return Err(Error::invalid("--out", problem));
+    }
+    let request = Request {
+        networks: asked.network.clone(),
+        activation: asked.activation,
+        output: asked.output,
+        cast: if asked.cast { Cast::ToF32 } else { Cast::Refused },
+    };
+    let Imported { network, layers, activation, output } =
+        import::read(&asked.file, &request).map_err(as_flag)?;
+    let network = match (&asked.state_order, &asked.config) {
+        (Some(names), _) => network.with_state_order(names.clone()).map_err(as_flag)?,
+        (None, Some(config)) => {
+            let (_, frame) = frame(global, config, &asked.file, &network)?;
+            network.with_state_order(frame.states)?
+        }
+        (None, None) => network,
+    };
+    let mut staged = Staged::new(folder_of(out))?;
+    staged.add(name, &network.to_bytes())?;
+    staged.publish()?;
+    let import = Import {
+        file: asked.file.display().to_string(),
+        out: out.display().to_string(),
+        layers,
+        widths: network.widths(),
+        activation: network.activation().name(),
+        activation_from: activation,
+        output: network.output().name(),
+        output_from: output,
+        state_order: network.state_order().map(<[String]>::to_vec),
+        parameter_count: network.parameter_count(),
+        digest: network.digest(),
+    };
+    report(global, &import, || import_text(&import))?;
+    Ok(Outcome::Done)
+}
+
+/// The error with the flag for its place.
+fn as_flag(error: Error) -> Error {
+    match error {
+        Error::Invalid { place, problem } => {
+            Error::invalid(format!("--{}", place.replace(' ', "-")), problem)
+        }
+        other => other,
+    }
+}
+
+/// What was imported, and what the file did not say.
+fn import_text(import: &Import) -> String {
+    let from = |origin: Origin, flag: &str| match origin {
+        Origin::File => "as the graph has it".to_owned(),
+        Origin::Stated => "as stated".to_owned(),
+        Origin::Default => format!("the default: the file does not say, --{flag} does"),
+    };
+    let inputs = import.state_order.as_ref().map(|names| names.join(","));
+    format!(
+        "{}: network {}, {} parameters\n\
+         layers      {}\n\
+         activation  {} ({})\n\
+         output      {} ({})\n\
+         inputs      {}\n\
+         digest      {}\n",
+        import.out,
+        widths(&import.widths),
+        import.parameter_count,
+        import.layers.join(", "),
+        import.activation,
+        from(import.activation_from, "activation"),
+        import.output,
+        from(import.output_from, "output"),
+        inputs.as_deref().unwrap_or("not named; --config or --state-order names them"),
+        import.digest,
+    )
+}
+
+/// Widths as in `12-64-3`.
+fn widths(widths: &[usize]) -> String {
+    widths.iter().map(usize::to_string).collect::<Vec<_>>().join("-")
+}
+
+/// What `policy inspect --json` prints.
+#[derive(Serialize)]
+struct Inspect {
+    file: String,
+    #[serde(flatten)]
+    network: Inspection,
+    /// Corners of the box that the actions are over.
+    low: Vec<f32>,
+    high: Vec<f32>,
+    actions: Vec<Action>,
+    /// Random states that `seen` is over.
+    samples: u64,
+    seed: u64,
+}
+
+/// The range of an action over the box.
+#[derive(Serialize)]
+struct Action {
+    name: String,
+    /// By interval arithmetic: every state of the box.
+    interval: [f64; 2],
+    /// Of the random states.
+    seen: [f32; 2],
+}
+
+/// Prints what a policy file holds.
+pub(super) fn inspect(global: &Global, file: &Path, config: Option<&Path>) -> Result<Outcome> {
+    let network = Mlp::load(file)?;
+    let seed = global.seed.unwrap_or(1);
+    let (seed, frame) = match config {
+        Some(path) => {
+            let (config, frame) = frame(global, path, file, &network)?;
+            (config.seed, frame)
+        }
+        None => (seed, unit_frame(&network)),
+    };
+    let inspect = Inspect {
+        file: file.display().to_string(),
+        actions: actions(&network, &frame, seed),
+        network: Inspection::of(&network),
+        low: frame.low,
+        high: frame.high,
+        samples: SAMPLES,
+        seed,
+    };
+    let place = config.map_or("from -1 to 1".to_owned(), |path| path.display().to_string());
+    report(global, &inspect, || inspect_text(&inspect, &place))?;
+    Ok(Outcome::Done)
+}
+
+/// The box from -1 to 1, with numbers for names.
+fn unit_frame(network: &Mlp) -> Frame {
+    let widths = network.widths();
+    let numbered = |count: usize| (0..count).map(|i| i.to_string()).collect();
+    let (inputs, outputs) = (widths[0], widths[widths.len() - 1]);
+    Frame {
+        states: numbered(inputs),
+        controls: numbered(outputs),
+        low: vec![-1.0; inputs],
+        high: vec![1.0; inputs],
+    }
+}
+
+/// The range of each action over the box.
+fn actions(network: &Mlp, frame: &Frame, seed: u64) -> Vec<Action> {
+    let Frame { controls, low, high, .. } = frame;
+    let sides = low.iter().zip(high).map(|(&low, &high)| Interval::new(low.into(), high.into()));
+    let intervals = output_intervals(network, &sides.collect::<Vec<_>>());
+    let stream = Stream::new(seed, Purpose::User, 0);
+    let batches = (0..SAMPLES).step_by(LANES).map(|i| stream.in_box::<LANES>(low, high, i));
+    let seen = output_ranges(network, batches);
+    let action = |((name, Interval { low, high }), seen): ((&String, _), _)| Action {
+        name: name.clone(),
+        interval: [low, high],
+        seen,
+    };
+    controls.iter().zip(intervals).zip(seen).map(action).collect()
+}
+
+/// The inspection in words; `place` names the box.
+fn inspect_text(inspect: &Inspect, place: &str) -> String {
+    let Inspect { network, .. } = inspect;
+    let names = network.state_order.as_ref().map(|names| names.join(","));
+    let mut text = format!(
+        "{}: network {}, {} parameters\n\
+         activation  {}, output {}\n\
+         inputs      {}\n\
+         digest      {}\n",
+        inspect.file,
+        widths(&network.widths),
+        network.parameter_count,
+        network.activation,
+        network.output,
+        names.as_deref().unwrap_or("not named"),
+        network.digest,
+    );
+    for (i, layer) in network.layers.iter().enumerate() {
+        let ([w, most], [b, bias]) = (layer.weight_range, layer.bias_range);
+        text += &format!(
+            "layer {i}     {} -> {}, weights {w:.4} to {most:.4}, biases {b:.4} to {bias:.4}, \
+             spectral norm at most {:.4}\n",
+            layer.inputs, layer.outputs, layer.spectral_norm
+        );
+    }
+    text += &format!("Lipschitz   at most {:.4}, everywhere\n", network.lipschitz_bound);
+    text += &format!("actions     over the box ({place}):\n");
+    for Action { name, interval: [low, high], seen: [least, largest] } in &inspect.actions {
+        text += &format!(
+            "  {name}  within {low:.4} to {high:.4}; seen {least:.4} to {largest:.4} in {} states\n",
+            inspect.samples
+        );
+    }
+    text
+}

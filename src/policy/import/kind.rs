@@ -1,0 +1,89 @@
+//! Kinds of numbers in files of other programs, and what becomes of those that are not f32.
+
+use half::{bf16, f16};
+
+/// What is done with numbers that are floats of another width than f32.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cast {
+    /// They are refused.
+    #[default]
+    Refused,
+    /// They are rounded to the nearest f32, or widened.
+    ToF32,
+}
+
+/// A kind of number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    F32,
+    F64,
+    F16,
+    Bf16,
+    /// No float.
+    Integer,
+}
+
+impl Kind {
+    /// The kind of the numbers of the storage `name` of PyTorch.
+    pub(super) fn of_storage(name: &str) -> Option<Self> {
+        Some(match name {
+            "FloatStorage" => Self::F32,
+            "DoubleStorage" => Self::F64,
+            "HalfStorage" => Self::F16,
+            "BFloat16Storage" => Self::Bf16,
+            "LongStorage" | "IntStorage" | "ShortStorage" | "CharStorage" | "ByteStorage"
+            | "BoolStorage" => Self::Integer,
+            _ => return None,
+        })
+    }
+
+    /// The kind with the number `data_type` in ONNX.
+    pub(super) fn of_onnx(data_type: i32) -> Self {
+        match data_type {
+            1 => Self::F32,
+            11 => Self::F64,
+            10 => Self::F16,
+            16 => Self::Bf16,
+            _ => Self::Integer,
+        }
+    }
+
+    /// The name for messages.
+    fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "float32",
+            Self::F64 => "float64",
+            Self::F16 => "float16",
+            Self::Bf16 => "bfloat16",
+            Self::Integer => "no float",
+        }
+    }
+
+    /// Bytes of a float, and how it is read as an f32.
+    ///
+    /// # Errors
+    /// A sentence with the remedy, for numbers that are no f32 if `cast` does not allow them.
+    pub(super) fn reader(self, cast: Cast) -> Result<(usize, fn(&[u8]) -> f32), String> {
+        let reader: (usize, fn(&[u8]) -> f32) = match self {
+            Self::F32 => (4, |bytes| f32::from_le_bytes(array(bytes))),
+            Self::F64 => (8, |bytes| f64::from_le_bytes(array(bytes)) as f32),
+            Self::F16 => (2, |bytes| f16::from_le_bytes(array(bytes)).to_f32()),
+            Self::Bf16 => (2, |bytes| bf16::from_le_bytes(array(bytes)).to_f32()),
+            Self::Integer => return Err("its numbers are no floats".to_owned()),
+        };
+        if self != Self::F32 && cast == Cast::Refused {
+            return Err(format!(
+                "its numbers are {}, a policy is float32; --cast converts them",
+                self.name()
+            ));
+        }
+        Ok(reader)
+    }
+}
+
+/// The first `N` bytes.
+fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
+    let mut array = [0; N];
+    array.copy_from_slice(&bytes[..N]);
+    array
+}

@@ -1,0 +1,213 @@
+//! Lipschitz bounds and ranges of networks, against decompositions, closed forms and many inputs.
+
+#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+
+use nalgebra::DMatrix;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use reachcast::policy::inspect::{Inspection, output_intervals, output_ranges};
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::real::bound::Interval;
+use reachcast::rollout::{Purpose, Region, Stream};
+
+const ACTIVATIONS: [Activation; 3] = [Activation::Relu, Activation::Tanh, Activation::Silu];
+
+/// A network with weights drawn uniformly, of about unit gain per layer.
+fn network(widths: &[usize], activation: Activation, output: OutputActivation, seed: u64) -> Mlp {
+    let mut draw = StdRng::seed_from_u64(seed);
+    let layers = widths.windows(2).map(|pair| {
+        let (inputs, outputs) = (pair[0], pair[1]);
+        let size = 1.5 / (inputs as f32).sqrt();
+        let mut numbers =
+            |count: usize| (0..count).map(|_| draw.random_range(-size..size)).collect();
+        Layer { weight: numbers(inputs * outputs), bias: numbers(outputs), inputs, outputs }
+    });
+    Mlp::new(layers.collect(), activation, output).unwrap()
+}
+
+/// The network in f64 with the library's functions, which the polynomials of `forward` are not.
+fn exact(network: &Mlp, input: &[f64]) -> Vec<f64> {
+    let last = network.layers().len() - 1;
+    network.layers().iter().enumerate().fold(input.to_vec(), |x, (i, layer)| {
+        let rows = layer.weight.chunks_exact(layer.inputs).zip(&layer.bias);
+        rows.map(|(row, &bias)| {
+            let sum: f64 = row.iter().zip(&x).map(|(&w, x)| f64::from(w) * x).sum();
+            let sum = sum + f64::from(bias);
+            match (i == last, network.activation(), network.output()) {
+                (true, _, OutputActivation::Tanh) | (false, Activation::Tanh, _) => sum.tanh(),
+                (true, _, OutputActivation::Identity) => sum,
+                (false, Activation::Relu, _) => sum.max(0.0),
+                (false, Activation::Silu, _) => sum / (1.0 + (-sum).exp()),
+            }
+        })
+        .collect()
+    })
+}
+
+fn race_policy() -> Mlp {
+    Mlp::load("configs/policies/race_policy.safetensors".as_ref()).unwrap()
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn the_lipschitz_bound_is_the_product_of_the_norms() {
+    let networks = ACTIVATIONS
+        .map(|activation| network(&[6, 32, 20, 2], activation, OutputActivation::Identity, 3));
+    for network in networks.into_iter().chain([race_policy()]) {
+        let inspection = Inspection::of(&network);
+        let norms = network.layers().iter().map(|layer| {
+            let weights = layer.weight.iter().map(|&w| f64::from(w));
+            DMatrix::from_row_iterator(layer.outputs, layer.inputs, weights).singular_values().max()
+        });
+        let product: f64 = norms.product();
+        // The steepest slope of SiLU, between the layers.
+        let slope: f64 = match network.activation() {
+            Activation::Silu => 1.099_839_3,
+            _ => 1.0,
+        };
+        let product = product * slope.powi(network.layers().len() as i32 - 1);
+        let bound = inspection.lipschitz_bound;
+        assert!(bound >= product * (1.0 - 1e-7), "{bound} is below {product}");
+        assert!(bound <= product * 1.0005, "{bound} is far above {product}");
+    }
+}
+
+#[test]
+fn no_two_outputs_are_farther_apart_than_the_bound_says() {
+    let mut draw = StdRng::seed_from_u64(5);
+    for activation in ACTIVATIONS {
+        // One layer of one neuron comes close to its bound: a positive weight at the steepest.
+        let narrow = network(&[1, 1, 1], activation, OutputActivation::Identity, 1);
+        let wide = network(&[3, 16, 2], activation, OutputActivation::Tanh, 4);
+        for (network, share) in [(narrow, 0.999), (wide, 0.05)] {
+            let bound = Inspection::of(&network).lipschitz_bound;
+            let mut steepest: f64 = 0.0;
+            for _ in 0..40_000 {
+                let mut side = |size: f64| -> Vec<f64> {
+                    (0..network.widths()[0]).map(|_| draw.random_range(-size..size)).collect()
+                };
+                let (a, step) = (side(4.0), side(1e-3));
+                let b: Vec<f64> = a.iter().zip(&step).map(|(a, step)| a + step).collect();
+                let apart = distance(&exact(&network, &a), &exact(&network, &b));
+                // What the outputs in f64 may be wrong by.
+                let slope = (apart - 1e-14) / distance(&a, &b);
+                assert!(slope <= bound, "{activation:?}: {slope} above {bound}");
+                steepest = steepest.max(slope);
+            }
+            assert!(steepest >= bound * share, "{activation:?}: {steepest} far below {bound}");
+        }
+    }
+}
+
+#[test]
+fn one_layer_has_its_range_in_closed_form() {
+    let network = network(&[4, 3], Activation::Relu, OutputActivation::Identity, 7);
+    let sides = [[-1.0, 2.0], [0.5, 0.5], [-3.0, -1.0], [0.0, 1.0]];
+    let intervals = output_intervals(&network, &sides.map(|[low, high]| Interval::new(low, high)));
+    let layer = &network.layers()[0];
+    for (row, found) in intervals.iter().enumerate() {
+        let end = |upper: bool| -> f64 {
+            let weights = &layer.weight[4 * row..4 * row + 4];
+            let terms = weights.iter().zip(sides).map(|(&w, [low, high])| {
+                f64::from(w) * if (w > 0.0) == upper { high } else { low }
+            });
+            f64::from(layer.bias[row]) + terms.sum::<f64>()
+        };
+        let (low, high) = (end(false), end(true));
+        assert!(found.low <= low && high <= found.high, "{found:?}: {low} to {high}");
+        assert!(low - found.low < 1e-14 && found.high - high < 1e-14, "{found:?}");
+    }
+}
+
+/// One input through one neuron: the range is exact, wherever the interval lies.
+#[test]
+fn activations_have_their_exact_range() {
+    let layer =
+        |weight: f32| Layer { weight: vec![weight], bias: vec![0.0], inputs: 1, outputs: 1 };
+    for activation in ACTIVATIONS {
+        let layers = vec![layer(1.0), layer(1.0)];
+        let network = Mlp::new(layers, activation, OutputActivation::Identity).unwrap();
+        for i in 0..120 {
+            let low = -6.0 + 0.1 * f64::from(i);
+            for width in [0.0, 0.003, 0.2, 1.0, 5.0] {
+                let found = output_intervals(&network, &[Interval::new(low, low + width)])[0];
+                let grid = (0..=1000).map(|j| low + width * f64::from(j) / 1000.0);
+                let values: Vec<f64> = grid.map(|x| exact(&network, &[x])[0]).collect();
+                let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+                let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                // The library's exp and tanh are within a few units in the last place.
+                let slack = 1e-15;
+                assert!(found.low <= least + slack && most <= found.high + slack, "{found:?}");
+                // A grid of 5 / 1000 misses the valley of SiLU by at most 0.5 (2.5e-3)^2 / 2; the
+                // valley is taken to be 1e-4 wide.
+                let loose = least - found.low < 3e-6 && found.high - most < 3e-6;
+                assert!(loose, "{activation:?} {low} + {width}: {found:?}, {least} to {most}");
+            }
+        }
+    }
+    let silu = Mlp::new(vec![layer(1.0), layer(1.0)], Activation::Silu, OutputActivation::Identity);
+    let all = output_intervals(&silu.unwrap(), &[Interval::ENTIRE])[0];
+    assert!(all.low < -0.278_464_5 && all.low > -0.279 && all.high == f64::INFINITY, "{all:?}");
+}
+
+#[test]
+fn every_output_lies_in_its_interval() {
+    let mut draw = StdRng::seed_from_u64(9);
+    for activation in ACTIVATIONS {
+        for output in [OutputActivation::Tanh, OutputActivation::Identity] {
+            let network = network(&[5, 24, 24, 3], activation, output, 11);
+            for size in [0.001, 0.1, 2.0] {
+                let centre: Vec<f64> = (0..5).map(|_| draw.random_range(-1.0..1.0)).collect();
+                let sides = centre.iter().map(|&c| Interval::new(c - size, c + size));
+                let intervals = output_intervals(&network, &sides.collect::<Vec<_>>());
+                for _ in 0..2_000 {
+                    // Corners and edges as well as the inside.
+                    let offset =
+                        |c: &f64| c + size * draw.random_range(-2.0..2.0_f64).clamp(-1.0, 1.0);
+                    let input: Vec<f64> = centre.iter().map(offset).collect();
+                    for (value, interval) in exact(&network, &input).iter().zip(&intervals) {
+                        let slack = 1e-14;
+                        let inside =
+                            interval.low - slack <= *value && *value <= interval.high + slack;
+                        assert!(inside, "{activation:?} {output:?}: {value} outside {interval:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn seen_ranges_are_those_of_the_states_drawn() {
+    let network = race_policy();
+    let (low, high) = ([-1.0_f32; 12], std::array::from_fn(|i| 0.25 * i as f32));
+    let stream = Stream::new(3, Purpose::User, 0);
+    let batches = (0..640).step_by(16).map(|i| stream.in_box::<16>(&low, &high, i));
+    let ranges = output_ranges(&network, batches);
+    let region = Region::Box { low, high };
+    for (control, [least, most]) in ranges.into_iter().enumerate() {
+        let single = |i| region.sample::<1>(stream, i).map(|coordinate| coordinate.0[0]);
+        let values = (0..640).map(|i| network.forward(&single(i))[control]);
+        let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+        assert_eq!([least, most], [low, high]);
+    }
+}
+
+#[test]
+fn numbers_of_the_layers() {
+    let layers = vec![
+        Layer { weight: vec![3.0, 0.0, 0.0, -4.0], bias: vec![0.5, -2.0], inputs: 2, outputs: 2 },
+        Layer { weight: vec![0.6, 0.8], bias: vec![1.0], inputs: 2, outputs: 1 },
+    ];
+    let network = Mlp::new(layers, Activation::Tanh, OutputActivation::Identity).unwrap();
+    let Inspection { layers, lipschitz_bound, parameter_count, .. } = Inspection::of(&network);
+    assert_eq!((layers[0].weight_range, layers[0].bias_range), ([-4.0, 3.0], [-2.0, 0.5]));
+    assert!((4.0..4.001).contains(&layers[0].spectral_norm), "{}", layers[0].spectral_norm);
+    assert!((4.0 - 1e-6..4.001).contains(&lipschitz_bound), "{lipschitz_bound}");
+    assert_eq!(parameter_count, 9);
+}
