@@ -112,18 +112,19 @@ fn shapes_that_do_not_fit() {
 
 #[test]
 fn storages_that_are_not_there_or_not_whole() {
-    let refused = |change: &dyn Fn(&str, Vec<u8>) -> Option<Vec<u8>>, words: &[&str]| {
-        refused_bytes(PTH, &rewritten(GOOD, change), &Request::default(), words);
+    let refused = |content: Vec<u8>, words: &[&str]| {
+        refused_bytes(PTH, &content, &Request::default(), words);
     };
-    refused(&|name, old| (name != "data/0").then_some(old), &["`0.weight`", "no entry `data/0`"]);
-    refused(&|name, old| (name != "data.pkl").then_some(old), &["no entry `data.pkl`"]);
-    let with = |entry: &'static str, new: Vec<u8>| {
-        move |name: &str, old: Vec<u8>| Some(if name == entry { new.clone() } else { old })
+    let without = |entry: &str| rewritten(GOOD, |name, old| (name != entry).then_some(old));
+    refused(without("data/0"), &["`0.weight`", "no entry `data/0`"]);
+    refused(without("data.pkl"), &["no entry `data.pkl`"]);
+    let with = |entry: &str, new: &[u8]| {
+        rewritten(GOOD, |name, old| Some(if name == entry { new.to_vec() } else { old }))
     };
-    refused(&with("data/0", vec![0; 95 * 4]), &["does not fit the 95 numbers"]);
-    refused(&with("data/0", Vec::new()), &["does not fit the 0 numbers"]);
-    refused(&with("data/2", vec![0xff; 256]), &["layers.1.weight[0] is NaN, not finite"]);
-    refused(&with("byteorder", b"big".to_vec()), &["most significant byte first"]);
+    refused(with("data/0", &[0; 95 * 4]), &["does not fit the 95 numbers"]);
+    refused(with("data/0", &[]), &["does not fit the 0 numbers"]);
+    refused(with("data/2", &[0xff; 256]), &["layers.1.weight[0] is NaN, not finite"]);
+    refused(with("byteorder", b"big"), &["most significant byte first"]);
     // The key of a storage is no path.
     let folder = replaced(&pickle(GOOD), b"X\x01\x00\x00\x000", &text("../data.pkl"));
     refused_pickle(&folder, &["no entry `data/../data.pkl`"]);

@@ -9,7 +9,7 @@ use super::{Outcome, folder_of, report};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::{Error, Result};
 use crate::files::Staged;
-use crate::policy::import::{self, Cast, Imported, Origin, Request};
+use crate::policy::import::{self, Cast, Origin, Request};
 use crate::policy::inspect::{Inspection, output_intervals, output_ranges};
 use crate::policy::{Mlp, Policy};
 use crate::real::bound::Interval;
@@ -81,47 +81,56 @@ struct Import {
 
 /// Writes a network of a checkpoint or a graph as a policy file.
 pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome> {
-    let missing = || Error::invalid("--out", "missing; name the policy file, OUT.safetensors");
-    let out = global.out.as_deref().ok_or_else(missing)?;
-    let name = out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    if out.extension().is_none_or(|ending| ending != ENDING) {
-        let problem = format!("{}: the name has to end in .{ENDING}", out.display());
-        return Err(Error::invalid("--out", problem));
-    }
+    let (out, name) = destination(global)?;
     let request = Request {
         networks: asked.network.clone(),
         activation: asked.activation,
         output: asked.output,
         cast: if asked.cast { Cast::ToF32 } else { Cast::Refused },
     };
-    let Imported { network, layers, activation, output } =
-        import::read(&asked.file, &request).map_err(as_flag)?;
-    let network = match (&asked.state_order, &asked.config) {
-        (Some(names), _) => network.with_state_order(names.clone()).map_err(as_flag)?,
-        (None, Some(config)) => {
-            let (_, frame) = frame(global, config, &asked.file, &network)?;
-            network.with_state_order(frame.states)?
-        }
-        (None, None) => network,
-    };
+    let found = import::read(&asked.file, &request).map_err(as_flag)?;
+    let network = with_names(global, asked, found.network)?;
     let mut staged = Staged::new(folder_of(out))?;
     staged.add(name, &network.to_bytes())?;
     staged.publish()?;
     let import = Import {
         file: asked.file.display().to_string(),
         out: out.display().to_string(),
-        layers,
+        layers: found.layers,
         widths: network.widths(),
         activation: network.activation().name(),
-        activation_from: activation,
+        activation_from: found.activation_from,
         output: network.output().name(),
-        output_from: output,
+        output_from: found.output_from,
         state_order: network.state_order().map(<[String]>::to_vec),
         parameter_count: network.parameter_count(),
         digest: network.digest(),
     };
     report(global, &import, || import_text(&import))?;
     Ok(Outcome::Done)
+}
+
+/// The policy file that is to be written, and its name in its folder.
+fn destination(global: &Global) -> Result<(&Path, &str)> {
+    let missing = || Error::invalid("--out", "missing; name the policy file, OUT.safetensors");
+    let out = global.out.as_deref().ok_or_else(missing)?;
+    let name = out.file_name().and_then(|name| name.to_str());
+    let name = name.filter(|_| out.extension().is_some_and(|ending| ending == ENDING));
+    let other = || {
+        let problem = format!("{}: the name has to end in .{ENDING}", out.display());
+        Error::invalid("--out", problem)
+    };
+    Ok((out, name.ok_or_else(other)?))
+}
+
+/// The network with the names of its inputs, where they are given.
+fn with_names(global: &Global, asked: &ImportArguments, network: Mlp) -> Result<Mlp> {
+    let names = match (&asked.state_order, &asked.config) {
+        (Some(names), _) => names.clone(),
+        (None, Some(config)) => frame(global, config, &asked.file, &network)?.1.states,
+        (None, None) => return Ok(network),
+    };
+    network.with_state_order(names).map_err(as_flag)
 }
 
 /// The error with the flag for its place.

@@ -78,7 +78,8 @@ mod tests {
         let all_equal = DMatrix::<f32>::identity(100, 100);
         check(&all_equal);
         // A Hadamard matrix: every singular value is the root of its size.
-        let sign = |i: usize, j: usize| if (i & j).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign =
+            |i: usize, j: usize| if (i & j).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
         let hadamard = DMatrix::from_fn(64, 64, sign);
         let bound = norm_bound(hadamard.as_slice(), [64, 64]);
         assert!((8.0..8.001).contains(&bound), "{bound}");

@@ -15,14 +15,12 @@ const MOST_ENTRIES: usize = 1 << 17;
 /// Longest key of a dictionary, bytes.
 const LONGEST_KEY: usize = 256;
 
-/// A checkpoint: tensors by name, their numbers unread.
+/// A checkpoint that numbers are read from.
 pub(super) struct Checkpoint<'a> {
     archive: Archive<Cursor<&'a [u8]>>,
     entries: Vec<String>,
     /// Where the entries lie, `archive/` in most files.
     folder: String,
-    /// The tensors in the order of the file, that of the modules in a state dict.
-    pub(super) tensors: Vec<Tensor>,
 }
 
 /// A tensor of a checkpoint.
@@ -39,18 +37,19 @@ pub(super) struct Tensor {
 }
 
 impl<'a> Checkpoint<'a> {
-    /// Reads the names of the tensors in the archive `bytes`.
+    /// The checkpoint in the archive `bytes`, and its tensors in the order of the file, which is
+    /// that of the modules in a state dict.
     ///
     /// # Errors
     /// A sentence about damage, a checkpoint of another sort, or a pickle that asks for more than
     /// tensors.
-    pub(super) fn open(bytes: &'a [u8]) -> Result<Self, String> {
+    pub(super) fn open(bytes: &'a [u8]) -> Result<(Self, Vec<Tensor>), String> {
         let damaged = |e| format!("not a whole checkpoint ({e})");
         let archive = Archive::open(Cursor::new(bytes), bytes.len() as u64).map_err(damaged)?;
         let entries = archive.names().map_err(damaged)?;
         let folder = entries.iter().find_map(|name| name.strip_suffix("data.pkl"));
         let folder = folder.ok_or("no entry `data.pkl`: not written by torch.save")?.to_owned();
-        let mut checkpoint = Self { archive, entries, folder, tensors: Vec::new() };
+        let mut checkpoint = Self { archive, entries, folder };
         if checkpoint.index("constants.pkl").is_some() {
             return Err("a TorchScript module, which holds code; save its tensors alone: \
                         torch.save(torch.jit.load(FILE).state_dict(), OTHER)"
@@ -63,8 +62,8 @@ impl<'a> Checkpoint<'a> {
         }
         let text = checkpoint.read("data.pkl")?;
         let (pickle, root) = pickle::read(&text)?;
-        checkpoint.tensors = tensors(&pickle, root)?;
-        Ok(checkpoint)
+        let tensors = tensors(&pickle, root)?;
+        Ok((checkpoint, tensors))
     }
 
     /// The numbers of `tensor`, its last index the fastest.

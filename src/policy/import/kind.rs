@@ -12,6 +12,9 @@ pub enum Cast {
     ToF32,
 }
 
+/// The f32 that the first bytes stand for.
+pub(super) type Number = fn(&[u8]) -> f32;
+
 /// A kind of number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -19,8 +22,8 @@ pub(super) enum Kind {
     F64,
     F16,
     Bf16,
-    /// No float.
-    Integer,
+    /// Integers, truth values, and what is not known.
+    NoFloat,
 }
 
 impl Kind {
@@ -32,7 +35,7 @@ impl Kind {
             "HalfStorage" => Self::F16,
             "BFloat16Storage" => Self::Bf16,
             "LongStorage" | "IntStorage" | "ShortStorage" | "CharStorage" | "ByteStorage"
-            | "BoolStorage" => Self::Integer,
+            | "BoolStorage" => Self::NoFloat,
             _ => return None,
         })
     }
@@ -44,18 +47,7 @@ impl Kind {
             11 => Self::F64,
             10 => Self::F16,
             16 => Self::Bf16,
-            _ => Self::Integer,
-        }
-    }
-
-    /// The name for messages.
-    fn name(self) -> &'static str {
-        match self {
-            Self::F32 => "float32",
-            Self::F64 => "float64",
-            Self::F16 => "float16",
-            Self::Bf16 => "bfloat16",
-            Self::Integer => "no float",
+            _ => Self::NoFloat,
         }
     }
 
@@ -63,21 +55,20 @@ impl Kind {
     ///
     /// # Errors
     /// A sentence with the remedy, for numbers that are no f32 if `cast` does not allow them.
-    pub(super) fn reader(self, cast: Cast) -> Result<(usize, fn(&[u8]) -> f32), String> {
-        let reader: (usize, fn(&[u8]) -> f32) = match self {
-            Self::F32 => (4, |bytes| f32::from_le_bytes(array(bytes))),
-            Self::F64 => (8, |bytes| f64::from_le_bytes(array(bytes)) as f32),
-            Self::F16 => (2, |bytes| f16::from_le_bytes(array(bytes)).to_f32()),
-            Self::Bf16 => (2, |bytes| bf16::from_le_bytes(array(bytes)).to_f32()),
-            Self::Integer => return Err("its numbers are no floats".to_owned()),
+    pub(super) fn reader(self, cast: Cast) -> Result<(usize, Number), String> {
+        let (name, size, number): (&str, usize, Number) = match self {
+            Self::F32 => ("float32", 4, |bytes| f32::from_le_bytes(array(bytes))),
+            Self::F64 => ("float64", 8, |bytes| f64::from_le_bytes(array(bytes)) as f32),
+            Self::F16 => ("float16", 2, |bytes| f16::from_le_bytes(array(bytes)).to_f32()),
+            Self::Bf16 => ("bfloat16", 2, |bytes| bf16::from_le_bytes(array(bytes)).to_f32()),
+            Self::NoFloat => return Err("its numbers are no floats".to_owned()),
         };
         if self != Self::F32 && cast == Cast::Refused {
             return Err(format!(
-                "its numbers are {}, a policy is float32; --cast converts them",
-                self.name()
+                "its numbers are {name}, a policy's float32; --cast converts them"
             ));
         }
-        Ok(reader)
+        Ok((size, number))
     }
 }
 

@@ -59,9 +59,9 @@ pub struct Imported {
     /// Names of its layers in the file.
     pub layers: Vec<String>,
     /// Who said what the hidden activation is.
-    pub activation: Origin,
+    pub activation_from: Origin,
     /// Who said what the last activation is.
-    pub output: Origin,
+    pub output_from: Origin,
 }
 
 /// Reads a network from a PyTorch checkpoint or an ONNX graph.
@@ -102,8 +102,7 @@ pub fn from_bytes(path: &Path, bytes: &[u8], request: &Request) -> Result<Import
 
 /// The network of a checkpoint.
 fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Imported, String> {
-    let mut checkpoint = Checkpoint::open(bytes)?;
-    let tensors = std::mem::take(&mut checkpoint.tensors);
+    let (mut checkpoint, tensors) = Checkpoint::open(bytes)?;
     let chosen = layers::choose(&tensors, &request.networks)?;
     let mut numbers = |tensor: &checkpoint::Tensor| {
         let numbers = checkpoint.numbers(tensor, request.cast);
@@ -134,8 +133,8 @@ fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Impor
     Ok(Imported {
         network: network.map_err(|e| e.to_string())?,
         layers: names,
-        activation: origin(request.activation.is_some()),
-        output: origin(request.output.is_some()),
+        activation_from: origin(request.activation.is_some()),
+        output_from: origin(request.output.is_some()),
     })
 }
 
@@ -154,6 +153,11 @@ fn as_stated((network, layers): (Mlp, Vec<String>), request: &Request) -> Result
         (_, Some(stated)) if stated != network.output() => {
             differs("output", stated.name(), network.output().name())
         }
-        _ => Ok(Imported { network, layers, activation: Origin::File, output: Origin::File }),
+        _ => Ok(Imported {
+            network,
+            layers,
+            activation_from: Origin::File,
+            output_from: Origin::File,
+        }),
     }
 }
