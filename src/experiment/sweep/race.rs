@@ -111,10 +111,10 @@ impl Experiment<'_> {
             let seed = [race_seed(self.noise_seeds[0], race.saturating_sub(1) as u64)];
             let one = std::slice::from_ref(start);
             let flights = fly(controller.as_mut(), world.system, one, &seed, steps, &Unwatched)?;
-            let timed = flights[0].decisions.iter().map(|decision| decision.seconds as f32);
+            let mut timed = flights[0].decisions.iter().map(|decision| decision.seconds as f32);
             if race > 0 {
                 seconds.extend(timed);
-            } else if let Some(second) = timed.last() {
+            } else if let Some(second) = timed.next_back() {
                 most =
                     (LATENCY_BUDGET / f64::from(second)).clamp(1.0, f64::from(TIMED_STEPS)) as u32;
             }
