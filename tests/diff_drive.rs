@@ -211,7 +211,7 @@ impl System<2, 1> for Lost {
         [Axis::new("u", "", -1.0, 1.0)]
     }
     fn step<R: Real>(&self, [x, y]: [R; 2], [u]: [R; 1]) -> [R; 2] {
-        [x + u, (y - y) / (y - y)]
+        [x + u, (R::lit(-1.0) - y * y).sqrt()]
     }
     fn target<R: Real>(&self, [x, _]: [R; 2]) -> R {
         x
