@@ -26,7 +26,7 @@ Examples:
   reachcast query reachcast-out --states configs/race_starts_500.csv
   reachcast check reachcast-out
   reachcast race configs/race.toml
-  reachcast policy import trained.pth --out policy.safetensors
+  reachcast policy import actor.pth --out policy.safetensors
   reachcast scenarios --epsilon 0.1 --beta 1e-3
 
 Exit codes:
@@ -206,7 +206,7 @@ there are several, they are listed, and --network names one. A critic takes the 
 controls of both players.
 
 Examples:
-  reachcast policy import trained.pth --out policy.safetensors --config configs/race.toml
+  reachcast policy import actor.pth --out policy.safetensors --config configs/race.toml
   reachcast policy import policy.pth --network actor1_old --out policy.safetensors
   reachcast policy import ppo.pt --network net.body,net.mean --activation tanh --out ppo.safetensors
   reachcast policy import policy.onnx --out policy.safetensors")]
