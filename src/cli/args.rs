@@ -28,7 +28,7 @@ Examples:
   reachcast check reachcast-out
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
-  reachcast policy import trained.pth --out policy.safetensors
+  reachcast policy import actor.pth --out policy.safetensors
   reachcast scenarios --epsilon 0.1 --beta 1e-3
   reachcast bench --quick
 
@@ -258,7 +258,7 @@ there are several, they are listed, and --network names one. A critic takes the 
 controls of both players.
 
 Examples:
-  reachcast policy import trained.pth --out policy.safetensors --config configs/race.toml
+  reachcast policy import actor.pth --out policy.safetensors --config configs/race.toml
   reachcast policy import policy.pth --network actor1_old --out policy.safetensors
   reachcast policy import ppo.pt --network net.body,net.mean --activation tanh --out ppo.safetensors
   reachcast policy import policy.onnx --out policy.safetensors")]

@@ -284,7 +284,8 @@ fn inspect_text(inspect: &Inspect, place: &str) -> String {
     text += &format!("actions     over the box ({place}):\n");
     for Action { name, interval: [low, high], seen: [least, largest] } in &inspect.actions {
         text += &format!(
-            "  {name}  within {low:.4} to {high:.4}; seen {least:.4} to {largest:.4} in {} states\n",
+            "  {name}  within {low:.4} to {high:.4}; \
+             seen {least:.4} to {largest:.4} in {} states\n",
             inspect.samples
         );
     }
