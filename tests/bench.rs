@@ -92,8 +92,8 @@ fn batches_grow_and_memory_does_not() {
     if let [Some(small), Some(large)] = peaks[..] {
         // The largest chunk of results is a quarter of a MiB.
         assert!(large < small + (4 << 20), "{peaks:?}");
-    } else {
-        assert!(!cfg!(target_os = "linux"), "{peaks:?}");
+    } else if cfg!(target_os = "linux") {
+        panic!("the peak is unknown: {peaks:?}");
     }
 }
 
