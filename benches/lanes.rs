@@ -27,8 +27,10 @@ use scalar::Damping;
 const ROLLOUTS: usize = 1024;
 /// Samples of a plan.
 const SAMPLES: u32 = 1024;
-/// How long each side is repeated; its best call counts.
-const PROTOCOL: Protocol = Protocol { warm_up_seconds: 0.1, budget_seconds: 0.5, least_calls: 5 };
+/// Turns of each side; its best call counts.
+const TURNS: usize = 5;
+/// How long a turn is.
+const TURN: Protocol = Protocol { warm_up_seconds: 0.02, budget_seconds: 0.1, least_calls: 3 };
 
 /// Smallest ratios to the scalar loop: rollouts under a formula, under a network, and plans.
 struct Floors {
@@ -95,7 +97,7 @@ fn rollouts<P: Policy<12, 3>>(backend: &Backend, policy: &P, data: &Data) -> f64
         black_box(scalar::measures(plant, black_box(starts), spec));
         Ok(())
     };
-    best(plain) / best(lanes)
+    ratio(plain, lanes)
 }
 
 /// Plans in lanes over plans in a loop.
@@ -110,10 +112,20 @@ fn plans(backend: &Backend) -> f64 {
         black_box(scalar::plan(&system, &cost, black_box(&task)));
         Ok(())
     };
-    best(plain) / best(lanes)
+    ratio(plain, lanes)
+}
+
+/// The shortest call of `plain` over that of `lanes`, which take turns.
+fn ratio(mut plain: impl FnMut() -> Result<()>, mut lanes: impl FnMut() -> Result<()>) -> f64 {
+    let mut best = [f64::INFINITY; 2];
+    for _ in 0..TURNS {
+        best[0] = best[0].min(shortest(&mut plain));
+        best[1] = best[1].min(shortest(&mut lanes));
+    }
+    best[0] / best[1]
 }
 
 /// The shortest call, seconds.
-fn best(call: impl FnMut() -> Result<()>) -> f64 {
-    measure(&PROTOCOL, call).expect("the work runs").best_seconds
+fn shortest(call: impl FnMut() -> Result<()>) -> f64 {
+    measure(&TURN, call).expect("the work runs").best_seconds
 }

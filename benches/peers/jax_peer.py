@@ -1,5 +1,6 @@
 """The workloads in JAX: jit, scan over the steps, layers as matrix products of the whole batch."""
 
+import itertools
 from functools import partial
 
 import peer
@@ -77,7 +78,6 @@ def plan(work, samples):
     mppi = work.settings["mppi"]
     shape = (mppi["horizon"], 3, samples)
 
-    @jax.jit
     def drawn(key):
         noise = mppi["sigma"] * jax.random.normal(key, shape)
         return improved(mppi, jnp.clip(noise, -1.0, 1.0))
@@ -85,8 +85,9 @@ def plan(work, samples):
     ours = work.array("mppi_controls").reshape(-1, mppi["horizon"], 3).transpose(1, 2, 0)
     peer.check_costs(work.array("mppi_costs"), jax.jit(partial(costs, mppi))(ours))
     peer.check("control", work.array("mppi_plan"), jax.jit(partial(improved, mppi))(ours))
-    # As many keys as there may be calls: making one is no part of the work.
-    keys = iter(list(jax.random.split(jax.random.key(1), 1000)) * 100)
+    # Making keys is no part of the work.
+    keys = itertools.cycle(list(jax.random.split(jax.random.key(1), 1000)))
+    drawn = jax.jit(drawn).lower(next(keys)).compile()
     return lambda: drawn(next(keys)).block_until_ready()
 
 

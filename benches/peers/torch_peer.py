@@ -53,16 +53,23 @@ def measures(layers, settings, judge, starts):
     return fold[1]
 
 
-# As they are, and compiled where that works; compiled once for all sizes.
-JUDGES = [judge, torch.compile(judge)]
-STAGES = [stage, torch.compile(stage)]
+def ways(function, arguments):
+    """The function as it is and, where that works, compiled for batches of any size."""
+    compiled = torch.compile(function, dynamic=True)
+    try:
+        for count in (48, 64):
+            compiled(*arguments(count))
+    except Exception:  # The compiler needs tools that may not be there.
+        return [function]
+    return [function, compiled]
 
 
 def rollout(work, network, count):
     layers = [(columns(w), columns(b[:, None])) for w, b in work.network(network)]
     starts = columns(work.starts[:count].T)
     accept = partial(peer.check, "measure", work.array(f"{network}_measures")[:count])
-    calls = [partial(measures, layers, work.settings, judge, starts) for judge in JUDGES]
+    forms = ways(judge, lambda n: (torch.ones(12, n), torch.tensor(1.0), *torch.ones(2, n)))
+    calls = [partial(measures, layers, work.settings, form, starts) for form in forms]
     return peer.fastest([(call, accept) for call in calls])
 
 
@@ -96,9 +103,10 @@ def plan(work, samples):
         peer.check_costs(work.array("mppi_costs"), costs(mppi, stage, ours))
         peer.check("control", work.array("mppi_plan"), improved(mppi, stage, ours))
 
-    return peer.fastest(
-        [(partial(drawn, mppi, stage, samples), partial(accept, stage)) for stage in STAGES]
-    )
+    numbers = mppi["speed"], mppi["cost"], torch.tensor(0.0)
+    forms = ways(stage, lambda n: (torch.ones(12, n), torch.ones(3, n), *numbers))
+    calls = [(partial(drawn, mppi, form, samples), partial(accept, form)) for form in forms]
+    return peer.fastest(calls)
 
 
 def prepare(work, workload):

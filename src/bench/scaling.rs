@@ -85,9 +85,10 @@ mod tests {
     fn the_peak_sees_what_was_held() {
         reset_peak();
         let before = peak_bytes().unwrap();
-        let held = black_box(vec![1_u8; 64 << 20]);
+        let held = black_box(vec![1_u8; 256 << 20]);
         let during = peak_bytes().unwrap();
         drop(held);
-        assert!(during >= before + (60 << 20), "{before} to {during}");
+        // Half of it: other tests of the same process give memory back.
+        assert!(during >= before + (128 << 20), "{before} to {during}");
     }
 }

@@ -27,6 +27,9 @@ const SAMPLES: [u32; 2] = [1024, 16_384];
 /// Starts whose rollouts tell how soon a sign is decided.
 const DECIDED: usize = 100;
 
+/// One call of a workload on a backend.
+type Call = Box<dyn Fn(&Backend) -> Result<()>>;
+
 /// Work of a fixed size that any backend does in one call.
 pub struct Workload {
     /// Kind, what it runs on, and size: `rollout/3x64/158`.
@@ -39,7 +42,7 @@ pub struct Workload {
     pub steps: f64,
     /// Floating-point operations of a unit, as [`flops`] counts them.
     pub flops: f64,
-    call: Box<dyn Fn(&Backend) -> Result<()>>,
+    call: Call,
 }
 
 impl Workload {
