@@ -7,7 +7,9 @@ use bytemuck::Zeroable;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
 use reachcast::backend::gpu::Params;
-use reachcast::backend::gpu::compose::{Access, Kernel, MppiText, Shape, Slot, compose};
+use reachcast::backend::gpu::compose::{
+    Access, Kernel, MppiText, Shape, Slot, compose, limit_kernel,
+};
 use reachcast::backend::physics;
 use reachcast::cost::{Cost, Fence, Quadratic, RaceCost, RecoveryCost, Safety};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
@@ -184,6 +186,12 @@ fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInf
             let (module, info) = validated(&name, &text.compose(kernel));
             see(&name, (kernel, &text.bindings(kernel)), &module, &info);
         }
+    }
+    for kernel in Kernel::LIMITS {
+        let (text, bindings) = limit_kernel(kernel);
+        let name = format!("{kernel:?}");
+        let (module, info) = validated(&name, &text);
+        see(&name, (kernel, &bindings), &module, &info);
     }
 }
 

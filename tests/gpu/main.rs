@@ -11,6 +11,7 @@ mod oracle;
 mod pairs;
 mod starts;
 mod systems;
+mod timing;
 
 use std::path::Path;
 

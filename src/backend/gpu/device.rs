@@ -112,6 +112,9 @@ pub fn adapters() -> Vec<Adapter> {
     found().into_iter().map(|(adapter, _)| adapter).collect()
 }
 
+/// What is asked for where the adapter has it; nothing depends on it.
+const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
+
 /// An opened device and its queue.
 pub(super) struct Device {
     pub(super) adapter: Adapter,
@@ -136,6 +139,7 @@ impl Device {
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("reachcast"),
+            required_features: handle.features() & WELCOME_FEATURES,
             required_limits: handle.limits(),
             ..Default::default()
         };

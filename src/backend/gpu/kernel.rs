@@ -143,6 +143,11 @@ pub(super) struct Bound {
 }
 
 impl Bound {
+    /// Name of the kernel's entry point.
+    pub(super) fn kernel(&self) -> &'static str {
+        self.pipeline.kernel.entry()
+    }
+
     /// Runs `groups` workgroups with the parameters at `offset`.
     pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32, groups: [u32; 2]) {
         pass.set_pipeline(&self.pipeline.pipeline);

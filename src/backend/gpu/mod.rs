@@ -5,12 +5,14 @@ pub mod compose;
 mod deviation;
 mod device;
 mod kernel;
+mod limits;
 mod mppi;
 mod mppi_plan;
 mod network;
 mod plan;
 mod reach_avoid;
 mod run;
+mod timing;
 
 use std::fmt;
 use std::sync::Arc;
@@ -25,15 +27,19 @@ use crate::system::System;
 use buffer::Pool;
 use device::Device;
 use kernel::Pipelines;
+use timing::Clock;
 
 pub use buffer::Params;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
+pub use limits::DeviceLimits;
+pub use timing::KernelTime;
 
 /// An opened adapter with its pipelines and buffers.
 pub struct Gpu {
     device: Device,
     pipelines: Pipelines,
     pool: Pool,
+    clock: Clock,
 }
 
 impl Gpu {
@@ -46,6 +52,7 @@ impl Gpu {
             device: Device::open(choice)?,
             pipelines: Pipelines::default(),
             pool: Pool::default(),
+            clock: Clock::default(),
         })
     }
 
@@ -61,6 +68,28 @@ impl Gpu {
     ) -> Self {
         self.pipelines = Pipelines::edited(Arc::new(edit));
         self
+    }
+
+    /// Times every dispatch on the device from now on, or no longer; off at first.
+    ///
+    /// Timed dispatches run in a pass each, and the host waits for each submission. On an adapter
+    /// without timestamp queries nothing changes.
+    pub fn time_kernels(&self, on: bool) {
+        self.clock.switch(on);
+    }
+
+    /// Times since the last call, by kernel, in the order in which they first ran; empty where
+    /// nothing was timed.
+    pub fn take_kernel_times(&self) -> Vec<KernelTime> {
+        self.clock.take()
+    }
+
+    /// Measures what the adapter can do; takes a second or so, more on a software adapter.
+    ///
+    /// # Errors
+    /// [`crate::Error::DeviceFailed`] if a kernel fails or leaves wrong results.
+    pub fn measure_limits(&self) -> Result<DeviceLimits> {
+        limits::measure(self)
     }
 
     /// The adapter in figures.

@@ -1,9 +1,11 @@
 //! The text of each kernel: constants, recorded formulas and the files of `shaders/`, concatenated.
 
 mod glue;
+mod limits;
 mod mppi;
 mod plant;
 
+pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::tile_steps;
 pub use plant::{Shape, compose};
@@ -42,6 +44,10 @@ pub enum Kernel {
     MppiRollout,
     /// Weighs the samples of MPPI problems.
     MppiUpdate,
+    /// Multiplies and adds in registers.
+    Peak,
+    /// Copies a buffer.
+    Copy,
 }
 
 /// How a kernel uses a binding.
@@ -130,6 +136,9 @@ impl Kernel {
     /// The kernels of MPPI.
     pub const MPPI: [Self; 3] = [Self::MppiStart, Self::MppiRollout, Self::MppiUpdate];
 
+    /// The kernels that measure what an adapter can do.
+    pub const LIMITS: [Self; 2] = [Self::Peak, Self::Copy];
+
     /// Name of the entry point.
     pub fn entry(self) -> &'static str {
         match self {
@@ -142,6 +151,8 @@ impl Kernel {
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
             Self::MppiUpdate => "mppi_update",
+            Self::Peak => "peak",
+            Self::Copy => "copy",
         }
     }
 
@@ -204,6 +215,8 @@ impl Kernel {
             Self::MppiUpdate => {
                 &[(S::Streams, Read), (S::Plans, Read), (S::Totals, Read), (S::Partials, ReadWrite)]
             }
+            Self::Peak => &[(S::Sink, ReadWrite)],
+            Self::Copy => &[(S::Source, Read), (S::Sink, ReadWrite)],
         };
         list.extend_from_slice(more);
         if network && matches!(self, Self::ReachAvoid | Self::Deviation) {

@@ -58,6 +58,7 @@ pub fn compose(kernel: Kernel, shape: &Shape, physics: &str) -> String {
         Kernel::MppiStart | Kernel::MppiRollout | Kernel::MppiUpdate => {
             panic!("{kernel:?} is composed by MppiText")
         }
+        Kernel::Peak | Kernel::Copy => panic!("{kernel:?} is composed by `limit_kernel`"),
     };
     let shared = vec![constants(states, shape.controls), PARAMS.to_owned()];
     [shared, parts].concat().join("\n")
