@@ -2,6 +2,7 @@
 //!
 //! Without an adapter every test says so and passes, unless `REACHCAST_REQUIRE_GPU` is 1.
 
+mod cache;
 mod edges;
 mod failures;
 mod measures;

@@ -113,7 +113,8 @@ pub fn adapters() -> Vec<Adapter> {
 }
 
 /// What is asked for where the adapter has it; nothing depends on it.
-const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
+const WELCOME_FEATURES: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PIPELINE_CACHE);
 
 /// An opened device and its queue.
 pub(super) struct Device {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::buffer::Params;
+use super::cache::PipelineCache;
 use super::compose::{Access, Kernel, Slot};
 use super::device::Device;
 use crate::error::Result;
@@ -24,13 +25,19 @@ pub(super) struct Pipeline {
 #[derive(Default)]
 pub(super) struct Pipelines {
     edit: Option<Edit>,
+    cache: Option<PipelineCache>,
     built: Mutex<HashMap<(Kernel, String), Arc<Pipeline>>>,
 }
 
 impl Pipelines {
-    /// Pipelines whose texts go through `edit` first.
+    /// Pipelines that start from those of earlier runs.
+    pub(super) fn new(device: &Device) -> Self {
+        Self { cache: PipelineCache::open(&device.device), ..Self::default() }
+    }
+
+    /// Pipelines whose texts go through `edit` first, and which leave nothing behind.
     pub(super) fn edited(edit: Edit) -> Self {
-        Self { edit: Some(edit), built: Mutex::default() }
+        Self { edit: Some(edit), ..Self::default() }
     }
 
     /// The pipeline of `kernel` with the text `composed`, from the cache or built now.
@@ -54,7 +61,8 @@ impl Pipelines {
             return Ok(Arc::clone(pipeline));
         }
         let module = self.module(device, kernel, &key.1);
-        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module));
+        let cache = self.cache.as_ref().map(PipelineCache::handle);
+        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module, cache));
         device.check()?;
         built.insert(key, Arc::clone(&pipeline));
         Ok(pipeline)
@@ -88,6 +96,7 @@ impl Pipeline {
         kernel: Kernel,
         bindings: Vec<(Slot, Access)>,
         module: &wgpu::ShaderModule,
+        cache: Option<&wgpu::PipelineCache>,
     ) -> Self {
         let entries: Vec<_> = bindings.iter().map(layout_entry).collect();
         let label = Some(kernel.entry());
@@ -111,7 +120,7 @@ impl Pipeline {
                 zero_initialize_workgroup_memory: false,
                 ..Default::default()
             },
-            cache: None,
+            cache,
         });
         Self { kernel, layout, bindings, pipeline }
     }

@@ -1,6 +1,7 @@
 //! The GPU backend: recorded physics spliced into the WGSL kernels, run through wgpu.
 
 mod buffer;
+mod cache;
 pub mod compose;
 mod deviation;
 mod device;
@@ -43,14 +44,16 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens an adapter.
+    /// Opens an adapter. Where its driver allows, compiled kernels are kept in the user's folder
+    /// for caches, or in the folder that `REACHCAST_PIPELINE_CACHE` names; `off` keeps none.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if none fits the choice or it does not open; it names those found.
     pub fn open(choice: &Choice) -> Result<Self> {
+        let device = Device::open(choice)?;
         Ok(Self {
-            device: Device::open(choice)?,
-            pipelines: Pipelines::default(),
+            pipelines: Pipelines::new(&device),
+            device,
             pool: Pool::default(),
             clock: Clock::default(),
         })
