@@ -5,6 +5,7 @@ mod cache;
 pub mod compose;
 mod deviation;
 mod device;
+mod drive;
 mod kernel;
 mod limits;
 mod mppi;
@@ -33,6 +34,7 @@ use timing::Clock;
 pub use buffer::Params;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
 pub use limits::DeviceLimits;
+pub use plan::NetworkKernels;
 pub use timing::KernelTime;
 
 /// An opened adapter with its pipelines and buffers.
@@ -41,6 +43,7 @@ pub struct Gpu {
     pipelines: Pipelines,
     pool: Pool,
     clock: Clock,
+    networks: NetworkKernels,
 }
 
 impl Gpu {
@@ -56,6 +59,7 @@ impl Gpu {
             device,
             pool: Pool::default(),
             clock: Clock::default(),
+            networks: NetworkKernels::Chosen,
         })
     }
 
@@ -70,6 +74,13 @@ impl Gpu {
         edit: impl Fn(&str) -> String + Send + Sync + 'static,
     ) -> Self {
         self.pipelines = Pipelines::edited(Arc::new(edit));
+        self
+    }
+
+    /// The same adapter, whose rollouts run networks as `networks` says.
+    #[must_use]
+    pub fn with_networks(mut self, networks: NetworkKernels) -> Self {
+        self.networks = networks;
         self
     }
 

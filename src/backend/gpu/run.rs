@@ -7,7 +7,7 @@ use super::buffer::{Buffer, Params, Pool, Use};
 use super::compose::{Access, Kernel, Shape, Slot, compose};
 use super::device::Device;
 use super::kernel::{Bound, Pipelines};
-use super::plan::{Plan, Work};
+use super::plan::{Plan, Work, fused};
 use super::timing::{Clock, Stamps};
 use crate::backend::physics;
 use crate::error::{Error, Result};
@@ -111,13 +111,14 @@ impl<'a> Job<'a> {
     {
         let network = plant.policy.network();
         check_network(network, NX, NU)?;
-        let plan = Plan::new(&gpu.device.adapter, work, NX, network, count)?;
+        let fused = fused(&gpu.device.adapter, network, gpu.networks)?;
+        let plan = Plan::new(&gpu.device.adapter, work, NX, (network, fused.as_ref()), count)?;
         // Per submission: the draw, compaction or reduction, and each step with its layers.
         let layers = network.map_or(0, |mlp| mlp.layers().len() as u64);
         Ok(Self {
             call: Call::new(gpu, 2 + u64::from(plan.segment) * (layers + 1)),
             plan,
-            shape: Shape::new(NX, NU, network),
+            shape: Shape { fused, ..Shape::new(NX, NU, network) },
             physics: physics(plant),
         })
     }
@@ -128,8 +129,13 @@ impl<'a> Job<'a> {
         kernel: Kernel,
         buffer: impl Fn(Slot) -> &'b Buffer,
     ) -> Result<Bound> {
-        let bindings = kernel.bindings(self.shape.network.is_some());
+        let bindings = self.shape.bindings(kernel);
         self.call.bind(kernel, bindings, compose(kernel, &self.shape, &self.physics), buffer)
+    }
+
+    /// Whether the rollouts run the layers of a network themselves.
+    pub(super) fn fused(&self) -> bool {
+        self.shape.fused.is_some()
     }
 
     /// Writes the listed starts `first..first + columns` into `state`; nothing if they are drawn.

@@ -1,10 +1,13 @@
 //! The text of each kernel: constants, recorded formulas and the files of `shaders/`, concatenated.
 
 mod glue;
+mod layers;
 mod limits;
 mod mppi;
 mod plant;
 
+pub use layers::Fused;
+pub(super) use layers::{LayerShape, input_quads, output_quads};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::tile_steps;
