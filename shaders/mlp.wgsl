@@ -1,8 +1,6 @@
-// One thread computes a tile of one dense layer, its trajectories MLP_LANES columns apart.
-// Activations are [width / 4, stride] vectors of 4 neurons, the state is laid out like the input's.
-// Reads the parameters and the source; writes the sink. Twin: backend/cpu/mlp.rs.
-
-const TILE_PITCH: u32 = MLP_LANES;
+// One workgroup computes WORKGROUP neurons of one dense layer for WORKGROUP trajectories, a tile per
+// thread. Activations are [width / 4, stride] vectors of 4 neurons, the state is laid out like the
+// input's. Reads the parameters and the source; writes the sink. Twin: backend/cpu/mlp.rs.
 
 @group(0) @binding(15) var<storage, read> source: array<vec4<f32>>;
 @group(0) @binding(16) var<storage, read_write> sink: array<vec4<f32>>;
@@ -15,13 +13,16 @@ fn put(quad: u32, column: u32, neurons: vec4<f32>) {
     sink[quad * params.stride + column] = neurons;
 }
 
-@compute @workgroup_size(MLP_LANES)
+@compute @workgroup_size(WORKGROUP)
 fn mlp(
     @builtin(local_invocation_index) lane: u32,
     @builtin(workgroup_id) group: vec3<u32>,
 ) {
-    let column = group.x * MLP_LANES * TILE_COLUMNS + lane;
-    let quad = 2u * group.y;
+    let column = group.x * WORKGROUP + lane % TILE_PITCH;
+    let quad = 2u * (group.y * TILE_PITCH + lane / TILE_PITCH);
+    if quad >= params.layer_outputs {
+        return;
+    }
     let layer =
         Layer(params.layer_offset, params.layer_inputs, params.layer_outputs, LAST_LAYER);
     put_tile(layer, quad, column, tile_of(layer, quad, column));

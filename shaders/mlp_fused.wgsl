@@ -1,10 +1,7 @@
-// The threads of a workgroup take its WORKGROUP trajectories through all layers of a network:
-// thread i computes a tile of the neurons from 8 (i / TILE_PITCH) on, for the trajectories from
-// i % TILE_PITCH on. Activations stay in workgroup memory, [widest / 4, WORKGROUP] vectors of 4
+// The threads of a workgroup take its WORKGROUP trajectories through all layers of a network, a tile
+// per thread and layer. Activations stay in workgroup memory, [widest / 4, WORKGROUP] vectors of 4
 // neurons; outputs replace the inputs of their layer. Whoever calls it calls it with all threads.
 // Twin: backend/cpu/mlp.rs.
-
-const TILE_PITCH: u32 = WORKGROUP / TILE_COLUMNS;
 
 var<workgroup> activations: array<vec4<f32>, FUSED_QUADS * WORKGROUP>;
 

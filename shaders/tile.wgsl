@@ -1,9 +1,11 @@
 // 8 neurons of one dense layer for 8 trajectories that lie TILE_PITCH columns apart: a tile of
 // registers, since the cost is that of loads. Reads the network's parameters; `input_at` and `put`
-// of the kernel around it say where activations lie, in vectors of 4 neurons.
-// Twin: backend/cpu/mlp.rs.
+// of the kernel around it say where activations lie, in vectors of 4 neurons. Thread i of a
+// workgroup takes the tile from neuron 8 (i / TILE_PITCH) and trajectory i % TILE_PITCH on: loads
+// are shared both ways. Twin: backend/cpu/mlp.rs.
 
 const TILE_COLUMNS: u32 = 8u;
+const TILE_PITCH: u32 = WORKGROUP / TILE_COLUMNS;
 
 struct Layer {
     // Of the biases [outputs / 4], which [inputs / 4, outputs / 4] blocks of 4 columns of 4 neurons

@@ -80,9 +80,10 @@ impl Pipelines {
         #[allow(unsafe_code, reason = "unchecked modules compile two to five times faster")]
         // SAFETY: columns are tested against `columns` or padded to the stride, steps are bounded
         // by the length of the schedule or of the plans of the problems, and `plan` and
-        // `mppi_plan` size every buffer for that stride, that length and those problems; the
-        // recorded physics has neither loops nor indices that are not constant, and every loop of
-        // the hand-written kernels ends.
+        // `mppi_plan` size every buffer for that stride, that length and those problems; workgroup
+        // memory has the vectors of the widest layer, and `limits` sizes its buffers for its
+        // threads; the recorded physics has neither loops nor indices that are not constant, and
+        // every loop of the hand-written kernels ends.
         unsafe {
             let checks = wgpu::ShaderRuntimeChecks::unchecked();
             device.device.create_shader_module_trusted(descriptor, checks)

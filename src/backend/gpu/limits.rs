@@ -17,8 +17,8 @@ const ROUND_LINKS: u64 = 16 * 4;
 const FIRST_SUM: u64 = 120;
 /// Threads that multiply and add: several times as many as any GPU keeps resident.
 const PEAK_THREADS: u32 = 1 << 20;
-/// Bytes that are copied, several times the caches of a GPU, where a binding is that large.
-const COPY_BYTES: u64 = 256 << 20;
+/// Bytes that are copied, more than the caches of a GPU hold, where a binding is that large.
+const COPY_BYTES: u64 = 128 << 20;
 /// Vectors that a thread copies.
 const COPY_ROUNDS: u32 = 16;
 /// Bytes of a vector of 4 numbers.

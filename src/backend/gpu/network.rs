@@ -1,9 +1,7 @@
 //! The network's parameters as the layer kernel wants them, and its layers' dispatches.
 
 use super::buffer::{Buffer, Params, Use};
-use super::compose::{
-    Kernel, LayerShape, MLP_LANES, Shape, Slot, TILE_COLUMNS, TILE_QUADS, compose,
-};
+use super::compose::{Kernel, LayerShape, Shape, Slot, TILE_PITCH, TILE_QUADS, WORKGROUP, compose};
 use super::kernel::Bound;
 use super::run::{Batch, Call};
 use crate::error::Result;
@@ -108,8 +106,9 @@ impl Network {
                 layer_outputs: layer.outputs,
                 ..Params::default()
             };
-            let across = columns.div_ceil(MLP_LANES * TILE_COLUMNS);
-            batch.push(bound, &params, [across, layer.outputs / TILE_QUADS]);
+            let across = columns.div_ceil(WORKGROUP);
+            let neurons = (layer.outputs / TILE_QUADS).div_ceil(TILE_PITCH);
+            batch.push(bound, &params, [across, neurons]);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! How a batch is cut up: columns per chunk, steps per dispatch, steps per submission.
 
-use super::compose::{Fused, MLP_LANES, TILE_COLUMNS, WORKGROUP};
+use super::compose::{Fused, WORKGROUP};
 use super::device::{Adapter, AdapterKind};
 use super::network::{input_quads, output_quads, parameter_quads};
 use crate::error::{Error, Result};
@@ -12,8 +12,8 @@ use crate::policy::Mlp;
 /// wrong; no other limit is known to be lower.
 pub(super) const MAX_TRIPS: u64 = 60_000;
 
-/// Columns are a multiple of this, so that the tiles of the network's layers are whole.
-pub(super) const COLUMN_UNIT: u64 = (MLP_LANES * TILE_COLUMNS) as u64;
+/// Columns are a multiple of this, so that workgroups are whole.
+pub(super) const COLUMN_UNIT: u64 = WORKGROUP as u64;
 /// Most columns of a chunk under a formula: enough threads for any GPU.
 pub(super) const FORMULA_COLUMNS: u64 = 1 << 18;
 /// Most columns of a chunk under a network, which has a thread per 8 neurons of 8 columns.

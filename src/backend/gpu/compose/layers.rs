@@ -1,7 +1,7 @@
 //! How a network lies on the device, and the text of the kernels that run it.
 
 use super::glue::component;
-use super::{TILE_QUADS, WORKGROUP};
+use super::{TILE_PITCH, TILE_QUADS, WORKGROUP};
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::real::record::{Expr, record};
 use crate::real::wgsl::function;
@@ -10,10 +10,8 @@ const TILE: &str = include_str!("../../../../shaders/tile.wgsl");
 const MLP: &str = include_str!("../../../../shaders/mlp.wgsl");
 const MLP_FUSED: &str = include_str!("../../../../shaders/mlp_fused.wgsl");
 
-/// Neurons of a tile in the vectors that it counts, bytes of such a vector.
+/// Bytes of a vector of 4 activations.
 const VECTOR_BYTES: u64 = 16;
-/// Threads beside each other in a workgroup that share a tile's neurons: `TILE_PITCH`.
-const TILE_PITCH: u32 = WORKGROUP / super::TILE_COLUMNS;
 
 /// Vectors of 4 inputs.
 pub(in super::super) fn input_quads(width: usize) -> usize {

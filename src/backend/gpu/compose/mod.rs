@@ -13,12 +13,12 @@ pub use mppi::MppiText;
 pub(super) use mppi::tile_steps;
 pub use plant::{Shape, compose};
 
-/// Threads of a workgroup, one trajectory or pair each.
+/// Threads of a workgroup, one trajectory, pair or tile of a layer each.
 pub const WORKGROUP: u32 = 64;
-/// Threads of a workgroup of the network's layers.
-pub const MLP_LANES: u32 = 32;
 /// Trajectories that one thread of a layer computes.
 pub const TILE_COLUMNS: u32 = 8;
+/// Threads of a workgroup that compute the same neurons, each for other trajectories.
+pub const TILE_PITCH: u32 = WORKGROUP / TILE_COLUMNS;
 /// Vectors of 4 neurons that one thread of a layer computes.
 pub const TILE_QUADS: u32 = 2;
 /// Numbers of a partial of MPPI before its sums of controls.
@@ -161,10 +161,7 @@ impl Kernel {
 
     /// Threads of a workgroup.
     pub fn workgroup(self) -> u32 {
-        match self {
-            Self::HiddenLayer | Self::OutputLayer => MLP_LANES,
-            _ => WORKGROUP,
-        }
+        WORKGROUP
     }
 
     /// What the kernel binds, for a plant driven by a network or by a formula; for MPPI, where the
