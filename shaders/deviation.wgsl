@@ -1,7 +1,8 @@
 // One thread rolls one pair side by side over the states t = step .. step + steps - 1. The
-// nominal trajectory stands in column i, the perturbed one in column stride + i. Reads the
-// schedule and, for a network, its controls; writes both states and folds, the pair's measures
-// and its distance at each of these steps. Twin: backend/cpu/deviation.rs.
+// nominal trajectory stands in column i, the perturbed one in column stride + i; threads from
+// WORKGROUP on only help to drive. Reads the schedule and, for a network, its controls (steps = 1
+// then) or its parameters; writes both states and folds, the pair's measures and its distance at
+// each of these steps. Twin: backend/cpu/deviation.rs.
 
 @group(0) @binding(2) var<storage, read> schedule: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
@@ -16,12 +17,14 @@ fn gap(nominal: State, perturbed: State) -> f32 {
     return select(HUGE, distance, sound);
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn deviation(@builtin(global_invocation_id) id: vec3<u32>) {
-    let column = id.x;
-    if column >= params.columns {
-        return;
-    }
+@compute @workgroup_size(LANES)
+fn deviation(
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) group: vec3<u32>,
+) {
+    // Columns are padded to whole workgroups; nothing is written beyond the last.
+    let column = group.x * WORKGROUP + lane % WORKGROUP;
+    let writes = lane < WORKGROUP && column < params.columns;
     let second = params.stride + column;
     var nominal = load_state(column);
     var perturbed = load_state(second);
@@ -29,18 +32,24 @@ fn deviation(@builtin(global_invocation_id) id: vec3<u32>) {
     var perturbed_fold = folds[second];
     for (var t = params.step; t < params.step + params.steps; t += 1u) {
         let row = schedule[t].xyz;
-        distances[(t - params.segment_start) * params.stride + column] = gap(nominal, perturbed);
+        if writes {
+            let place = (t - params.segment_start) * params.stride + column;
+            distances[place] = gap(nominal, perturbed);
+        }
         nominal_fold = judge(nominal_fold, nominal, row);
         perturbed_fold = judge(perturbed_fold, perturbed, vec3<f32>(row.x, 0.0, 0.0));
         if t < params.horizon {
-            let replayed = drive(column, nominal);
+            let replayed = drive(lane, column, nominal);
             if params.closed_loop != 0u {
-                perturbed = advance(perturbed, drive(second, perturbed));
+                perturbed = advance(perturbed, drive(lane, second, perturbed));
             } else {
                 perturbed = advance(perturbed, replayed);
             }
             nominal = advance(nominal, replayed);
         }
+    }
+    if !writes {
+        return;
     }
     store_state(column, nominal);
     store_state(second, perturbed);

@@ -1,7 +1,7 @@
 // One thread rolls one trajectory over the states t = step .. step + steps - 1, the margins of
-// each folded. Reads the schedule and, for a network, its controls (steps = 1 then); writes the
-// state, the fold and the measure or its sign at the trajectory's place in the batch. Twin:
-// backend/cpu/reach_avoid.rs.
+// each folded; threads from WORKGROUP on only help to drive. Reads the schedule and, for a network,
+// its controls (steps = 1 then) or its parameters; writes the state, the fold and the measure or
+// its sign at the trajectory's place in the batch. Twin: backend/cpu/reach_avoid.rs.
 
 @group(0) @binding(2) var<storage, read> schedule: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
@@ -9,22 +9,29 @@
 @group(0) @binding(5) var<storage, read> origin: array<u32>;
 @group(0) @binding(7) var<storage, read_write> measures: array<f32>;
 
-@compute @workgroup_size(WORKGROUP)
-fn reach_avoid(@builtin(global_invocation_id) id: vec3<u32>) {
-    let column = id.x;
-    if column >= params.columns {
-        return;
-    }
+@compute @workgroup_size(LANES)
+fn reach_avoid(
+    @builtin(local_invocation_index) lane: u32,
+    @builtin(workgroup_id) group: vec3<u32>,
+) {
+    // Columns are padded to whole workgroups; nothing is written beyond the last.
+    let column = group.x * WORKGROUP + lane % WORKGROUP;
     var x = load_state(column);
     var fold = folds[column];
     for (var t = params.step; t < params.step + params.steps; t += 1u) {
-        if params.sign_only != 0u && decided(fold) {
+        let settled = params.sign_only != 0u && decided(fold);
+        if settled && !TOGETHER {
             break;
         }
-        fold = judge(fold, x, schedule[t].xyz);
-        if t < params.horizon {
-            x = advance(x, drive(column, x));
+        if !settled {
+            fold = judge(fold, x, schedule[t].xyz);
         }
+        if t < params.horizon {
+            x = advance(x, drive(lane, column, x));
+        }
+    }
+    if lane >= WORKGROUP || column >= params.columns {
+        return;
     }
     store_state(column, x);
     folds[column] = fold;

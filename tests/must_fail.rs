@@ -11,7 +11,7 @@ mod oracle;
 
 use common::{adapter, race_policy};
 use reachcast::backend::Backend;
-use reachcast::backend::gpu::Gpu;
+use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::rollout::{
@@ -59,6 +59,18 @@ fn parity(gpu: Gpu) -> bool {
         && measures_agree(&backend, plant, ball)
         && measures_agree(&backend, simple, square)
         && pairs_agree(&backend, plant, region, PairControl::Replay)
+}
+
+/// The same for rollouts that run the race's network themselves, pairs in feedback.
+fn fused_parity(gpu: Gpu) -> bool {
+    let backend = Backend::Gpu(gpu.with_networks(NetworkKernels::Fused));
+    let race = DroneRace::default();
+    let (low, high) = (race.states().map(|a| a.low), race.states().map(|a| a.high));
+    let region = Region::new_box(low, high).expect("box");
+    let policy = race_policy();
+    let plant = Plant { system: &race, policy: &policy };
+    measures_agree(&backend, plant, region.clone())
+        && pairs_agree(&backend, plant, region, PairControl::ClosedLoop)
 }
 
 fn measures_agree<S, P, const NX: usize, const NU: usize>(
@@ -237,6 +249,9 @@ fn kernels_as_they_are_agree() {
         assert!(parity(gpu));
     }
     if let Some(gpu) = adapter() {
+        assert!(fused_parity(gpu));
+    }
+    if let Some(gpu) = adapter() {
         assert!(mppi_parity(gpu));
     }
     if let Some(gpu) = adapter() {
@@ -272,6 +287,20 @@ mutants! {
     perturbed_is_nominal: "perturbed = advance(perturbed, replayed);" => "perturbed = advance(nominal, replayed);";
     states_swapped: "let v1 = x[1];" => "let v1 = x[0];";
     branches_turned: " < v" => " > v";
+}
+
+mutants! {
+    fused_parity:
+    one_fused_step_too_few: "if t < params.horizon {" => "if t + 1u < params.horizon {";
+    one_layer_too_few: "i < LAYER_COUNT" => "i + 1u < LAYER_COUNT";
+    last_layer_like_the_others: "if layer.last {" => "if !layer.last {";
+    inputs_replaced_too_early: "    // All inputs are read before the first is replaced.\n    workgroupBarrier();\n" => "";
+    states_of_a_neighbour: "put_state(lane, x);" => "put_state((lane + 1u) % WORKGROUP, x);";
+    neurons_of_another_tile: "2u * (lane / TILE_PITCH)" => "2u * (lane % TILE_PITCH)";
+    one_tile_in_eight_left_out: "let column = lane % TILE_PITCH;" => "let column = lane % (TILE_PITCH - 1u);";
+    controls_of_a_neighbour: "control_at(lane % WORKGROUP)" => "control_at((lane + 1u) % WORKGROUP)";
+    biases_forgotten: "let upper_bias = weights[layer.offset + quad];" => "let upper_bias = vec4<f32>(0.0);";
+    perturbed_controls_are_nominal: "drive(lane, second, perturbed)" => "replayed";
 }
 
 mutants! {

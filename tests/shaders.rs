@@ -7,7 +7,9 @@ use bytemuck::Zeroable;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
 use reachcast::backend::gpu::Params;
-use reachcast::backend::gpu::compose::{Access, Kernel, MppiText, Shape, Slot, compose};
+use reachcast::backend::gpu::compose::{
+    Access, Fused, Kernel, MppiText, Shape, Slot, compose, limit_kernel,
+};
 use reachcast::backend::physics;
 use reachcast::cost::{
     Cost, CostMap, Fence, GoalCost, Grid, Quadratic, RaceCost, RecoveryCost, Safety,
@@ -57,17 +59,22 @@ impl<const NX: usize, const NU: usize> Policy<NX, NU> for Clamped {
 
 /// A network with one hidden layer of 5 neurons.
 fn network(states: usize, controls: usize, activation: Activation) -> Mlp {
+    network_of(states, 5, controls, activation)
+}
+
+/// A network with one hidden layer of `hidden` neurons.
+fn network_of(states: usize, hidden: usize, controls: usize, activation: Activation) -> Mlp {
     let layer = |inputs: usize, outputs: usize| Layer {
         weight: vec![0.1; inputs * outputs],
         bias: vec![0.0; outputs],
         inputs,
         outputs,
     };
-    let layers = vec![layer(states, 5), layer(5, controls)];
+    let layers = vec![layer(states, hidden), layer(hidden, controls)];
     Mlp::new(layers, activation, OutputActivation::Tanh).expect("a whole network")
 }
 
-/// Shape and physics under a formula and under a network of each activation.
+/// Shape and physics under a formula, and under a network of each activation in layers and fused.
 fn plants<S: System<NX, NU>, const NX: usize, const NU: usize>(
     system: &S,
 ) -> Vec<(String, Shape, String)> {
@@ -77,7 +84,12 @@ fn plants<S: System<NX, NU>, const NX: usize, const NU: usize>(
         let mlp = network(NX, NU, activation);
         let text = physics::<_, _, NX, NU>(Plant { system, policy: &mlp });
         let name = format!("{} {activation:?}", system.name());
-        all.push((name, Shape::new(NX, NU, Some(&mlp)), text));
+        all.push((name.clone(), Shape::new(NX, NU, Some(&mlp)), text.clone()));
+        for hidden in [5, 128] {
+            let fused = Some(Fused::new(&network_of(NX, hidden, NU, activation)));
+            let shape = Shape { fused, ..Shape::new(NX, NU, Some(&mlp)) };
+            all.push((format!("{name}, {hidden} neurons fused"), shape, text.clone()));
+        }
     }
     all
 }
@@ -110,7 +122,8 @@ fn validated(name: &str, text: &str) -> (naga::Module, ModuleInfo) {
     (module, info)
 }
 
-type Bindings<'a> = (Kernel, &'a [(Slot, Access)]);
+/// A kernel, the threads of its workgroup, and what it binds.
+type Bindings<'a> = (Kernel, u32, &'a [(Slot, Access)]);
 
 /// Texts of MPPI for one system and cost: each kind of noise, with and without each network.
 fn mppi_texts_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
@@ -185,16 +198,23 @@ fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInf
         for kernel in Kernel::ROLLOUT {
             let name = format!("{kernel:?} of {plant}");
             let (module, info) = validated(&name, &compose(kernel, &shape, &physics));
-            let bindings = kernel.bindings(shape.network.is_some());
-            see(&name, (kernel, &bindings), &module, &info);
+            let bindings = shape.bindings(kernel);
+            see(&name, (kernel, shape.lanes(kernel), &bindings), &module, &info);
         }
     }
     for (plant, text) in mppi_texts() {
         for kernel in Kernel::MPPI {
             let name = format!("{kernel:?} of {plant}");
             let (module, info) = validated(&name, &text.compose(kernel));
-            see(&name, (kernel, &text.bindings(kernel)), &module, &info);
+            let bindings = text.bindings(kernel);
+            see(&name, (kernel, kernel.workgroup(), &bindings), &module, &info);
         }
+    }
+    for kernel in Kernel::LIMITS {
+        let (text, bindings) = limit_kernel(kernel);
+        let name = format!("{kernel:?}");
+        let (module, info) = validated(&name, &text);
+        see(&name, (kernel, kernel.workgroup(), &bindings), &module, &info);
     }
 }
 
@@ -233,7 +253,7 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
 
 #[test]
 fn bindings_are_those_that_rust_lists() {
-    each_kernel(|name, (_, listed), module, info| {
+    each_kernel(|name, (_, _, listed), module, info| {
         let entry = info.get_entry_point(0);
         let mut declared = 0;
         for (handle, variable) in module.global_variables.iter() {
@@ -270,18 +290,18 @@ fn bindings_are_those_that_rust_lists() {
 
 #[test]
 fn entry_points_and_workgroups() {
-    each_kernel(|name, (kernel, _), module, _| {
+    each_kernel(|name, (kernel, lanes, _), module, _| {
         let [entry] = module.entry_points.as_slice() else {
             panic!("{name} has not one entry point");
         };
         assert_eq!(entry.name, kernel.entry(), "{name}");
-        assert_eq!(entry.workgroup_size, [kernel.workgroup(), 1, 1], "{name}");
+        assert_eq!(entry.workgroup_size, [lanes, 1, 1], "{name}");
     });
 }
 
 #[test]
 fn storage_fits_the_least_that_adapters_offer() {
-    each_kernel(|name, (_, bindings), _, _| {
+    each_kernel(|name, (_, _, bindings), _, _| {
         let storage = bindings.iter().filter(|(_, access)| *access != Access::Uniform).count();
         assert!(storage <= 8, "{name} binds {storage} storage buffers");
     });
@@ -374,8 +394,27 @@ fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
     let (_, shape, physics) = all_plants().swap_remove(1);
     let text = compose(Kernel::HiddenLayer, &shape, &physics);
     assert!(text.contains(&format!("const TILE_COLUMNS: u32 = {TILE_COLUMNS}u;")));
-    let stores = text.matches("sink[there").count() as u32;
-    assert_eq!(stores, TILE_COLUMNS * TILE_QUADS);
+    let stores = text.matches("tile.upper_").count() + text.matches("tile.lower_").count();
+    assert_eq!(stores as u32, TILE_COLUMNS * TILE_QUADS);
+}
+
+#[test]
+fn fused_activations_take_the_workgroup_memory_that_is_planned() {
+    for (hidden, lanes, bytes) in [(3, 64, 3), (64, 64, 16), (65, 128, 18), (128, 128, 32)] {
+        let mlp = network_of(12, hidden, 3, Activation::Relu);
+        let fused = Fused::new(&mlp);
+        // A quarter of a KiB per neuron, the 12 inputs and whole tiles of 8 at least.
+        assert_eq!((fused.lanes(), fused.workgroup_bytes()), (lanes, bytes << 10), "{hidden}");
+        let shape = Shape { fused: Some(fused), ..Shape::new(12, 3, Some(&mlp)) };
+        let text = physics(Plant { system: &DroneRace::default(), policy: &mlp });
+        let (module, _) = validated("fused", &compose(Kernel::ReachAvoid, &shape, &text));
+        let shared = module.global_variables.iter().map(|(_, variable)| variable);
+        let shared = shared.filter(|variable| variable.space == AddressSpace::WorkGroup);
+        let size = |variable: &naga::GlobalVariable| {
+            u64::from(module.types[variable.ty].inner.size(module.to_ctx()))
+        };
+        assert_eq!(shared.map(size).sum::<u64>(), bytes << 10, "{hidden} neurons");
+    }
 }
 
 /// Layer of each top-level module; a file may name its own layer and those above it.

@@ -20,6 +20,7 @@ pub use physics::physics;
 
 /// The native CPU, or a GPU through wgpu.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "a program has one, and passes it by reference")]
 pub enum Backend {
     /// Lanes and threads on the host.
     Cpu(Cpu),

@@ -1,5 +1,6 @@
 //! Chunk borders, long horizons and states that are not finite.
 
+use reachcast::backend::gpu::Gpu;
 use reachcast::policy::Activation;
 use reachcast::rollout::{
     DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query,
@@ -8,7 +9,9 @@ use reachcast::rollout::{
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
 
 use crate::systems::{Count, Idle};
-use crate::{deviation, drawn, gpu, measures, race_policy, ramp, random_network, whole_box};
+use crate::{
+    deviation, drawn, each_way, gpu, measures, race_policy, ramp, random_network, whole_box,
+};
 
 #[test]
 fn chunks_join_without_a_seam() {
@@ -84,21 +87,23 @@ fn every_step_of_a_long_horizon_is_taken() {
         tightening: &tightening,
         control: PairControl::ClosedLoop,
     };
-    let (back, farthest, pairs) = deviation::<_, _, 2, 1>(gpu, plant, &task);
-    gpu = back;
+    let (_, farthest, pairs) = deviation::<_, _, 2, 1>(gpu, plant, &task);
     assert_eq!(farthest.len(), horizon as usize + 1);
     for (pair, expected) in pairs.iter().zip(&expected) {
         assert_eq!([pair.nominal, pair.perturbed], [*expected; 2]);
     }
+    each_way(every_step_under_a_network);
+}
 
-    // Under a network, steps are dispatches of their own: cross a submission there too.
+/// Crosses submissions: only the last state counts, whose margin is 150 above the start's, less
+/// 149.5.
+fn every_step_under_a_network(mut gpu: Gpu) {
     let policy = random_network(&[2, 4, 1], Activation::Relu);
     let plant = Plant { system: &Count, policy: &policy };
     let spec = RolloutSpec::new(150, 1.0).expect("a horizon");
     let mut target = vec![1000.0; 151];
     target[150] = 0.0;
     let tightening = Tightening { constraint: vec![0.0; 151], target };
-    // Only the last state counts: its margin is 150 above the start's, less 149.5.
     let starts = [[-149.5, 0.5], [-150.5, 0.5]];
     for (query, expected) in [(Query::Measure, [0.5, -0.5]), (Query::Sign, [1.0, -1.0])] {
         let task = ReachAvoidTask {
@@ -116,7 +121,10 @@ fn every_step_of_a_long_horizon_is_taken() {
 
 #[test]
 fn non_finite_states_fail_unless_the_target_was_reached() {
-    let Some(mut gpu) = gpu() else { return };
+    each_way(non_finite_states);
+}
+
+fn non_finite_states(mut gpu: Gpu) {
     // The second state is infinite after 7 squarings of 2.1 and finite again at t = 8. From -3 the
     // first reaches 0 before that (a margin of 3 at t = 6), from -10 after it, from -20 never.
     let nan = f32::NAN;

@@ -2,21 +2,24 @@
 //!
 //! Without an adapter every test says so and passes, unless `REACHCAST_REQUIRE_GPU` is 1.
 
+mod cache;
 mod edges;
 mod failures;
 mod measures;
 mod mppi;
+mod networks;
 #[path = "../oracle/mppi.rs"]
 mod oracle;
 mod pairs;
 mod starts;
 mod systems;
+mod timing;
 
 use std::path::Path;
 
 use reachcast::Result;
 use reachcast::backend::Backend;
-use reachcast::backend::gpu::{Choice, Gpu};
+use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::rollout::{
     DeviationTask, Farthest, PairMeasure, Plant, Purpose, ReachAvoidTask, Region, RolloutSpec,
@@ -35,6 +38,14 @@ fn gpu() -> Option<Gpu> {
             println!("SKIPPED: no adapter");
             None
         }
+    }
+}
+
+/// Runs `test` on an adapter whose rollouts run networks in layers, and on one that fuses them.
+fn each_way(test: impl Fn(Gpu)) {
+    for networks in [NetworkKernels::Layered, NetworkKernels::Fused] {
+        let Some(gpu) = gpu() else { return };
+        test(gpu.with_networks(networks));
     }
 }
 

@@ -7,7 +7,7 @@ use reachcast::rollout::{
 };
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
 
-use crate::{band, drawn, gpu, measures, race_policy, ramp, random_network, whole_box};
+use crate::{band, drawn, each_way, gpu, measures, race_policy, ramp, random_network, whole_box};
 
 /// Whether the adapter rounds every sum and product and contracts none: measured for lavapipe.
 fn rounds_like_the_host(gpu: &Gpu) -> bool {
@@ -34,7 +34,12 @@ fn measure_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: 
 }
 
 /// Every GPU measure lies within [`band`].
-fn assert_close_to_f64<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
+pub(crate) fn assert_close_to_f64<
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+    const NX: usize,
+    const NU: usize,
+>(
     plant: Plant<'_, S, P>,
     task: &ReachAvoidTask<'_, NX>,
     gpu: &[f32],
@@ -80,7 +85,10 @@ fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
 
 #[test]
 fn race_measures_lie_within_a_band_around_f64() {
-    let Some(gpu) = gpu() else { return };
+    each_way(race_measures);
+}
+
+fn race_measures(gpu: Gpu) {
     let (system, policy) = (DroneRace::default(), race_policy());
     let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
@@ -126,11 +134,11 @@ fn wide_networks_of_every_activation() {
 
 #[test]
 fn sign_query_equals_the_sign_of_the_measure() {
-    let Some(gpu) = gpu() else { return };
     let (race, network) = (DroneRace::default(), race_policy());
+    each_way(|gpu| drop(assert_signs(gpu, &race, &network, 30, 700)));
+    let Some(gpu) = gpu() else { return };
     let integrator = DoubleIntegrator::default();
     let formula = BangBang { acceleration: 1.0 };
-    let gpu = assert_signs(gpu, &race, &network, 30, 700);
     assert_signs(gpu, &integrator, &formula, 100, 3000);
 }
 

@@ -1,5 +1,6 @@
 //! Pairs rolled out side by side against the f64 oracle.
 
+use reachcast::backend::gpu::Gpu;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
 use reachcast::rollout::{
@@ -9,11 +10,14 @@ use reachcast::rollout::{
 use reachcast::system::{DroneRace, System};
 
 use crate::systems::{Idle, Reveal};
-use crate::{band, deviation, drawn, gpu, race_policy, ramp, whole_box};
+use crate::{band, deviation, drawn, each_way, gpu, race_policy, ramp, whole_box};
 
 #[test]
 fn deviation_of_the_race_against_f64() {
-    let Some(mut gpu) = gpu() else { return };
+    each_way(race_deviation);
+}
+
+fn race_deviation(mut gpu: Gpu) {
     let (system, policy) = (DroneRace::default(), race_policy());
     let plant = Plant { system: &system, policy: &policy };
     let spec = RolloutSpec::new(30, 0.95).expect("a horizon");

@@ -89,6 +89,8 @@ pub(super) enum Use {
     Uniform,
     /// Results on their way to the host.
     Readback,
+    /// Times that queries found.
+    Timestamps,
 }
 
 impl Use {
@@ -98,6 +100,7 @@ impl Use {
             Self::Storage => U::STORAGE | U::COPY_SRC | U::COPY_DST,
             Self::Uniform => U::UNIFORM | U::COPY_DST,
             Self::Readback => U::MAP_READ | U::COPY_DST,
+            Self::Timestamps => U::QUERY_RESOLVE | U::COPY_SRC,
         }
     }
 }
@@ -140,6 +143,11 @@ impl Buffer {
     /// Its first block of parameters, moved by a dynamic offset.
     pub(super) fn first_block(&self) -> wgpu::BufferBinding<'_> {
         wgpu::BufferBinding { buffer: &self.inner, offset: 0, size: Some(Params::SIZE) }
+    }
+
+    /// All of it, as commands other than kernels see it.
+    pub(super) fn whole(&self) -> &wgpu::Buffer {
+        &self.inner
     }
 
     /// Writes `data` at the start, before the next submission.

@@ -3,8 +3,8 @@
 use super::Gpu;
 use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, Slot};
+use super::drive::Drive;
 use super::kernel::Bound;
-use super::network::Network;
 use super::plan::Work;
 use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
 use crate::backend::PairSink;
@@ -36,7 +36,7 @@ where
     let chunks = Chunks {
         kernels: buffers.bind(&job)?,
         job: &job,
-        network: buffers.network.as_ref(),
+        drive: &buffers.drive,
         params: pair_params(task, job.plan.stride),
     };
     let mut first = task.range.start;
@@ -68,7 +68,7 @@ struct Buffers {
     measures: Buffer,
     distances: Buffer,
     farthest: Buffer,
-    network: Option<Network>,
+    drive: Drive,
 }
 
 impl Buffers {
@@ -87,12 +87,11 @@ impl Buffers {
             measures: job.call.storage(8 * stride),
             distances: job.call.storage(4 * stride * u64::from(job.plan.segment)),
             farthest: job.call.storage(8 * (u64::from(task.spec.horizon) + 1)),
-            network: network.map(|mlp| Network::new(&job.call, mlp, job.plan.row)),
+            drive: Drive::new(job, network),
         })
     }
 
     fn bind(&self, job: &Job<'_>) -> Result<Kernels> {
-        let network = self.network.as_ref();
         let buffer = |slot| match slot {
             Slot::Region => &self.region,
             Slot::Schedule => &self.schedule,
@@ -101,15 +100,14 @@ impl Buffers {
             Slot::Origin => &self.origin,
             Slot::Distances => &self.distances,
             Slot::Farthest => &self.farthest,
-            Slot::Control => network.map_or(&self.measures, Network::output),
+            Slot::Control | Slot::Weights => self.drive.source().unwrap_or(&self.measures),
             _ => &self.measures,
         };
         Ok(Kernels {
             sample: job.bind(Kernel::Sample, buffer)?,
             rollout: job.bind(Kernel::Deviation, buffer)?,
             reduce: job.bind(Kernel::Reduce, buffer)?,
-            layers: network
-                .map_or(Ok(Vec::new()), |network| network.bind(&job.call, &self.state))?,
+            layers: self.drive.bind(job, &self.state)?,
         })
     }
 }
@@ -140,7 +138,7 @@ fn pair_params<const NX: usize>(task: &DeviationTask<'_, NX>, stride: u32) -> Pa
 /// What the chunks of a call share.
 struct Chunks<'a> {
     job: &'a Job<'a>,
-    network: Option<&'a Network>,
+    drive: &'a Drive,
     kernels: Kernels,
     params: Params,
 }
@@ -170,12 +168,10 @@ impl Chunks<'_> {
         let mut step = first;
         while step < first + count {
             let steps = plan.steps.min(first + count - step);
-            if let Some(network) = self.network
-                && step < params.horizon
-            {
+            if step < params.horizon {
                 // Perturbed states stand `stride` columns after the nominal ones.
                 let columns = if params.closed_loop == 0 { params.columns } else { plan.row };
-                network.forward(batch, &self.kernels.layers, columns, plan.row);
+                self.drive.forward(batch, &self.kernels.layers, columns, plan.row);
             }
             batch.push_columns(Kernel::Deviation, &self.kernels.rollout, &params.over(step, steps));
             step += steps;

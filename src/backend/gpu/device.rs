@@ -50,6 +50,8 @@ pub struct Adapter {
     pub max_binding_bytes: u64,
     /// Largest number of threads of a workgroup.
     pub max_workgroup_threads: u32,
+    /// Largest memory that the threads of a workgroup share, bytes.
+    pub max_workgroup_bytes: u32,
 }
 
 impl Adapter {
@@ -64,6 +66,7 @@ impl Adapter {
             max_buffer_bytes: 1 << 30,
             max_binding_bytes,
             max_workgroup_threads: 256,
+            max_workgroup_bytes: 16 << 10,
         }
     }
 
@@ -85,6 +88,7 @@ impl Adapter {
             max_buffer_bytes: limits.max_buffer_size,
             max_binding_bytes: limits.max_storage_buffer_binding_size,
             max_workgroup_threads: limits.max_compute_invocations_per_workgroup,
+            max_workgroup_bytes: limits.max_compute_workgroup_storage_size,
         }
     }
 }
@@ -112,6 +116,10 @@ pub fn adapters() -> Vec<Adapter> {
     found().into_iter().map(|(adapter, _)| adapter).collect()
 }
 
+/// What is asked for where the adapter has it; nothing depends on it.
+const WELCOME_FEATURES: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PIPELINE_CACHE);
+
 /// An opened device and its queue.
 pub(super) struct Device {
     pub(super) adapter: Adapter,
@@ -136,6 +144,7 @@ impl Device {
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("reachcast"),
+            required_features: handle.features() & WELCOME_FEATURES,
             required_limits: handle.limits(),
             ..Default::default()
         };

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::buffer::Params;
+use super::cache::PipelineCache;
 use super::compose::{Access, Kernel, Slot};
 use super::device::Device;
 use crate::error::Result;
@@ -24,13 +25,19 @@ pub(super) struct Pipeline {
 #[derive(Default)]
 pub(super) struct Pipelines {
     edit: Option<Edit>,
+    cache: Option<PipelineCache>,
     built: Mutex<HashMap<(Kernel, String), Arc<Pipeline>>>,
 }
 
 impl Pipelines {
-    /// Pipelines whose texts go through `edit` first.
+    /// Pipelines that start from those of earlier runs.
+    pub(super) fn new(device: &Device) -> Self {
+        Self { cache: PipelineCache::open(&device.device), ..Self::default() }
+    }
+
+    /// Pipelines whose texts go through `edit` first, and which leave nothing behind.
     pub(super) fn edited(edit: Edit) -> Self {
-        Self { edit: Some(edit), built: Mutex::default() }
+        Self { edit: Some(edit), ..Self::default() }
     }
 
     /// The pipeline of `kernel` with the text `composed`, from the cache or built now.
@@ -54,7 +61,8 @@ impl Pipelines {
             return Ok(Arc::clone(pipeline));
         }
         let module = self.module(device, kernel, &key.1);
-        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module));
+        let cache = self.cache.as_ref().map(PipelineCache::handle);
+        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module, cache));
         device.check()?;
         built.insert(key, Arc::clone(&pipeline));
         Ok(pipeline)
@@ -72,10 +80,11 @@ impl Pipelines {
         #[allow(unsafe_code, reason = "unchecked modules compile two to five times faster")]
         // SAFETY: columns are tested against `columns` or padded to the stride, steps are bounded
         // by the length of the schedule or of the plans of the problems, and `plan` and
-        // `mppi_plan` size every buffer for that stride, that length and those problems; the cell
-        // of a map is bounded by the number of its cells, as an integer; the recorded physics has
-        // neither loops nor indices that are not constant, and every loop of the hand-written
-        // kernels ends.
+        // `mppi_plan` size every buffer for that stride, that length and those problems; workgroup
+        // memory has the vectors of the widest layer, and `limits` sizes its buffers for its
+        // threads; the cell of a map is bounded by the number of its cells, as an integer; the
+        // recorded physics has neither loops nor indices that are not constant, and every loop of
+        // the hand-written kernels ends.
         unsafe {
             let checks = wgpu::ShaderRuntimeChecks::unchecked();
             device.device.create_shader_module_trusted(descriptor, checks)
@@ -89,6 +98,7 @@ impl Pipeline {
         kernel: Kernel,
         bindings: Vec<(Slot, Access)>,
         module: &wgpu::ShaderModule,
+        cache: Option<&wgpu::PipelineCache>,
     ) -> Self {
         let entries: Vec<_> = bindings.iter().map(layout_entry).collect();
         let label = Some(kernel.entry());
@@ -112,7 +122,7 @@ impl Pipeline {
                 zero_initialize_workgroup_memory: false,
                 ..Default::default()
             },
-            cache: None,
+            cache,
         });
         Self { kernel, layout, bindings, pipeline }
     }
@@ -144,6 +154,11 @@ pub(super) struct Bound {
 }
 
 impl Bound {
+    /// Name of the kernel's entry point.
+    pub(super) fn kernel(&self) -> &'static str {
+        self.pipeline.kernel.entry()
+    }
+
     /// Runs `groups` workgroups with the parameters at `offset`.
     pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32, groups: [u32; 2]) {
         pass.set_pipeline(&self.pipeline.pipeline);

@@ -1,16 +1,20 @@
 //! The GPU backend: recorded physics spliced into the WGSL kernels, run through wgpu.
 
 mod buffer;
+mod cache;
 pub mod compose;
 mod deviation;
 mod device;
+mod drive;
 mod kernel;
+mod limits;
 mod mppi;
 mod mppi_plan;
 mod network;
 mod plan;
 mod reach_avoid;
 mod run;
+mod timing;
 
 use std::fmt;
 use std::sync::Arc;
@@ -25,27 +29,37 @@ use crate::system::System;
 use buffer::Pool;
 use device::Device;
 use kernel::Pipelines;
+use timing::Clock;
 
 pub use buffer::Params;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
+pub use limits::DeviceLimits;
+pub use plan::NetworkKernels;
+pub use timing::KernelTime;
 
 /// An opened adapter with its pipelines and buffers.
 pub struct Gpu {
     device: Device,
     pipelines: Pipelines,
     pool: Pool,
+    clock: Clock,
+    networks: NetworkKernels,
 }
 
 impl Gpu {
-    /// Opens an adapter.
+    /// Opens an adapter. Where its driver allows, compiled kernels are kept in the user's folder
+    /// for caches, or in the folder that `REACHCAST_PIPELINE_CACHE` names; `off` keeps none.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if none fits the choice or it does not open; it names those found.
     pub fn open(choice: &Choice) -> Result<Self> {
+        let device = Device::open(choice)?;
         Ok(Self {
-            device: Device::open(choice)?,
-            pipelines: Pipelines::default(),
+            pipelines: Pipelines::new(&device),
+            device,
             pool: Pool::default(),
+            clock: Clock::default(),
+            networks: NetworkKernels::Chosen,
         })
     }
 
@@ -61,6 +75,35 @@ impl Gpu {
     ) -> Self {
         self.pipelines = Pipelines::edited(Arc::new(edit));
         self
+    }
+
+    /// The same adapter, whose rollouts run networks as `networks` says.
+    #[must_use]
+    pub fn with_networks(mut self, networks: NetworkKernels) -> Self {
+        self.networks = networks;
+        self
+    }
+
+    /// Times every dispatch on the device from now on, or no longer; off at first.
+    ///
+    /// Timed dispatches run in a pass each, and the host waits for each submission. On an adapter
+    /// without timestamp queries nothing changes.
+    pub fn time_kernels(&self, on: bool) {
+        self.clock.switch(on);
+    }
+
+    /// Times since the last call, by kernel, in the order in which they first ran; empty where
+    /// nothing was timed.
+    pub fn take_kernel_times(&self) -> Vec<KernelTime> {
+        self.clock.take()
+    }
+
+    /// Measures what the adapter can do; takes a second or so, more on a software adapter.
+    ///
+    /// # Errors
+    /// [`crate::Error::DeviceFailed`] if a kernel fails or leaves wrong results.
+    pub fn measure_limits(&self) -> Result<DeviceLimits> {
+        limits::measure(self)
     }
 
     /// The adapter in figures.

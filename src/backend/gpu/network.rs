@@ -1,29 +1,17 @@
 //! The network's parameters as the layer kernel wants them, and its layers' dispatches.
 
 use super::buffer::{Buffer, Params, Use};
-use super::compose::{Kernel, MLP_LANES, Shape, Slot, TILE_COLUMNS, TILE_QUADS, compose};
+use super::compose::{Kernel, LayerShape, Shape, Slot, TILE_PITCH, TILE_QUADS, WORKGROUP, compose};
 use super::kernel::Bound;
 use super::run::{Batch, Call};
 use crate::error::Result;
 use crate::policy::{Layer, Mlp};
 
-/// Vectors of 4 inputs.
-pub(super) fn input_quads(width: usize) -> usize {
-    width.div_ceil(4)
-}
-
-/// Vectors of 4 neurons, up to a whole tile.
-pub(super) fn output_quads(width: usize) -> usize {
-    width.div_ceil(4).next_multiple_of(TILE_QUADS as usize)
-}
+pub(super) use super::compose::{input_quads, output_quads};
 
 /// Vectors that the parameters of all layers take.
 pub(super) fn parameter_quads(mlp: &Mlp) -> usize {
-    mlp.layers().iter().map(layer_quads).sum()
-}
-
-fn layer_quads(layer: &Layer) -> usize {
-    output_quads(layer.outputs) * (1 + 4 * input_quads(layer.inputs))
+    LayerShape::of(mlp).last().map_or(0, |layer| layer.end() as usize)
 }
 
 /// Appends biases `[outputs / 4]`, then weights `[inputs / 4, outputs / 4]` in blocks of 4 columns
@@ -49,30 +37,31 @@ fn pack(layer: &Layer, out: &mut Vec<[f32; 4]>) {
     }
 }
 
-/// A network on the device.
+/// The parameters of all layers of `mlp`, on the device.
+pub(super) fn upload(call: &Call<'_>, mlp: &Mlp) -> Buffer {
+    let mut packed = Vec::with_capacity(parameter_quads(mlp));
+    for layer in mlp.layers() {
+        pack(layer, &mut packed);
+    }
+    call.uploaded(&packed)
+}
+
+/// A network on the device, a dispatch per layer.
 pub(super) struct Network {
     weights: Buffer,
     activations: [Buffer; 2],
-    layers: Vec<[u32; 3]>,
+    layers: Vec<LayerShape>,
     shape: Shape,
 }
 
 impl Network {
     /// Uploads `mlp`; its activations have `row` columns.
     pub(super) fn new(call: &Call<'_>, mlp: &Mlp, row: u32) -> Self {
-        let mut packed = Vec::with_capacity(parameter_quads(mlp));
-        let mut layers = Vec::new();
-        for layer in mlp.layers() {
-            let shape = [packed.len(), input_quads(layer.inputs), output_quads(layer.outputs)];
-            layers.push(shape.map(|number| number as u32));
-            pack(layer, &mut packed);
-        }
-        let weights = call.storage(16 * packed.len() as u64);
-        weights.write(call.device, &packed);
-        let widest = layers.iter().map(|[.., outputs]| *outputs).max().unwrap_or(0);
+        let layers = LayerShape::of(mlp);
+        let widest = layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let bytes = 16 * u64::from(widest) * u64::from(row);
         Self {
-            weights,
+            weights: upload(call, mlp),
             activations: [(); 2].map(|()| call.pool.take(call.device, Use::Storage, bytes)),
             layers,
             shape: Shape::new(mlp.widths()[0], mlp.widths()[mlp.layers().len()], Some(mlp)),
@@ -108,17 +97,18 @@ impl Network {
         columns: u32,
         row: u32,
     ) {
-        for (layer, [offset, inputs, outputs]) in bound.iter().zip(&self.layers) {
+        for (bound, layer) in bound.iter().zip(&self.layers) {
             let params = Params {
                 columns,
                 stride: row,
-                layer_offset: *offset,
-                layer_inputs: *inputs,
-                layer_outputs: *outputs,
+                layer_offset: layer.offset,
+                layer_inputs: layer.inputs,
+                layer_outputs: layer.outputs,
                 ..Params::default()
             };
-            let across = columns.div_ceil(MLP_LANES * TILE_COLUMNS);
-            batch.push(layer, &params, [across, outputs / TILE_QUADS]);
+            let across = columns.div_ceil(WORKGROUP);
+            let neurons = (layer.outputs / TILE_QUADS).div_ceil(TILE_PITCH);
+            batch.push(bound, &params, [across, neurons]);
         }
     }
 }
@@ -126,6 +116,7 @@ impl Network {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::policy::{Activation, OutputActivation};
 
     #[test]
     fn packed_by_columns_of_four_neurons() {
@@ -137,7 +128,8 @@ mod tests {
         };
         let mut packed = Vec::new();
         pack(&layer, &mut packed);
-        assert_eq!(packed.len(), layer_quads(&layer));
+        let mlp = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Tanh).expect("whole");
+        assert_eq!(packed.len(), parameter_quads(&mlp));
         assert_eq!(packed[0], [10.0, 20.0, 30.0, 0.0]);
         assert_eq!(packed[1], [0.0; 4], "bias of the padded tile");
         assert_eq!(packed[2 + 1], [1.0, 6.0, 11.0, 0.0], "column 1 of the weights");

@@ -1,7 +1,7 @@
 //! How a batch is cut up: columns per chunk, steps per dispatch, steps per submission.
 
-use super::compose::{MLP_LANES, TILE_COLUMNS, WORKGROUP};
-use super::device::Adapter;
+use super::compose::{Fused, WORKGROUP};
+use super::device::{Adapter, AdapterKind};
 use super::network::{input_quads, output_quads, parameter_quads};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
@@ -12,12 +12,19 @@ use crate::policy::Mlp;
 /// wrong; no other limit is known to be lower.
 pub(super) const MAX_TRIPS: u64 = 60_000;
 
-/// Columns are a multiple of this, so that the tiles of the network's layers are whole.
-pub(super) const COLUMN_UNIT: u64 = (MLP_LANES * TILE_COLUMNS) as u64;
+/// Columns are a multiple of this, so that workgroups are whole.
+pub(super) const COLUMN_UNIT: u64 = WORKGROUP as u64;
 /// Most columns of a chunk under a formula: enough threads for any GPU.
 pub(super) const FORMULA_COLUMNS: u64 = 1 << 18;
 /// Most columns of a chunk under a network, which has a thread per 8 neurons of 8 columns.
 pub(super) const NETWORK_COLUMNS: u64 = 1 << 14;
+/// Most columns of a chunk whose rollouts run a network themselves, a workgroup of at least 64
+/// threads per 64 columns: enough for any GPU, and not too long a dispatch for the watchdog of a
+/// slow one.
+const FUSED_COLUMNS: u64 = 1 << 16;
+/// Widest network that rollouts run themselves: beyond, its activations leave no room for a second
+/// workgroup, and its parameters do not stay in the caches.
+const FUSED_WIDTH: usize = 128;
 /// Most device memory of one call, bytes.
 pub(super) const MEMORY_BYTES: u64 = 256 << 20;
 
@@ -33,15 +40,102 @@ pub(super) enum Work {
 }
 
 impl Work {
-    /// Steps per submission, driven by a network or by a formula.
-    fn segment(self, network: bool) -> u32 {
-        match (self, network) {
-            (Self::Measure, false) => 256,
-            (Self::Measure, true) => 64,
-            (Self::Sign, true) => 8,
-            (Self::Sign, false) | (Self::Pairs, _) => 32,
+    /// Steps per submission.
+    fn segment(self, driven: Driven) -> u32 {
+        match (self, driven) {
+            (Self::Measure, Driven::Formula) => 256,
+            (Self::Measure, Driven::Layered) => 64,
+            (Self::Sign, Driven::Layered | Driven::Fused) => 8,
+            (Self::Sign, Driven::Formula) | (Self::Measure, Driven::Fused) | (Self::Pairs, _) => 32,
         }
     }
+
+    /// Trajectories of a column.
+    fn sides(self) -> u32 {
+        if self == Self::Pairs { 2 } else { 1 }
+    }
+}
+
+/// What drives the rollouts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Driven {
+    /// A formula.
+    Formula,
+    /// A network, a dispatch per layer between the steps.
+    Layered,
+    /// A network that the rollouts run themselves.
+    Fused,
+}
+
+impl Driven {
+    fn new(network: Option<&Mlp>, fused: Option<&Fused>) -> Self {
+        match (network, fused) {
+            (None, _) => Self::Formula,
+            (Some(_), None) => Self::Layered,
+            (Some(_), Some(_)) => Self::Fused,
+        }
+    }
+
+    /// Most columns of a chunk.
+    fn columns(self) -> u64 {
+        match self {
+            Self::Formula => FORMULA_COLUMNS,
+            Self::Layered => NETWORK_COLUMNS,
+            Self::Fused => FUSED_COLUMNS,
+        }
+    }
+}
+
+/// How rollouts run the network that drives them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NetworkKernels {
+    /// Fused where that should be faster: networks of at most 128 neurons per layer, on hardware
+    /// whose workgroups have the memory. Nothing of a trajectory then leaves its workgroup before
+    /// the last step, and there is one dispatch instead of one per layer and step. A software
+    /// adapter gets layers: workgroup memory is ordinary memory there, and the larger number of
+    /// barriers costs.
+    #[default]
+    Chosen,
+    /// A dispatch per layer and step, activations in storage.
+    Layered,
+    /// The rollout kernel runs all layers of all steps, activations in workgroup memory.
+    Fused,
+}
+
+/// The layers of `network` if rollouts on `adapter` run them themselves.
+///
+/// # Errors
+/// [`Error::Device`] if that is asked for and not possible.
+pub(super) fn fused(
+    adapter: &Adapter,
+    network: Option<&Mlp>,
+    wanted: NetworkKernels,
+) -> Result<Option<Fused>> {
+    let Some(mlp) = network.filter(|_| wanted != NetworkKernels::Layered) else {
+        return Ok(None);
+    };
+    let fused = Fused::new(mlp);
+    let widest = mlp.widths().into_iter().max().unwrap_or(0);
+    let fits = widest <= FUSED_WIDTH
+        && fused.workgroup_bytes() <= u64::from(adapter.max_workgroup_bytes)
+        && fused.lanes() <= adapter.max_workgroup_threads
+        && step_trips(&fused, Work::Pairs) <= MAX_TRIPS;
+    match wanted {
+        NetworkKernels::Fused if !fits => Err(Error::Device(format!(
+            "a network of {widest} neurons per layer does not fuse: at most {FUSED_WIDTH}, and \
+             {} bytes of workgroup memory, of which {} has {}; run it in layers",
+            fused.workgroup_bytes(),
+            adapter.name,
+            adapter.max_workgroup_bytes
+        ))),
+        NetworkKernels::Chosen if adapter.kind == AdapterKind::Software => Ok(None),
+        _ => Ok(fits.then_some(fused)),
+    }
+}
+
+/// Loop iterations of a thread for one step that runs the network itself.
+fn step_trips(fused: &Fused, work: Work) -> u64 {
+    1 + u64::from(work.sides()) * fused.trips()
 }
 
 /// How a batch is cut up.
@@ -53,12 +147,14 @@ pub(super) struct Plan {
     pub(super) row: u32,
     /// Steps per submission.
     pub(super) segment: u32,
-    /// Steps per dispatch: all of a segment, or 1 under a network, whose layers come between.
+    /// Steps per dispatch: 1 if a network's layers come between, else as many of a segment as the
+    /// bound on loop iterations allows.
     pub(super) steps: u32,
 }
 
 impl Plan {
-    /// The plan for `count` starts or pairs of `states` states on `adapter`.
+    /// The plan for `count` starts or pairs of `states` states on `adapter`, driven by `network`,
+    /// which the rollouts run themselves where it is fused.
     ///
     /// # Errors
     /// [`Error::Device`] if not even the smallest chunk fits.
@@ -66,37 +162,41 @@ impl Plan {
         adapter: &Adapter,
         work: Work,
         states: usize,
-        network: Option<&Mlp>,
+        (network, fused): (Option<&Mlp>, Option<&Fused>),
         count: u64,
     ) -> Result<Self> {
-        let sides = if work == Work::Pairs { 2 } else { 1 };
-        let segment = work.segment(network.is_some());
-        let cap = if network.is_some() { NETWORK_COLUMNS } else { FORMULA_COLUMNS };
-        let parts = column_bytes(work, states, network, segment);
+        let driven = Driven::new(network, fused);
+        let segment = work.segment(driven);
+        let layered = network.filter(|_| driven == Driven::Layered);
+        let parts = column_bytes(work, states, layered, segment);
         let largest = parts.iter().copied().max().unwrap_or(1);
         let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
         let fitting = (binding / largest).min(MEMORY_BYTES / parts.iter().sum::<u64>());
-        let wanted = count.max(1).next_multiple_of(COLUMN_UNIT).min(cap);
+        let wanted = count.max(1).next_multiple_of(COLUMN_UNIT).min(driven.columns());
         let stride = wanted.min(fitting / COLUMN_UNIT * COLUMN_UNIT);
         let parameters = 16 * network.map_or(0, parameter_quads) as u64;
         if stride == 0 || parameters > binding {
             return Err(too_large(adapter, largest * COLUMN_UNIT, parameters, binding));
         }
-        let steps = if network.is_some() { 1 } else { segment };
-        let trips = longest_trips(states, network, stride, u64::from(steps));
+        let steps = match (layered, fused) {
+            (Some(_), _) => 1,
+            (None, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work)) as u32),
+            (None, None) => segment,
+        };
+        let trips = longest_trips(states, layered, stride, u64::from(steps));
         if trips > MAX_TRIPS {
             return Err(Error::Device(format!(
                 "a kernel would need {trips} loop iterations per thread, and some drivers stop \
                  at {MAX_TRIPS} without notice; use the native CPU backend for this size"
             )));
         }
-        Ok(Self { stride: stride as u32, row: stride as u32 * sides, segment, steps })
+        Ok(Self { stride: stride as u32, row: stride as u32 * work.sides(), segment, steps })
     }
 }
 
 /// Bytes that each buffer holds per column.
 fn column_bytes(work: Work, states: usize, network: Option<&Mlp>, segment: u32) -> Vec<u64> {
-    let sides = if work == Work::Pairs { 2 } else { 1 };
+    let sides = u64::from(work.sides());
     let state = 16 * input_quads(states) as u64 * sides;
     let (folds, origin, measure) = (8 * sides, 4, 4 * sides);
     let mut parts = vec![state, folds, origin, measure];
@@ -113,7 +213,7 @@ fn column_bytes(work: Work, states: usize, network: Option<&Mlp>, segment: u32) 
     parts
 }
 
-/// Most loop iterations of one invocation of any kernel of the plan.
+/// Most loop iterations of one invocation of any kernel of the plan, `network` in layers.
 fn longest_trips(states: usize, network: Option<&Mlp>, stride: u64, steps: u64) -> u64 {
     let states = states as u64;
     // Philox takes 10 iterations per 4 words; a start and its perturbation run over the states
@@ -153,20 +253,25 @@ mod tests {
 
     #[test]
     fn chunks_are_whole_tiles_within_the_limits() {
-        let wide = network(&[12, 512, 512, 3]);
+        let (wide, narrow) = (network(&[12, 512, 512, 3]), network(&[12, 64, 64, 3]));
         for (binding, count) in [(1 << 27, 1), (1 << 27, u64::MAX / 2), (1 << 20, 100_000_000)] {
-            for network in [None, Some(&wide)] {
+            for network in [None, Some(&wide), Some(&narrow)] {
+                let fused = network.filter(|mlp| *mlp == &narrow).map(Fused::new);
                 for work in [Work::Measure, Work::Sign, Work::Pairs] {
                     // Parameters of the wide network take a megabyte of their own.
                     let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
-                    let plan = Plan::new(&Adapter::made_up(binding), work, 12, network, count);
+                    let driven = (network, fused.as_ref());
+                    let plan = Plan::new(&Adapter::made_up(binding), work, 12, driven, count);
                     let plan = plan.expect("a plan within the limits");
-                    let bytes = column_bytes(work, 12, network, plan.segment);
+                    let layered = network.filter(|_| fused.is_none());
+                    let bytes = column_bytes(work, 12, layered, plan.segment);
                     let stride = u64::from(plan.stride);
                     assert_eq!(stride % COLUMN_UNIT, 0);
                     assert!(bytes.iter().all(|bytes| bytes * stride <= binding));
                     assert!(bytes.iter().sum::<u64>() * stride <= MEMORY_BYTES);
-                    assert!(u64::from(plan.steps) <= MAX_TRIPS);
+                    let step = fused.as_ref().map_or(1, |fused| step_trips(fused, work));
+                    assert!(u64::from(plan.steps) * step <= MAX_TRIPS);
+                    assert_eq!(plan.steps == 1, layered.is_some());
                 }
             }
         }
@@ -174,17 +279,50 @@ mod tests {
 
     #[test]
     fn small_batches_get_small_chunks() {
-        let plan = Plan::new(&Adapter::made_up(1 << 27), Work::Measure, 12, None, 468);
+        let plan = Plan::new(&Adapter::made_up(1 << 27), Work::Measure, 12, (None, None), 468);
         assert_eq!(plan.expect("a plan").stride, 512);
     }
 
     #[test]
     fn what_cannot_run_is_refused() {
-        let small = Plan::new(&Adapter::made_up(1 << 10), Work::Measure, 12, None, 10);
+        let small = Plan::new(&Adapter::made_up(1 << 10), Work::Measure, 12, (None, None), 10);
         assert!(matches!(small, Err(Error::Device(_))), "{small:?}");
         let states = 4 * MAX_TRIPS as usize;
-        let long = Plan::new(&Adapter::made_up(1 << 30), Work::Measure, states, None, 10);
+        let long = Plan::new(&Adapter::made_up(1 << 30), Work::Measure, states, (None, None), 10);
         let text = long.expect_err("too many iterations").to_string();
         assert!(text.contains("loop iterations"), "{text}");
+    }
+
+    /// Whether a network of these widths is fused on hardware with `bytes` of workgroup memory.
+    fn fuses(widths: &[usize], bytes: u32, kind: AdapterKind, wanted: NetworkKernels) -> bool {
+        let adapter = Adapter { kind, max_workgroup_bytes: bytes, ..Adapter::made_up(1 << 27) };
+        let fused = fused(&adapter, Some(&network(widths)), wanted);
+        fused.is_ok_and(|fused| fused.is_some())
+    }
+
+    #[test]
+    fn networks_fuse_where_they_fit() {
+        use AdapterKind::{Discrete, Software};
+        use NetworkKernels::{Chosen, Layered};
+        let (least, usual) = (16 << 10, 32 << 10);
+        assert!(fuses(&[12, 64, 64, 64, 3], least, Discrete, Chosen));
+        assert!(!fuses(&[12, 128, 128, 3], least, Discrete, Chosen), "16 KiB hold 64 neurons");
+        assert!(fuses(&[12, 128, 128, 3], usual, Discrete, Chosen));
+        assert!(!fuses(&[12, 129, 3], 1 << 20, Discrete, Chosen), "too wide");
+        assert!(!fuses(&[12, 129, 3], 1 << 20, Discrete, NetworkKernels::Fused), "too wide");
+        assert!(!fuses(&[12, 64, 3], usual, Software, Chosen));
+        assert!(fuses(&[12, 64, 3], usual, Software, NetworkKernels::Fused));
+        assert!(!fuses(&[12, 64, 3], usual, Discrete, Layered));
+    }
+
+    #[test]
+    fn deep_fused_networks_take_fewer_steps_per_dispatch() {
+        let deep = network(&[[12].as_slice(), &[128; 60], &[3]].concat());
+        let fused = Fused::new(&deep);
+        let adapter = Adapter::made_up(1 << 27);
+        let plan = Plan::new(&adapter, Work::Measure, 12, (Some(&deep), Some(&fused)), 1000);
+        // 3 vectors of inputs, then 60 times 32, and the 61 layers themselves.
+        let trips = 1 + 3 + 60 * 32 + 61;
+        assert_eq!(u64::from(plan.expect("a plan").steps), MAX_TRIPS / trips);
     }
 }

@@ -3,8 +3,8 @@
 use super::Gpu;
 use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, Slot};
+use super::drive::Drive;
 use super::kernel::Bound;
-use super::network::Network;
 use super::plan::Work;
 use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
 use crate::backend::MeasureSink;
@@ -64,7 +64,7 @@ struct Buffers {
     measures: Buffer,
     survivors: Buffer,
     sets: [Columns; 2],
-    network: Option<Network>,
+    drive: Drive,
 }
 
 impl Buffers {
@@ -79,14 +79,13 @@ impl Buffers {
             measures: job.call.storage(4 * u64::from(job.plan.stride)),
             survivors: job.call.storage(4),
             sets: [Columns::new(job, NX), Columns::new(job, NX)],
-            network: network.map(|mlp| Network::new(&job.call, mlp, job.plan.row)),
+            drive: Drive::new(job, network),
         })
     }
 
     /// The kernels on the set `from`, which compact into the other one.
     fn bind(&self, job: &Job<'_>, from: usize) -> Result<Kernels> {
         let (set, kept) = (&self.sets[from], &self.sets[1 - from]);
-        let network = self.network.as_ref();
         let buffer = |slot| match slot {
             Slot::Region => &self.region,
             Slot::Schedule => &self.schedule,
@@ -97,15 +96,14 @@ impl Buffers {
             Slot::KeptFolds => &kept.folds,
             Slot::KeptOrigin => &kept.origin,
             Slot::Survivors => &self.survivors,
-            Slot::Control => network.map_or(&self.measures, Network::output),
+            Slot::Control | Slot::Weights => self.drive.source().unwrap_or(&self.measures),
             _ => &self.measures,
         };
         Ok(Kernels {
             sample: job.bind(Kernel::Sample, buffer)?,
             rollout: job.bind(Kernel::ReachAvoid, buffer)?,
             compact: job.bind(Kernel::Compact, buffer)?,
-            layers: network
-                .map_or(Ok(Vec::new()), |network| network.bind(&job.call, &set.state))?,
+            layers: self.drive.bind(job, &set.state)?,
         })
     }
 }
@@ -185,10 +183,9 @@ impl Chunks<'_> {
         let mut step = steps.start;
         while step < steps.end {
             let count = self.job.plan.steps.min(steps.end - step);
-            if let Some(network) = &self.buffers.network
-                && step < params.horizon
-            {
-                network.forward(batch, &kernels.layers, params.columns, params.stride);
+            if step < params.horizon {
+                let drive = &self.buffers.drive;
+                drive.forward(batch, &kernels.layers, params.columns, params.stride);
             }
             let params = params.over(step, count);
             batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params);

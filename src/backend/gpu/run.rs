@@ -7,7 +7,8 @@ use super::buffer::{Buffer, Params, Pool, Use};
 use super::compose::{Access, Kernel, Shape, Slot, compose};
 use super::device::Device;
 use super::kernel::{Bound, Pipelines};
-use super::plan::{Plan, Work};
+use super::plan::{Plan, Work, fused};
+use super::timing::{Clock, Stamps};
 use crate::backend::physics;
 use crate::error::{Error, Result};
 use crate::policy::{Mlp, Policy};
@@ -22,6 +23,7 @@ pub(super) struct Call<'a> {
     pub(super) device: &'a Device,
     pub(super) pool: &'a Pool,
     pipelines: &'a Pipelines,
+    clock: &'a Clock,
     uniform: Buffer,
     in_flight: Cell<Option<wgpu::SubmissionIndex>>,
 }
@@ -34,6 +36,7 @@ impl<'a> Call<'a> {
             device: &gpu.device,
             pool: &gpu.pool,
             pipelines: &gpu.pipelines,
+            clock: &gpu.clock,
             uniform: gpu.pool.take(&gpu.device, Use::Uniform, bytes),
             in_flight: Cell::new(None),
         }
@@ -73,12 +76,12 @@ impl<'a> Call<'a> {
         if let Some(buffer) = cleared {
             buffer.clear(&mut encoder);
         }
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        for (bound, offset, groups) in &batch.calls {
-            bound.dispatch(&mut pass, *offset, *groups);
-        }
-        drop(pass);
+        let stamps = self.clock.stamps(self.device, self.pool, batch.calls.len());
+        batch.encode(&mut encoder, stamps.as_ref());
         let index = self.device.queue.submit([encoder.finish()]);
+        if let Some(stamps) = &stamps {
+            self.clock.add(self.device, stamps, batch.kernels())?;
+        }
         match self.in_flight.replace(Some(index)) {
             Some(before) => self.device.wait(Some(before)),
             None => self.device.check(),
@@ -108,13 +111,14 @@ impl<'a> Job<'a> {
     {
         let network = plant.policy.network();
         check_network(network, NX, NU)?;
-        let plan = Plan::new(&gpu.device.adapter, work, NX, network, count)?;
+        let fused = fused(&gpu.device.adapter, network, gpu.networks)?;
+        let plan = Plan::new(&gpu.device.adapter, work, NX, (network, fused.as_ref()), count)?;
         // Per submission: the draw, compaction or reduction, and each step with its layers.
         let layers = network.map_or(0, |mlp| mlp.layers().len() as u64);
         Ok(Self {
             call: Call::new(gpu, 2 + u64::from(plan.segment) * (layers + 1)),
             plan,
-            shape: Shape::new(NX, NU, network),
+            shape: Shape { fused, ..Shape::new(NX, NU, network) },
             physics: physics(plant),
         })
     }
@@ -125,8 +129,13 @@ impl<'a> Job<'a> {
         kernel: Kernel,
         buffer: impl Fn(Slot) -> &'b Buffer,
     ) -> Result<Bound> {
-        let bindings = kernel.bindings(self.shape.network.is_some());
+        let bindings = self.shape.bindings(kernel);
         self.call.bind(kernel, bindings, compose(kernel, &self.shape, &self.physics), buffer)
+    }
+
+    /// Whether the rollouts run the layers of a network themselves.
+    pub(super) fn fused(&self) -> bool {
+        self.shape.fused.is_some()
     }
 
     /// Writes the listed starts `first..first + columns` into `state`; nothing if they are drawn.
@@ -165,6 +174,27 @@ impl<'a> Batch<'a> {
         self.calls.push((bound, self.blocks.len() as u32, groups));
         self.blocks.extend_from_slice(bytemuck::bytes_of(params));
         self.blocks.resize(self.blocks.len().next_multiple_of(Params::PITCH), 0);
+    }
+
+    /// Records the dispatches: in one pass, or in one each where they are timed.
+    fn encode(&self, encoder: &mut wgpu::CommandEncoder, stamps: Option<&Stamps>) {
+        let Some(stamps) = stamps else {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for (bound, offset, groups) in &self.calls {
+                bound.dispatch(&mut pass, *offset, *groups);
+            }
+            return;
+        };
+        for (number, (bound, offset, groups)) in self.calls.iter().enumerate() {
+            let mut pass = encoder.begin_compute_pass(&stamps.pass(number));
+            bound.dispatch(&mut pass, *offset, *groups);
+        }
+        stamps.resolve(encoder);
+    }
+
+    /// The kernel of each dispatch.
+    fn kernels(&self) -> impl Iterator<Item = &'static str> {
+        self.calls.iter().map(|(bound, ..)| bound.kernel())
     }
 
     /// Number of dispatches.

@@ -1,6 +1,6 @@
 //! Text that the kernels share: sizes, access to states and tables, calls of recorded functions.
 
-use super::{MLP_LANES, WORKGROUP};
+use super::WORKGROUP;
 use crate::real::record::record;
 use crate::real::wgsl::{Product, function_with};
 use crate::rollout::{HUGE, NON_FINITE, normal_pair};
@@ -16,7 +16,6 @@ pub(super) fn constants(states: usize, controls: usize) -> String {
          const NU: u32 = {}u;\n\
          const STATE_QUADS: u32 = {}u;\n\
          const WORKGROUP: u32 = {WORKGROUP}u;\n\
-         const MLP_LANES: u32 = {MLP_LANES}u;\n\
          const HUGE: f32 = {HUGE:?}f;\n\
          const NON_FINITE: f32 = {NON_FINITE:?}f;\n\
          alias State = array<f32, {}>;\n\

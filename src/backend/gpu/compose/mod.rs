@@ -1,19 +1,24 @@
 //! The text of each kernel: constants, recorded formulas and the files of `shaders/`, concatenated.
 
 mod glue;
+mod layers;
+mod limits;
 mod mppi;
 mod plant;
 
+pub use layers::Fused;
+pub(super) use layers::{LayerShape, input_quads, output_quads};
+pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::{map_of, tile_steps};
 pub use plant::{Shape, compose};
 
-/// Threads of a workgroup, one trajectory or pair each.
+/// Threads of a workgroup, one trajectory, pair or tile of a layer each.
 pub const WORKGROUP: u32 = 64;
-/// Threads of a workgroup of the network's layers.
-pub const MLP_LANES: u32 = 32;
 /// Trajectories that one thread of a layer computes.
 pub const TILE_COLUMNS: u32 = 8;
+/// Threads of a workgroup that compute the same neurons, each for other trajectories.
+pub const TILE_PITCH: u32 = WORKGROUP / TILE_COLUMNS;
 /// Vectors of 4 neurons that one thread of a layer computes.
 pub const TILE_QUADS: u32 = 2;
 /// Numbers of a partial of MPPI before its sums of controls.
@@ -42,6 +47,10 @@ pub enum Kernel {
     MppiRollout,
     /// Weighs the samples of MPPI problems.
     MppiUpdate,
+    /// Multiplies and adds in registers.
+    Peak,
+    /// Copies a buffer.
+    Copy,
 }
 
 /// How a kernel uses a binding.
@@ -130,6 +139,9 @@ impl Kernel {
     /// The kernels of MPPI.
     pub const MPPI: [Self; 3] = [Self::MppiStart, Self::MppiRollout, Self::MppiUpdate];
 
+    /// The kernels that measure what an adapter can do.
+    pub const LIMITS: [Self; 2] = [Self::Peak, Self::Copy];
+
     /// Name of the entry point.
     pub fn entry(self) -> &'static str {
         match self {
@@ -142,15 +154,14 @@ impl Kernel {
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
             Self::MppiUpdate => "mppi_update",
+            Self::Peak => "peak",
+            Self::Copy => "copy",
         }
     }
 
     /// Threads of a workgroup.
     pub fn workgroup(self) -> u32 {
-        match self {
-            Self::HiddenLayer | Self::OutputLayer => MLP_LANES,
-            _ => WORKGROUP,
-        }
+        WORKGROUP
     }
 
     /// What the kernel binds, for a plant driven by a network or by a formula; for MPPI, where the
@@ -204,6 +215,8 @@ impl Kernel {
             Self::MppiUpdate => {
                 &[(S::Streams, Read), (S::Plans, Read), (S::Totals, Read), (S::Partials, ReadWrite)]
             }
+            Self::Peak => &[(S::Sink, ReadWrite)],
+            Self::Copy => &[(S::Source, Read), (S::Sink, ReadWrite)],
         };
         list.extend_from_slice(more);
         if network && matches!(self, Self::ReachAvoid | Self::Deviation) {

@@ -3,10 +3,11 @@
 use super::glue::{
     FINITE, PARAMS, RNG, call, component, constants, finite_glue, recorded_pair, state_glue,
 };
-use super::{Kernel, Slot};
+use super::layers::{Fused, fused_text, layer_text};
+use super::{Access, Kernel, Slot};
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::real::Real;
-use crate::real::record::{Expr, Graph, record};
+use crate::real::record::{Expr, record};
 use crate::real::wgsl::{Product, function, function_with};
 
 const FOLD: &str = include_str!("../../../../shaders/fold.wgsl");
@@ -16,10 +17,9 @@ const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
-const MLP: &str = include_str!("../../../../shaders/mlp.wgsl");
 
 /// What the text of a kernel depends on besides the physics.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Number of states.
     pub states: usize,
@@ -27,12 +27,34 @@ pub struct Shape {
     pub controls: usize,
     /// Activations of the network, where the policy is one.
     pub network: Option<(Activation, OutputActivation)>,
+    /// Its layers, where the rollouts run them.
+    pub fused: Option<Fused>,
 }
 
 impl Shape {
-    /// The shape for a system of that many states and controls, driven by a network or a formula.
+    /// The shape for a system of that many states and controls, driven by a formula or by a network
+    /// whose layers have kernels of their own.
     pub fn new(states: usize, controls: usize, network: Option<&Mlp>) -> Self {
-        Self { states, controls, network: network.map(|mlp| (mlp.activation(), mlp.output())) }
+        let network = network.map(|mlp| (mlp.activation(), mlp.output()));
+        Self { states, controls, network, fused: None }
+    }
+
+    /// What `kernel` binds.
+    pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
+        let mut list = kernel.bindings(self.network.is_some());
+        if self.fused.is_some() {
+            let control = list.iter_mut().filter(|(slot, _)| *slot == Slot::Control);
+            control.for_each(|(slot, _)| *slot = Slot::Weights);
+        }
+        list
+    }
+
+    /// Threads of a workgroup of `kernel`, which has [`Kernel::workgroup`] trajectories.
+    pub fn lanes(&self, kernel: Kernel) -> u32 {
+        match (kernel, &self.fused) {
+            (Kernel::ReachAvoid | Kernel::Deviation, Some(fused)) => fused.lanes(),
+            _ => kernel.workgroup(),
+        }
     }
 }
 
@@ -42,7 +64,13 @@ pub fn compose(kernel: Kernel, shape: &Shape, physics: &str) -> String {
     let states = shape.states;
     let folds = || [FINITE, FOLD].concat();
     let rollout = || {
-        let glue = [state_glue(states), finite_glue(states), plant_glue(shape)].concat();
+        let lanes = format!(
+            "const LANES: u32 = {}u;\n// Whether `drive` is called by all threads together.\n\
+             const TOGETHER: bool = {};\n",
+            shape.lanes(kernel),
+            shape.fused.is_some()
+        );
+        let glue = [lanes, state_glue(states), finite_glue(states), plant_glue(shape)].concat();
         [folds(), glue, physics.to_owned(), JUDGE.to_owned()].join("\n")
     };
     let draw = || [state_glue(states), RNG.to_owned(), recorded_normals()].join("\n");
@@ -52,12 +80,12 @@ pub fn compose(kernel: Kernel, shape: &Shape, physics: &str) -> String {
         Kernel::Deviation => vec![rollout(), recorded_distance(states), DEVIATION.to_owned()],
         Kernel::Compact => vec![folds(), COMPACT.to_owned()],
         Kernel::Reduce => vec![REDUCE.to_owned()],
-        Kernel::HiddenLayer | Kernel::OutputLayer => {
-            vec![recorded_activation(kernel, shape), MLP.to_owned()]
-        }
+        Kernel::HiddenLayer => vec![layer_text(shape.network, false)],
+        Kernel::OutputLayer => vec![layer_text(shape.network, true)],
         Kernel::MppiStart | Kernel::MppiRollout | Kernel::MppiUpdate => {
             panic!("{kernel:?} is composed by MppiText")
         }
+        Kernel::Peak | Kernel::Copy => panic!("{kernel:?} is composed by `limit_kernel`"),
     };
     let shared = vec![constants(states, shape.controls), PARAMS.to_owned()];
     [shared, parts].concat().join("\n")
@@ -74,13 +102,17 @@ fn plant_glue(shape: &Shape) -> String {
     .concat();
     if shape.network.is_none() {
         text += &call("control_of", "plant_control", &[x], ("Control", shape.controls));
-        text += "fn drive(column: u32, x: State) -> Control {\n    return control_of(x);\n}\n";
+        text += "fn drive(lane: u32, column: u32, x: State) -> Control {\n    \
+                 return control_of(x);\n}\n";
         return text;
+    }
+    if let Some(fused) = &shape.fused {
+        return text + &fused_text(shape.network, fused, [shape.states, shape.controls]);
     }
     let slot = Slot::Control as u32;
     text += &format!(
         "@group(0) @binding({slot}) var<storage, read> control: array<vec4<f32>>;\n\
-         fn drive(column: u32, x: State) -> Control {{\n    \
+         fn drive(lane: u32, column: u32, x: State) -> Control {{\n    \
          let stride = params.stride * (1u + params.paired);\n"
     );
     for quad in 0..shape.controls.div_ceil(4) {
@@ -114,16 +146,4 @@ fn recorded_distance(states: usize) -> String {
         "{recorded}\nfn state_distance(a: State, b: State) -> f32 {{\n    \
          return distance_of({call});\n}}\n"
     )
-}
-
-/// `activation` of a layer; the identity where there is no network.
-fn recorded_activation(kernel: Kernel, shape: &Shape) -> String {
-    let graph: Graph = record(1, |x| {
-        vec![match (kernel, shape.network) {
-            (Kernel::HiddenLayer, Some((hidden, _))) => hidden.apply(x[0]),
-            (_, Some((_, output))) => output.apply(x[0]),
-            (_, None) => x[0],
-        }]
-    });
-    function("activation", &[("x", 1)], &graph)
 }

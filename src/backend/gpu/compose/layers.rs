@@ -1,0 +1,156 @@
+//! How a network lies on the device, and the text of the kernels that run it.
+
+use super::glue::component;
+use super::{TILE_PITCH, TILE_QUADS, WORKGROUP};
+use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::real::record::{Expr, record};
+use crate::real::wgsl::function;
+
+const TILE: &str = include_str!("../../../../shaders/tile.wgsl");
+const MLP: &str = include_str!("../../../../shaders/mlp.wgsl");
+const MLP_FUSED: &str = include_str!("../../../../shaders/mlp_fused.wgsl");
+
+/// Bytes of a vector of 4 activations.
+const VECTOR_BYTES: u64 = 16;
+
+/// Vectors of 4 inputs.
+pub(in super::super) fn input_quads(width: usize) -> usize {
+    width.div_ceil(4)
+}
+
+/// Vectors of 4 neurons, up to a whole tile.
+pub(in super::super) fn output_quads(width: usize) -> usize {
+    width.div_ceil(4).next_multiple_of(TILE_QUADS as usize)
+}
+
+/// Where the parameters of a layer lie, and its size in vectors of 4.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) struct LayerShape {
+    /// Vectors before its biases.
+    pub(in super::super) offset: u32,
+    /// Vectors of 4 inputs.
+    pub(in super::super) inputs: u32,
+    /// Vectors of 4 neurons.
+    pub(in super::super) outputs: u32,
+}
+
+impl LayerShape {
+    /// The layers of `mlp`, one after the other.
+    pub(in super::super) fn of(mlp: &Mlp) -> Vec<Self> {
+        let mut offset = 0;
+        let shape = |layer: &crate::policy::Layer| {
+            let inputs = input_quads(layer.inputs) as u32;
+            let outputs = output_quads(layer.outputs) as u32;
+            let shape = Self { offset, inputs, outputs };
+            offset = shape.end();
+            shape
+        };
+        mlp.layers().iter().map(shape).collect()
+    }
+
+    /// Vectors up to the end of its weights.
+    pub(in super::super) fn end(self) -> u32 {
+        self.offset + self.outputs * (1 + 4 * self.inputs)
+    }
+}
+
+/// The layers of a network that the rollouts run themselves, all steps in one dispatch.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fused {
+    layers: Vec<LayerShape>,
+}
+
+impl Fused {
+    /// All layers of `mlp`.
+    pub fn new(mlp: &Mlp) -> Self {
+        Self { layers: LayerShape::of(mlp) }
+    }
+
+    /// Threads of a workgroup: one for each tile of the widest layer, and for each trajectory.
+    pub fn lanes(&self) -> u32 {
+        let neurons = self.layers.iter().map(|layer| layer.outputs / TILE_QUADS).max();
+        (neurons.unwrap_or(1) * TILE_PITCH).next_multiple_of(WORKGROUP)
+    }
+
+    /// Workgroup memory that the activations take, bytes.
+    pub fn workgroup_bytes(&self) -> u64 {
+        u64::from(self.quads()) * u64::from(WORKGROUP) * VECTOR_BYTES
+    }
+
+    /// Loop iterations of a thread for one evaluation of the network.
+    pub(in super::super) fn trips(&self) -> u64 {
+        self.layers.iter().map(|layer| 1 + u64::from(layer.inputs)).sum()
+    }
+
+    /// Vectors of the widest activations.
+    fn quads(&self) -> u32 {
+        self.layers.iter().map(|layer| layer.inputs.max(layer.outputs)).max().unwrap_or(1)
+    }
+}
+
+/// The text of a layer's kernel: of the last one, or of another.
+pub(super) fn layer_text(network: Option<(Activation, OutputActivation)>, last: bool) -> String {
+    let last = format!("const LAST_LAYER: bool = {last};\n");
+    [recorded_activations(network), last, TILE.to_owned(), MLP.to_owned()].join("\n")
+}
+
+/// `drive` by a network that the rollout runs itself.
+pub(super) fn fused_text(
+    network: Option<(Activation, OutputActivation)>,
+    fused: &Fused,
+    [states, controls]: [usize; 2],
+) -> String {
+    let sizes = format!(
+        "const FUSED_QUADS: u32 = {}u;\nconst LAYER_COUNT: u32 = {}u;\n",
+        fused.quads(),
+        fused.layers.len()
+    );
+    [
+        recorded_activations(network),
+        sizes,
+        TILE.to_owned(),
+        layer_table(&fused.layers),
+        activation_glue(states, controls),
+        MLP_FUSED.to_owned(),
+    ]
+    .join("\n")
+}
+
+/// `layer_at`: the layers by number.
+fn layer_table(layers: &[LayerShape]) -> String {
+    let mut text = String::from("fn layer_at(number: u32) -> Layer {\n    switch number {\n");
+    for (number, &LayerShape { offset, inputs, outputs }) in layers.iter().enumerate() {
+        let last = number + 1 == layers.len();
+        let case = if last { "default".to_owned() } else { format!("case {number}u") };
+        let layer = format!("Layer({offset}u, {inputs}u, {outputs}u, {last})");
+        text += &format!("        {case}: {{ return {layer}; }}\n");
+    }
+    text + "    }\n}\n"
+}
+
+/// `put_state` and `control_at`, free of loops.
+fn activation_glue(states: usize, controls: usize) -> String {
+    let mut text = String::from("fn put_state(column: u32, x: State) {\n");
+    for quad in 0..states.div_ceil(4) {
+        let entry = |i: usize| if i < states { format!("x[{i}]") } else { "0.0".to_owned() };
+        let entries: Vec<String> = (4 * quad..4 * quad + 4).map(entry).collect();
+        text += &format!("    put({quad}u, column, vec4<f32>({}));\n", entries.join(", "));
+    }
+    text += "}\nfn control_at(column: u32) -> Control {\n";
+    for quad in 0..controls.div_ceil(4) {
+        text += &format!("    let v{quad} = input_at({quad}u, column);\n");
+    }
+    let all: Vec<String> = (0..controls).map(component).collect();
+    text + &format!("    return Control({});\n}}\n", all.join(", "))
+}
+
+/// `hidden_activation` and `output_activation`; the identity where there is no network.
+fn recorded_activations(network: Option<(Activation, OutputActivation)>) -> String {
+    let hidden = |x: Expr| network.map_or(x, |(hidden, _)| hidden.apply(x));
+    let output = |x: Expr| network.map_or(x, |(_, output)| output.apply(x));
+    [
+        function("hidden_activation", &[("x", 1)], &record(1, |x| vec![hidden(x[0])])),
+        function("output_activation", &[("x", 1)], &record(1, |x| vec![output(x[0])])),
+    ]
+    .join("\n")
+}

@@ -1,0 +1,175 @@
+//! Networks that the rollouts run themselves, against the f64 oracle and against layers.
+
+use reachcast::Error;
+use reachcast::backend::gpu::{Gpu, NetworkKernels};
+use reachcast::policy::{Activation, Mlp};
+use reachcast::rollout::{
+    DeviationTask, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask,
+    RolloutSpec, Starts, Stream, Tightening,
+};
+use reachcast::system::DroneRace;
+
+use crate::measures::assert_close_to_f64;
+use crate::systems::Count;
+use crate::{
+    deviation, drawn, each_way, gpu, measures, race_policy, random_network, reach_avoid, whole_box,
+};
+
+fn fusing() -> Option<Gpu> {
+    gpu().map(|gpu| gpu.with_networks(NetworkKernels::Fused))
+}
+
+/// A tightening under which the measure is the target margin of the last state, undiscounted.
+fn last_state_only(horizon: u32) -> (RolloutSpec, Tightening) {
+    let spec = RolloutSpec::new(horizon, 1.0).expect("a horizon");
+    let mut target = vec![1e3; horizon as usize + 1];
+    target[horizon as usize] = 0.0;
+    (spec, Tightening { constraint: vec![-1e3; target.len()], target })
+}
+
+#[test]
+fn last_states_under_networks_of_every_width_and_depth() {
+    let Some(mut gpu) = fusing() else { return };
+    let system = DroneRace::default();
+    let (spec, tightening) = last_state_only(12);
+    let cases = [
+        (vec![12, 64, 64, 64, 3], Activation::Relu),
+        (vec![12, 128, 128, 3], Activation::Relu),
+        (vec![12, 67, 3], Activation::Tanh),
+        (vec![12, 5, 9, 3], Activation::Silu),
+        (vec![12, 3], Activation::Relu),
+    ];
+    for (widths, activation) in cases {
+        let policy = random_network(&widths, activation);
+        let task = ReachAvoidTask {
+            starts: drawn(whole_box(&system), 31),
+            range: 0..100,
+            spec,
+            tightening: &tightening,
+            query: Query::Measure,
+        };
+        let plant = Plant { system: &system, policy: &policy };
+        let (back, found) = measures(gpu, plant, &task);
+        gpu = back;
+        assert!(found.iter().all(|margin| *margin > -900.0), "the last state decides");
+        assert_close_to_f64(plant, &task, &found);
+    }
+}
+
+#[test]
+fn batches_around_whole_workgroups() {
+    let Some(mut gpu) = fusing() else { return };
+    let (system, policy) = (DroneRace::default(), race_policy());
+    let plant = Plant { system: &system, policy: &policy };
+    let (spec, tightening) = last_state_only(3);
+    let mut task = ReachAvoidTask {
+        starts: drawn(whole_box(&system), 32),
+        range: 0..600,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let (back, all) = measures(gpu, plant, &task);
+    gpu = back;
+    assert_close_to_f64(plant, &task, &all);
+    for count in [1, 63, 64, 65, 127, 255, 256, 257] {
+        task.range = 7..7 + count;
+        let (back, found) = measures(gpu, plant, &task);
+        gpu = back;
+        assert_eq!(found, all[7..7 + count as usize], "{count} trajectories");
+    }
+}
+
+#[test]
+fn fused_chunks_join_without_a_seam() {
+    let Some(gpu) = fusing() else { return };
+    let system = DroneRace::default();
+    let policy = random_network(&[12, 8, 3], Activation::Relu);
+    let plant = Plant { system: &system, policy: &policy };
+    let (spec, tightening) = last_state_only(2);
+    let pairs = |range| DeviationTask {
+        pairs: Pairs {
+            nominal: drawn(whole_box(&system), 33),
+            radius: 0.1,
+            stream: Stream::new(33, Purpose::DeviationPerturbation, 0),
+        },
+        range,
+        spec,
+        tightening: &tightening,
+        control: PairControl::ClosedLoop,
+    };
+    let seam = 1 << 16;
+    let (gpu, farthest, whole) = deviation(gpu, plant, &pairs(0..seam + 300));
+    let (gpu, before, left) = deviation(gpu, plant, &pairs(0..seam - 100));
+    let (_, after, right) = deviation(gpu, plant, &pairs(seam - 100..seam + 300));
+    assert_eq!(whole, [left, right].concat());
+    let merged: Vec<_> = before.iter().zip(after).map(|(a, b)| a.merge(b)).collect();
+    assert_eq!(farthest, merged);
+}
+
+#[test]
+fn a_decided_sign_stays_when_the_state_overflows() {
+    each_way(|gpu| {
+        // Not safe from t = 3 on; infinite at t = 7, within the same dispatch.
+        let mut constraint = vec![0.0; 8];
+        constraint[3] = 1e7;
+        let tightening = Tightening { target: vec![0.0; 8], constraint };
+        let policy = random_network(&[2, 4, 1], Activation::Tanh);
+        let mut task = ReachAvoidTask {
+            starts: Starts::Listed(&[[-20.0, 2.1]]),
+            range: 0..1,
+            spec: RolloutSpec::new(7, 1.0).expect("a horizon"),
+            tightening: &tightening,
+            query: Query::Sign,
+        };
+        let plant = Plant { system: &Count, policy: &policy };
+        let (gpu, sign) = measures(gpu, plant, &task);
+        assert_eq!(sign, [-1.0]);
+        task.query = Query::Measure;
+        assert_eq!(measures(gpu, plant, &task).1, [NON_FINITE]);
+    });
+}
+
+/// Kernels that a rollout of 40 steps dispatches, and how often.
+fn dispatches(gpu: Gpu, policy: &Mlp) -> Vec<(&'static str, u64)> {
+    let system = DroneRace::default();
+    let (spec, tightening) = last_state_only(40);
+    let task = ReachAvoidTask {
+        starts: drawn(whole_box(&system), 34),
+        range: 0..10,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    gpu.time_kernels(true);
+    let (gpu, _) = measures(gpu, Plant { system: &system, policy }, &task);
+    gpu.take_kernel_times().iter().map(|time| (time.kernel, time.dispatches)).collect()
+}
+
+#[test]
+fn a_fused_rollout_has_no_dispatches_of_layers() {
+    let policy = random_network(&[12, 16, 16, 3], Activation::Relu);
+    let Some(gpu) = gpu() else { return };
+    let layered = dispatches(gpu.with_networks(NetworkKernels::Layered), &policy);
+    assert_eq!(layered, [("sample", 1), ("mlp", 120), ("reach_avoid", 41)]);
+    let Some(gpu) = fusing() else { return };
+    // 41 states in submissions of at most 32.
+    assert_eq!(dispatches(gpu, &policy), [("sample", 1), ("reach_avoid", 2)]);
+}
+
+#[test]
+fn a_network_too_wide_to_fuse_is_refused() {
+    let Some(gpu) = fusing() else { return };
+    let (system, policy) = (DroneRace::default(), random_network(&[12, 200, 3], Activation::Relu));
+    let (spec, tightening) = last_state_only(1);
+    let task = ReachAvoidTask {
+        starts: drawn(whole_box(&system), 35),
+        range: 0..1,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let (_, result) = reach_avoid(gpu, Plant { system: &system, policy: &policy }, &task);
+    let Err(Error::Device(problem)) = result else { panic!("{result:?}") };
+    assert!(problem.contains("200") && problem.contains("128"), "{problem}");
+}
