@@ -107,6 +107,7 @@ where
         let (x, u) = (from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i]));
         let mut outputs = system.step(x, u).to_vec();
         outputs.push(cost.stage(x, u, from_fn(|i| inputs[NX + NU + i])));
+        outputs.extend(cost.map(x).map(|(map, place)| map.cell(place)));
         outputs
     });
     let normals = record(2, |uniforms| normal_pair(uniforms[0], uniforms[1]).to_vec());

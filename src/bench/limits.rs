@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::measure::{Protocol, Timing, measure};
 use crate::backend::Backend;
+use crate::backend::gpu::DeviceLimits;
 use crate::error::Result;
 use crate::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
 use crate::system::{BangBang, DoubleIntegrator};
@@ -167,14 +168,17 @@ pub struct AdapterLimits {
     /// One rollout of one step and no network: submission, kernels and readback. No batch takes
     /// less.
     pub round_trip: Timing,
+    /// Arithmetic, memory, and what a submission and a dispatch cost.
+    pub device: DeviceLimits,
 }
 
 impl AdapterLimits {
-    /// Measures those of `backend`.
+    /// Measures those of the adapter of `backend`; none without one.
     ///
     /// # Errors
     /// Those of the backend.
-    pub fn measure(protocol: &Protocol, backend: &Backend) -> Result<Self> {
+    pub fn measure(protocol: &Protocol, backend: &Backend) -> Result<Option<Self>> {
+        let Backend::Gpu(gpu) = backend else { return Ok(None) };
         let (system, policy) = (DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
         let spec = RolloutSpec::new(1, 1.0)?;
         let task = ReachAvoidTask {
@@ -187,7 +191,7 @@ impl AdapterLimits {
         let plant = Plant { system: &system, policy: &policy };
         let round_trip =
             measure(protocol, || backend.reach_avoid(plant, &task, &mut |_, _| Ok(())))?;
-        Ok(Self { round_trip })
+        Ok(Some(Self { round_trip, device: gpu.measure_limits()? }))
     }
 }
 

@@ -86,9 +86,24 @@ pub struct WorkloadRecord {
     pub steps_per_second: f64,
     /// Floating-point operations per second, at the median.
     pub flops_per_second: f64,
-    /// Rate of the best call over that of matrix products, both undisturbed; none where the latter
-    /// was not measured.
-    pub share: Option<f64>,
+    /// Rate of the best call over the limit of its backend, both undisturbed: matrix products of the
+    /// CPU, multiply-adds in the adapter's registers.
+    pub share: f64,
+    /// Time on the adapter by kernel, of one more call; empty on the CPU, and where the adapter has
+    /// no timestamps.
+    pub kernels: Vec<KernelRecord>,
+}
+
+/// Time of one kernel on an adapter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KernelRecord {
+    /// Entry point.
+    pub kernel: String,
+    /// How often it was dispatched.
+    pub dispatches: u64,
+    /// Time of all of them, s.
+    pub seconds: f64,
 }
 
 /// A workload that was left out.

@@ -5,13 +5,14 @@ use super::data::Data;
 use super::limits::{AdapterLimits, HostLimits};
 use super::measure::{Protocol, measure};
 use super::record::{
-    BENCH_SCHEMA, BackendRecord, BenchRecord, LeftOutRecord, MachineRecord, WorkloadRecord,
+    BENCH_SCHEMA, BackendRecord, BenchRecord, KernelRecord, LeftOutRecord, MachineRecord,
+    WorkloadRecord,
 };
 use super::scaling::{SIZES, scaling};
 use super::workload::{self, Workload};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
-use crate::backend::gpu::AdapterKind;
+use crate::backend::gpu::{AdapterKind, KernelTime};
 use crate::error::{Error, Result};
 use crate::scenario::Watch;
 
@@ -121,10 +122,7 @@ pub fn run(asked: &Asked, backends: &[Backend], watch: &dyn Watch) -> Result<Ben
 impl BenchRecord {
     /// Measures and notes a backend.
     fn add_backend(&mut self, backend: &Backend) -> Result<()> {
-        let adapter = match backend {
-            Backend::Cpu(_) => None,
-            Backend::Gpu(_) => Some(AdapterLimits::measure(&self.protocol, backend)?),
-        };
+        let adapter = AdapterLimits::measure(&self.protocol, backend)?;
         self.backends.push(BackendRecord {
             backend: backend.name().to_owned(),
             device: backend.device(),
@@ -133,12 +131,17 @@ impl BenchRecord {
         Ok(())
     }
 
-    /// The share of the matrix products' rate that each workload reaches, where that is known.
+    /// The share of its backend's limit that each workload reaches.
     fn hold_against_limits(&mut self) {
+        let adapter = self.backends.iter().find_map(|backend| backend.adapter.as_ref());
+        let on_adapter = adapter.map(|limits| limits.device.flops_per_second);
         for workload in &mut self.workloads {
-            let limit = (workload.backend == "cpu").then_some(self.limits.gemm_all_flops);
+            let limit = match (workload.backend.as_str(), on_adapter) {
+                ("gpu", Some(limit)) => limit,
+                _ => self.limits.gemm_all_flops,
+            };
             let flops = workload.flops_per_unit * workload.units as f64;
-            workload.share = limit.map(|limit| flops / workload.timing.best_seconds / limit);
+            workload.share = flops / workload.timing.best_seconds / limit;
         }
     }
 
@@ -164,7 +167,8 @@ impl BenchRecord {
             units_per_second,
             steps_per_second: workload.steps * units_per_second,
             flops_per_second: workload.flops * units_per_second,
-            share: None,
+            share: 0.0,
+            kernels: kernel_times(workload, backend)?,
         });
         Ok(())
     }
@@ -193,6 +197,21 @@ impl BenchRecord {
         let (name, backend) = (name.to_owned(), backend.name().to_owned());
         self.left_out.push(LeftOutRecord { name, backend, reason });
     }
+}
+
+/// Times on the adapter of one call of `workload`.
+fn kernel_times(workload: &Workload, backend: &Backend) -> Result<Vec<KernelRecord>> {
+    let Backend::Gpu(gpu) = backend else { return Ok(Vec::new()) };
+    gpu.time_kernels(true);
+    let called = workload.call(backend);
+    gpu.time_kernels(false);
+    called?;
+    let record = |time: KernelTime| KernelRecord {
+        kernel: time.kernel.to_owned(),
+        dispatches: time.dispatches,
+        seconds: time.seconds,
+    };
+    Ok(gpu.take_kernel_times().into_iter().map(record).collect())
 }
 
 /// Whether `backend` is an adapter that the processor plays.

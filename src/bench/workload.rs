@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::data::{self, Data};
 use super::flops;
 use crate::backend::Backend;
+use crate::control::DriveBenchmark;
 use crate::cost::Cost;
 use crate::error::Result;
 use crate::policy::Mlp;
@@ -24,6 +25,8 @@ const PAIRS: u64 = 16_384;
 const RADIUS: f32 = 0.1;
 /// Samples of a plan.
 const SAMPLES: [u32; 2] = [1024, 16_384];
+/// Samples of the published benchmark of MPPI.
+const DRIVE_SAMPLES: u32 = 16_384;
 /// Starts whose rollouts tell how soon a sign is decided.
 const DECIDED: usize = 100;
 
@@ -85,6 +88,9 @@ pub fn all(data: &Data) -> Result<Vec<Workload>> {
         let name = format!("mppi/lane/{samples}");
         all.push(plan(name, DroneRace::default(), data::lane(), spec, problem));
     }
+    let DriveBenchmark { system, planner, problem } = DriveBenchmark::new(DRIVE_SAMPLES)?;
+    let name = format!("mppi/drive/{DRIVE_SAMPLES}");
+    all.push(plan(name, system, planner.cost, planner.spec, problem));
     Ok(all)
 }
 

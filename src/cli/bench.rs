@@ -10,7 +10,7 @@ use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::bench::export::export;
 use crate::bench::measure::Timing;
-use crate::bench::record::{BenchRecord, ScalingRecord, WorkloadRecord};
+use crate::bench::record::{BenchRecord, KernelRecord, ScalingRecord, WorkloadRecord};
 use crate::bench::run::{self as benchmark, Asked};
 use crate::error::Result;
 use crate::files::{Staged, json};
@@ -94,7 +94,8 @@ fn head(record: &BenchRecord) -> String {
     let mut text = format!(
         "machine  {}, {} cores, {}, {}; reachcast {}, seed {}\n\
          method   {} s of warm-up, then calls for {} s, {} at least; rates at the median call; \
-         share: best call over best matrix products\n\
+         share: best call over best matrix products (CPU), over \
+         multiply-adds in registers (GPU)\n\
          limits   f32 matrix products {} GFLOP/s on one thread, {} on {}; \
          memory {:.1} GB/s (a = b + s c)\n",
         machine.cpu,
@@ -116,6 +117,16 @@ fn head(record: &BenchRecord) -> String {
         if let Some(adapter) = &backend.adapter {
             let [low, middle, high] = spread(&adapter.round_trip).map(|seconds| 1e6 * seconds);
             let _ = write!(text, "; there and back {middle:.0} us ({low:.0} to {high:.0})");
+            let device = &adapter.device;
+            let _ = write!(
+                text,
+                "\n         multiply-adds {} GFLOP/s, copies {:.1} GB/s, a submission {:.1} us, a further \
+                 dispatch {:.1} us",
+                giga(device.flops_per_second),
+                device.copy_bytes_per_second / 1e9,
+                1e6 * device.submit_seconds,
+                1e6 * device.dispatch_seconds
+            );
         }
         text.push('\n');
     }
@@ -138,8 +149,14 @@ fn workload_line(workload: &WorkloadRecord) -> String {
         workload.timing.calls,
         count(workload.steps_per_second),
         giga(workload.flops_per_second),
-        workload.share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share)),
-    )
+        format!("{:.1} %", 100.0 * workload.share),
+    ) + &workload.kernels.iter().map(kernel_line).collect::<String>()
+}
+
+/// Time of a kernel on the adapter.
+fn kernel_line(kernel: &KernelRecord) -> String {
+    let KernelRecord { kernel, dispatches, seconds } = kernel;
+    format!("    {kernel:22} {:.3} ms on the adapter in {dispatches} dispatches\n", 1e3 * seconds)
 }
 
 fn scaling_line(scaling: &ScalingRecord) -> String {

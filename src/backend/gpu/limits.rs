@@ -31,7 +31,8 @@ const LONG_ENOUGH_SECONDS: f64 = 0.03;
 const REPETITIONS: usize = 7;
 
 /// What an adapter reaches, as the host sees it.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DeviceLimits {
     /// Rate of f32 multiplications and additions in registers, a multiply-add counted as two, 1/s.
     pub flops_per_second: f64,
