@@ -2,7 +2,7 @@
 //! that they support.
 //!
 //! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
-//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`experiment`] and [`bench`];
+//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`experiment`] and [`mod@bench`];
 //! [`report`]; the command line.
 //! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
 
