@@ -60,7 +60,7 @@ def ways(function, arguments):
 
 def rollout(work, network, count):
     layers = [(torch.tensor(w), torch.tensor(b[:, None])) for w, b in work.network(network)]
-    starts = torch.tensor(work.starts[:count].T)
+    starts = torch.tensor(work.starts[:count].T).contiguous()
     accept = partial(peer.check, "measure", work.array(f"{network}_measures")[:count])
     forms = ways(judge, lambda n: (torch.ones(12, n), torch.tensor(1.0), *torch.ones(2, n)))
     calls = [partial(measures, layers, work.settings, form, starts) for form in forms]
@@ -91,7 +91,7 @@ def drawn(mppi, stage, samples):
 def plan(work, samples):
     mppi = work.settings["mppi"]
     ours = work.array("mppi_controls").reshape(-1, mppi["horizon"], 3).transpose(1, 2, 0)
-    ours = torch.tensor(ours)
+    ours = torch.tensor(ours).contiguous()
 
     def accept(stage, _):
         peer.check_plan(work, costs(mppi, stage, ours), improved(mppi, stage, ours))
