@@ -83,8 +83,7 @@ def plan(work, samples):
         return improved(mppi, jnp.clip(noise, -1.0, 1.0))
 
     ours = work.array("mppi_controls").reshape(-1, mppi["horizon"], 3).transpose(1, 2, 0)
-    peer.check_costs(work.array("mppi_costs"), jax.jit(partial(costs, mppi))(ours))
-    peer.check("control", work.array("mppi_plan"), jax.jit(partial(improved, mppi))(ours))
+    peer.check_plan(work, jax.jit(partial(costs, mppi))(ours), jax.jit(partial(improved, mppi))(ours))
     # Making keys is no part of the work.
     keys = itertools.cycle(list(jax.random.split(jax.random.key(1), 1000)))
     drawn = jax.jit(drawn).lower(next(keys)).compile()

@@ -13,7 +13,7 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", HERE.parent.parent / "target"))
 PROGRAM = TARGET / "release" / "reachcast"
-PEERS = ["jax_peer.py", "torch_peer.py"]
+PEERS = {"JAX": "jax_peer.py", "PyTorch": "torch_peer.py"}
 WORKLOADS = [
     *(f"rollout/{net}/{n}" for net in ("3x64", "3x128", "4x512") for n in (158, 4096, 65536)),
     "sign/race/65536",
@@ -50,12 +50,13 @@ class Ours:
 class Peer:
     """A script that stays up and answers a line for each workload."""
 
-    def __init__(self, script, folder):
+    def __init__(self, name, script, folder):
         command = [sys.executable, "-B", HERE / script, folder]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         self.process = subprocess.Popen(command, text=True, bufsize=1, **pipes)
         hello = self.answer()
-        self.title, self.absent = hello["title"], hello.get("absent")
+        self.title = hello.get("title", name)
+        self.absent = hello.get("absent") or hello.get("refused")
 
     def ask(self, workload):
         print(json.dumps({"workload": workload, **PROTOCOL}), file=self.process.stdin, flush=True)
@@ -63,7 +64,7 @@ class Peer:
 
     def answer(self):
         line = self.process.stdout.readline()
-        return json.loads(line) if line else {"title": "?", "refused": "the script ended"}
+        return json.loads(line) if line else {"refused": "the script ended"}
 
     def close(self):
         self.process.stdin.close()
@@ -132,7 +133,7 @@ def main():
         chosen = [name for name in chosen if name not in LARGE]
     folder = TARGET / "peers"
     subprocess.run([PROGRAM, "bench", "-q", "--export", folder], check=True)
-    ours, scripts = Ours(), [Peer(script, folder) for script in PEERS]
+    ours, scripts = Ours(), [Peer(name, script, folder) for name, script in PEERS.items()]
     peers = [peer for peer in scripts if not peer.absent]
     most = min(asked.rounds, 2) if asked.quick else asked.rounds
     rows = [row(name, rounds_of(name, [ours, *peers], most)) for name in chosen]

@@ -2,8 +2,6 @@
 
 from functools import partial
 
-import numpy as np
-
 import peer
 
 try:
@@ -33,13 +31,9 @@ def stage(x, u, speed, cost, last):
     return peer.lane_cost(torch, x, u, speed, cost, last)
 
 
-def columns(array):
-    return torch.tensor(np.ascontiguousarray(array))
-
-
 def matrices():
     a, b, constant = peer.step_matrices()
-    return columns(a), columns(b), columns(constant[:, None])
+    return torch.tensor(a), torch.tensor(b), torch.tensor(constant[:, None])
 
 
 def measures(layers, settings, judge, starts):
@@ -65,8 +59,8 @@ def ways(function, arguments):
 
 
 def rollout(work, network, count):
-    layers = [(columns(w), columns(b[:, None])) for w, b in work.network(network)]
-    starts = columns(work.starts[:count].T)
+    layers = [(torch.tensor(w), torch.tensor(b[:, None])) for w, b in work.network(network)]
+    starts = torch.tensor(work.starts[:count].T).contiguous()
     accept = partial(peer.check, "measure", work.array(f"{network}_measures")[:count])
     forms = ways(judge, lambda n: (torch.ones(12, n), torch.tensor(1.0), *torch.ones(2, n)))
     calls = [partial(measures, layers, work.settings, form, starts) for form in forms]
@@ -97,11 +91,10 @@ def drawn(mppi, stage, samples):
 def plan(work, samples):
     mppi = work.settings["mppi"]
     ours = work.array("mppi_controls").reshape(-1, mppi["horizon"], 3).transpose(1, 2, 0)
-    ours = columns(ours)
+    ours = torch.tensor(ours).contiguous()
 
     def accept(stage, _):
-        peer.check_costs(work.array("mppi_costs"), costs(mppi, stage, ours))
-        peer.check("control", work.array("mppi_plan"), improved(mppi, stage, ours))
+        peer.check_plan(work, costs(mppi, stage, ours), improved(mppi, stage, ours))
 
     numbers = mppi["speed"], mppi["cost"], torch.tensor(0.0)
     forms = ways(stage, lambda n: (torch.ones(12, n), torch.ones(3, n), *numbers))
