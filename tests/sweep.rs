@@ -35,19 +35,25 @@ fn rows(out: &Path) -> Vec<Vec<String>> {
 }
 
 fn races(record: &SweepRecord) -> Vec<&RacePoint> {
-    let race = |result| match result {
-        &PointResult::Race(ref point) => point,
-        other => panic!("{other:?}"),
-    };
-    record.points.iter().map(|point| race(&point.result)).collect()
+    let mut races = Vec::new();
+    for point in &record.points {
+        match &point.result {
+            PointResult::Race(race) => races.push(race),
+            other => panic!("{other:?}"),
+        }
+    }
+    races
 }
 
 fn certificates(record: &SweepRecord) -> Vec<&CertificatePoint> {
-    let certificate = |result| match result {
-        &PointResult::Certificate(ref point) => point,
-        other => panic!("{other:?}"),
-    };
-    record.points.iter().map(|point| certificate(&point.result)).collect()
+    let mut certificates = Vec::new();
+    for point in &record.points {
+        match &point.result {
+            PointResult::Certificate(certificate) => certificates.push(certificate),
+            other => panic!("{other:?}"),
+        }
+    }
+    certificates
 }
 
 /// What `reachcast` prints with these arguments, which has to succeed.

@@ -185,7 +185,7 @@ Examples:
   reachcast sweep configs/race.toml --vary race.mppi.cost.speed=0.5,1,2 --noise-seeds 5
   reachcast sweep configs/race.toml --of certificate --epsilon 0.05,0.1,0.2 --radius 0.02,0.05,0.1
   reachcast sweep configs/race.toml --of certificate --bound fixed-shape,variables,exact")]
-    Sweep(SweepArguments),
+    Sweep(Box<SweepArguments>),
     /// Import a policy from PyTorch or ONNX, or tell what is in a policy file
     #[command(subcommand)]
     Policy(PolicyCommand),
