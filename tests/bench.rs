@@ -2,33 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
+mod command;
 mod common;
 
 use std::path::Path;
-use std::process::{Command, Output};
 
+use command::{done, refused};
 use reachcast::bench::record::{BENCH_SCHEMA, BenchRecord};
 use reachcast::policy::Mlp;
-
-/// The program with these arguments, in the repository's folder.
-fn reachcast(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_reachcast"))
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
-
-/// Runs and expects exit code 0; standard output.
-fn done(arguments: &[&str]) -> String {
-    let output = reachcast(arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
 
 /// The record of a quick benchmark on the CPU.
 fn record(filter: &str) -> BenchRecord {
@@ -99,14 +80,9 @@ fn batches_grow_and_memory_does_not() {
 
 #[test]
 fn a_filter_that_fits_nothing_is_refused_with_what_there_is() {
-    let output = reachcast(&["bench", "--quick", "--workload", "nonsense"]);
-    let message = text(&output.stderr);
-    assert_eq!((output.status.code(), text(&output.stdout)), (Some(2), String::new()));
-    for word in ["--workload nonsense", "rollout/3x64/158", "sign/race/65536", "scaling"] {
-        assert!(message.contains(word), "no `{word}` in: {message}");
-    }
-    let both = reachcast(&["bench", "--quick", "--export", "nowhere"]);
-    assert_eq!(both.status.code(), Some(2));
+    let words = ["--workload nonsense", "rollout/3x64/158", "sign/race/65536", "scaling"];
+    refused(&["bench", "--quick", "--workload", "nonsense"], &words);
+    refused(&["bench", "--quick", "--export", "nowhere"], &["--export"]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-#[path = "sweep_run/mod.rs"]
+mod common;
 mod sweep_run;
 
 use std::path::{Path, PathBuf};
@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
-use reachcast::backend::gpu::{Choice, Gpu};
 use reachcast::experiment::record::RaceRecord;
 use reachcast::experiment::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
 use reachcast::scenario::bound::{required_scenarios, simple_scenarios};
@@ -328,10 +327,7 @@ fn bounds_of_certificates_are_told_apart() {
 
 #[test]
 fn an_adapter_sweeps_too() {
-    if let Err(error) = Gpu::open(&Choice::Any) {
-        let required = std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1");
-        assert!(!required, "REACHCAST_REQUIRE_GPU is 1: {error}");
-        println!("SKIPPED: no adapter");
+    if common::adapter().is_none() {
         return;
     }
     let folder = Folder::new();

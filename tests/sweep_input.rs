@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-#[path = "sweep_run/mod.rs"]
 mod sweep_run;
 
 use std::path::Path;

@@ -105,7 +105,7 @@ pub(super) fn names(list: &[String]) -> Result<Vec<Name>> {
 }
 
 /// The controller of a name.
-fn name(text: &str) -> Result<Name> {
+pub(super) fn name(text: &str) -> Result<Name> {
     let known = Name::value_variants();
     known.iter().copied().find(|name| name.text() == text).ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(|name| name.text()).collect();

@@ -1,6 +1,7 @@
 //! The program from outside: its exit code, what it prints, and files of a test's own.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+#![allow(dead_code, reason = "each test file uses a part of it")]
 
 use std::process::Command;
 

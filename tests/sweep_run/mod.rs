@@ -31,10 +31,7 @@ impl Folder {
 /// `sweep` of `config` into `out`.
 pub(crate) fn sweep_of(config: &str, out: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_reachcast"));
-    command.args(["sweep", config, "--out"]).arg(out).args(arguments);
-    if !arguments.contains(&"--backend") && !arguments.contains(&"gpu") {
-        command.args(["-q"]);
-    }
+    command.args(["sweep", config, "-q", "--out"]).arg(out).args(arguments);
     command.current_dir(env!("CARGO_MANIFEST_DIR"));
     command
 }

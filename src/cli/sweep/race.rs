@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use clap::ValueEnum;
-
 use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::Backend;
 use crate::cli::args::Global;
 use crate::cli::progress::Progress;
-use crate::cli::race_input::{RaceInput, noise_seeds};
+use crate::cli::race_input::{RaceInput, name, noise_seeds};
 use crate::config::Overrides;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::experiment::controller::Name;
 use crate::experiment::run::Experiment;
 use crate::experiment::sweep::Store;
@@ -61,9 +59,7 @@ pub(super) fn run(
 impl Sweep<'_> {
     /// The controller of a point.
     fn controller(&self, values: &Values) -> Result<Name> {
-        let text = self.grid.value(values, &Target::Controller).unwrap_or_default();
-        let known = Name::value_variants().iter().find(|name| name.text() == text);
-        known.copied().ok_or_else(|| Error::invalid("--controllers", format!("no `{text}`")))
+        name(self.grid.value(values, &Target::Controller).unwrap_or_default())
     }
 
     /// The configuration of a point.
