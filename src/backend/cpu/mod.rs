@@ -14,13 +14,12 @@ mod mppi_update;
 mod packs;
 mod reach_avoid;
 mod schedule;
+mod spread;
 #[cfg(test)]
 mod tests;
 mod tile;
 
 use std::sync::Arc;
-
-use rayon::prelude::*;
 
 use self::deviation::Deviation;
 use self::dispatch::Instructions;
@@ -28,6 +27,7 @@ use self::mlp::Packed;
 use self::packs::Packs;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
+use self::spread::spread;
 use super::{MeasureSink, PairSink};
 use crate::error::{Error, Result};
 use crate::policy::{Mlp, Policy};
@@ -112,18 +112,14 @@ impl Cpu {
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, network);
             measures.resize(chunk.count, 0.0);
-            let units = measures.chunks_mut(schedule.unit).enumerate();
-            let units: Vec<_> = units.collect();
-            self.pool.install(|| {
-                units.into_par_iter().for_each(|(unit, out)| {
-                    self.instructions.run(ReachAvoid {
-                        plant,
-                        network,
-                        task,
-                        width: schedule.width,
-                        first: chunk.first + (unit * schedule.unit) as u64,
-                        out,
-                    });
+            spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
+                self.instructions.run(ReachAvoid {
+                    plant,
+                    network,
+                    task,
+                    width: schedule.width,
+                    first: chunk.first + (unit * schedule.unit) as u64,
+                    out,
                 });
             });
             sink(chunk.first, &measures)?;
@@ -150,19 +146,15 @@ impl Cpu {
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, network);
             measures.resize(chunk.count, PairMeasure::default());
-            let units: Vec<_> = measures.chunks_mut(schedule.unit).enumerate().collect();
-            let found: Vec<Vec<Farthest>> = self.pool.install(|| {
-                let units = units.into_par_iter().map(|(unit, out)| {
-                    self.instructions.run(Deviation {
-                        plant,
-                        network,
-                        task,
-                        width: schedule.width,
-                        first: chunk.first + (unit * schedule.unit) as u64,
-                        out,
-                    })
-                });
-                units.collect()
+            let found = spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
+                self.instructions.run(Deviation {
+                    plant,
+                    network,
+                    task,
+                    width: schedule.width,
+                    first: chunk.first + (unit * schedule.unit) as u64,
+                    out,
+                })
             });
             for found in found {
                 let steps = farthest.iter_mut().zip(found);

@@ -1,9 +1,8 @@
 //! MPPI problems cut into units for the threads, merged in order.
 
-use rayon::prelude::*;
-
 use super::Cpu;
 use super::mppi_rollout::MppiRollout;
+use super::spread::spread;
 use crate::backend::softmin::Partial;
 use crate::cost::Cost;
 use crate::error::Result;
@@ -39,18 +38,13 @@ impl Cpu {
             (number / units as usize, first..(first + UNIT).min(samples))
         };
         let count = task.problems.len() * units as usize;
-        let mut outs = cut(&mut costs, samples as usize, count);
-        let parts: Vec<Partial<NU>> = self.pool.install(|| {
-            let units = outs.par_iter_mut().enumerate().map(|(number, out)| {
-                let (problem, samples) = unit_of(number);
-                let networks = [value.as_deref(), disturbance.as_deref()];
-                let costs = out.take();
-                let unit = MppiRollout { system, cost, task, networks, problem, samples, costs };
-                self.instructions.run(unit)
-            });
-            units.collect()
+        let outs = cut(&mut costs, samples as usize, count).into_iter();
+        let parts: Vec<Partial<NU>> = spread(&self.pool, outs, |number, costs| {
+            let (problem, samples) = unit_of(number);
+            let networks = [value.as_deref(), disturbance.as_deref()];
+            let unit = MppiRollout { system, cost, task, networks, problem, samples, costs };
+            self.instructions.run(unit)
         });
-        drop(outs);
         let merged = parts.chunks(units as usize).zip(task.problems).enumerate();
         let results = merged.map(|(number, (parts, problem))| {
             let settings = task.spec.settings();
