@@ -62,7 +62,7 @@ impl Job for Certify<'_> {
         let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
         progress.check()?;
-        Ok((record, staged))
+        Ok((record.sealed()?, staged))
     }
 }
 
@@ -71,12 +71,21 @@ fn stage(staged: &mut Staged, record: &Record, policy: &PolicySource) -> Result<
     if let PolicySource::Network { bytes, .. } = policy {
         staged.add(POLICY, bytes)?;
     }
+    for (name, bytes) in derived_files(record) {
+        staged.add(name, &bytes)?;
+    }
+    staged.add(CERTIFICATE, json(CERTIFICATE, record)?.as_bytes())
+}
+
+/// The files that say again what the record says.
+pub(super) fn derived_files(record: &Record) -> [(&'static str, Vec<u8>); 3] {
     let slice = &record.slice;
     let shape = [slice.y.values.len(), slice.x.values.len()];
-    staged.add("slice.npy", &npy_bytes(&slice.check_margin, shape))?;
-    staged.add("deviation.csv", deviation_csv(&record.deviation).as_bytes())?;
-    staged.add("report.html", crate::report::html(record).as_bytes())?;
-    staged.add(CERTIFICATE, json(CERTIFICATE, record)?.as_bytes())
+    [
+        ("slice.npy", npy_bytes(&slice.check_margin, shape)),
+        ("deviation.csv", deviation_csv(&record.deviation).into_bytes()),
+        ("report.html", crate::report::html(record).into_bytes()),
+    ]
 }
 
 /// The bounds of each step; the column `exact` is empty for a system that is not linear.

@@ -81,8 +81,7 @@ where
     };
     Ok(DeviationRecord {
         claim: claim(context.plant.system, settings, &program)?,
-        // As it was written: 0.1, not 0.10000000149.
-        radius: asked.radius.to_string().parse().unwrap_or(f64::from(asked.radius)),
+        radius: written(asked.radius),
         control: asked.control,
         joint: asked.joint,
         source: asked.source,
@@ -95,6 +94,41 @@ where
         posterior_risk: wait_and_judge(asked.scenarios, support, program.beta),
         non_finite: sample.non_finite,
     })
+}
+
+/// What `stored` says as its own numbers and `settings` give it.
+pub(super) fn derived<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    stored: &DeviationRecord,
+) -> Result<DeviationRecord>
+where
+    S: System<NX, NU>,
+{
+    let asked = &settings.deviation;
+    let program = check_scenarios(asked, settings.spec.horizon)?;
+    let exact = exact(system, settings)?;
+    let bound = match (asked.source, &exact) {
+        (DeviationSource::Exact, Some(exact)) => exact.clone(),
+        _ => stored.bound.clone(),
+    };
+    Ok(DeviationRecord {
+        claim: claim(system, settings, &program)?,
+        radius: written(asked.radius),
+        control: asked.control,
+        joint: asked.joint,
+        source: asked.source,
+        bound,
+        exact,
+        pilot: if asked.joint == Joint::FixedShape { asked.pilot } else { 0 },
+        posterior_risk: wait_and_judge(asked.scenarios, stored.support, program.beta),
+        ..stored.clone()
+    })
+}
+
+/// The number as it was written: 0.1, not 0.10000000149.
+fn written(radius: f32) -> f64 {
+    radius.to_string().parse().unwrap_or(f64::from(radius))
 }
 
 /// The program of the bound; refuses fewer pairs than it needs.
