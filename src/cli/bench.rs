@@ -27,10 +27,11 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     let threads = global.threads.map(usize::from);
     let asked = Asked { quick: asked.quick, filter: asked.workload.clone(), seed, threads };
     let progress = Progress::new(global);
+    // Before the work: a folder that cannot be written to would waste it.
+    let staged = global.out.as_deref().map(Staged::new).transpose()?;
     let record = benchmark::run(&asked, &devices::all(global)?, &progress)?;
     progress.finish();
-    if let Some(folder) = &global.out {
-        let mut staged = Staged::new(folder)?;
+    if let Some(mut staged) = staged {
         staged.add("bench.json", json("bench.json", &record)?.as_bytes())?;
         staged.publish()?;
     }

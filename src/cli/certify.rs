@@ -8,15 +8,20 @@ use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::Result;
-use crate::files::{Staged, json, npy_bytes};
+use crate::files::{Staged, check_room, json, npy_bytes};
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::scenario;
 use crate::scenario::record::{DeviationRecord, Record};
+use crate::scenario::settings::Settings;
 use crate::system::System;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-out";
+/// Rollouts that a picture shows.
+const PICTURED: usize = 13;
+/// Starts that a picture shows.
+const KEPT: usize = 400;
 /// Name of the stored certificate.
 pub(super) const CERTIFICATE: &str = "certificate.json";
 /// Name of the copy of the network, which makes the folder self-contained.
@@ -59,11 +64,19 @@ impl Job for Certify<'_> {
         let progress = Progress::new(self.global);
         // Before the work: a folder that cannot be written to would waste it.
         let staged = Staged::new(self.out)?;
+        check_room(self.out, estimate(&settings))?;
         let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
         progress.check()?;
         Ok((record.sealed()?, staged))
     }
+}
+
+/// About what the files of the folder take, bytes: a number takes some 20 characters in a text.
+fn estimate<const NX: usize>(settings: &Settings<NX>) -> u64 {
+    let [x, y] = settings.slice.each_ref().map(|axis| axis.values.len());
+    let states = PICTURED * (settings.spec.horizon as usize + 1) + KEPT;
+    (1 << 20) + 20 * (8 * x * y + 2 * NX * states) as u64
 }
 
 /// Writes all files of the folder, the certificate itself last.

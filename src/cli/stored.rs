@@ -52,12 +52,14 @@ fn at(path: &Path, error: Error) -> Error {
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
     let stored = Stored::read(global, folder)?;
+    // Before the work: a folder that cannot be written to would waste it.
+    let staged = global.out.as_deref().map(Staged::new).transpose()?;
     let job = Ask { global, stored: &stored, states };
     let rows = stored.config.with_plant(&stored.policy, job)?;
-    match &global.out {
+    match staged {
         None => report(global, &rows, || csv(&rows))?,
-        Some(out) => {
-            let path = write(out, &rows)?;
+        Some(staged) => {
+            let path = write(staged, &rows)?;
             report(global, &rows, || counts(&rows, &path))?;
         }
     }
@@ -91,9 +93,8 @@ impl Job for Ask<'_> {
     }
 }
 
-/// Writes the rows to `query.csv` in the folder `out`.
-fn write(out: &Path, rows: &[QueryRow]) -> Result<PathBuf> {
-    let mut staged = Staged::new(out)?;
+/// Writes the rows to `query.csv`.
+fn write(mut staged: Staged, rows: &[QueryRow]) -> Result<PathBuf> {
     staged.add("query.csv", csv(rows).as_bytes())?;
     Ok(staged.publish()?.remove(0))
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::controller::{Name, World};
 use super::judge::{Judge, safe_at_start};
-use super::log::{RaceLog, arrays, damaged, races};
+use super::log::{RaceLog, arrays, damaged, is_sealed, races, sealed};
 use super::picture::picture;
 use super::plan::Paths;
 use super::race::{STEP_SECONDS, fly, race_seed};
@@ -21,7 +21,7 @@ use super::summary::Summary;
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, npz_bytes, read_npz};
+use crate::files::{Staged, check_room, npz_bytes, read_npz};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
@@ -31,6 +31,10 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
+/// Folder of the stored races.
+const RACES: &str = "races";
+/// Room for record, page and manifest, bytes.
+const RECORD_BYTES: u64 = 2 << 20;
 /// Name of the file that says which experiment a folder holds.
 const MANIFEST: &str = "experiment.json";
 /// Name of the page that every command with results writes.
@@ -85,6 +89,7 @@ impl Experiment<'_> {
         let names: Vec<Name> = self.names.iter().copied().filter(runs).collect();
         self.check(&names)?;
         self.claim_folder()?;
+        self.check_room(&names)?;
         let (mut summaries, mut timings) = (Vec::new(), Vec::new());
         for name in names {
             let mut summary = self.controller(name, watch)?;
@@ -121,6 +126,25 @@ impl Experiment<'_> {
             controller(name, World { race: &race, ..self.world }, 1, Paths::None)?;
         }
         Ok(())
+    }
+
+    /// Makes sure that the races that are still to be flown can be stored.
+    fn check_room(&self, names: &[Name]) -> Result<()> {
+        Staged::within(&self.folder, RACES)?;
+        let races = self.folder.join(RACES);
+        let mut missing = 0;
+        for &name in names {
+            for &seed in &self.noise_seeds {
+                for first in (0..self.starts.len()).step_by(BATCH) {
+                    if !races.join(batch_file(name, seed, first)).exists() {
+                        missing += BATCH.min(self.starts.len() - first) as u64;
+                    }
+                }
+            }
+        }
+        let race = arrays(&[RaceLog::default()], self.world.race.steps as usize);
+        let bytes: usize = race.iter().map(|(_, array)| array.data.bytes()).sum();
+        check_room(&self.folder, missing * bytes as u64 + RECORD_BYTES)
     }
 
     /// All races of one controller.
@@ -167,17 +191,17 @@ impl Experiment<'_> {
     ) -> Result<Vec<RaceLog>> {
         let starts = &self.starts[first..self.starts.len().min(first + BATCH)];
         let steps = world.race.steps;
-        let file = format!("{}-seed{noise_seed}-from{first}.npz", name.text());
-        let folder = self.folder.join("races");
-        let path = folder.join(&file);
+        let file = batch_file(name, noise_seed, first);
+        let path = self.folder.join(RACES).join(&file);
+        let label = format!("{file} {}", self.manifest());
         if path.exists() {
             watch.advance(starts.len() as u64 * u64::from(steps))?;
-            return stored(&path, starts, steps);
+            return stored(&path, starts, steps, &label);
         }
         let seeds = self.seeds(noise_seed, first, starts.len());
         let logs = flown(name, world, starts, &seeds, watch)?;
-        let mut staged = Staged::new(&folder)?;
-        staged.add(&file, &npz_bytes(&arrays(&logs, steps as usize))?)?;
+        let mut staged = Staged::within(&self.folder, RACES)?;
+        staged.add(&file, &npz_bytes(&sealed(arrays(&logs, steps as usize), &label))?)?;
         staged.publish()?;
         Ok(logs)
     }
@@ -311,7 +335,7 @@ impl Experiment<'_> {
 pub(super) fn claim_folder(folder: &Path, manifest: &str) -> Result<()> {
     let path = folder.join(MANIFEST);
     match std::fs::read_to_string(&path) {
-        Ok(text) if text == manifest => Ok(()),
+        Ok(text) if text == manifest => Staged::new(folder).map(drop),
         Ok(_) => {
             let problem = "another experiment is stored here (other configuration, starts, \
                            parameters, networks, backend or program); give another --out, or \
@@ -356,7 +380,7 @@ pub(super) fn flown(
 }
 
 /// The races that the file at `path` holds, if they are those from `starts` and of that length.
-fn stored(path: &Path, starts: &[[f32; 12]], steps: u32) -> Result<Vec<RaceLog>> {
+fn stored(path: &Path, starts: &[[f32; 12]], steps: u32, label: &str) -> Result<Vec<RaceLog>> {
     let arrays = read_npz(path).map_err(|error| match error {
         Error::File { problem, .. } => damaged(path, &problem),
         other => other,
@@ -365,10 +389,21 @@ fn stored(path: &Path, starts: &[[f32; 12]], steps: u32) -> Result<Vec<RaceLog>>
     if most != steps as usize {
         return Err(damaged(path, &format!("it holds races of {most} steps, not of {steps}")));
     }
-    match stored.iter().map(|race| &race.states[0]).eq(starts) {
-        true => Ok(stored),
-        false => Err(damaged(path, "its starts are others")),
+    if !stored.iter().map(|race| &race.states[0]).eq(starts) {
+        return Err(damaged(path, "its starts are others"));
     }
+    match is_sealed(&arrays, label) {
+        true => Ok(stored),
+        false => {
+            let problem = "edited, or of another controller, noise seed or experiment";
+            Err(damaged(path, problem))
+        }
+    }
+}
+
+/// Name of the file of a batch of races.
+fn batch_file(name: Name, noise_seed: u64, first: usize) -> String {
+    format!("{}-seed{noise_seed}-from{first}.npz", name.text())
 }
 
 /// Mean of compute times; 0 without any.

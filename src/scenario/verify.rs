@@ -107,15 +107,19 @@ where
     P: Policy<NX, NU>,
 {
     let refuse = |field: &str, stored: &str, found: &str| {
-        Err(Error::Refused(format!("{field} is {stored} in the record, {found} here")))
+        Err(Error::Refused(format!("{field} is {stored} in the record, {found} here; certify again")))
     };
     let (physics, policy) = hashes(plant);
     let stored = &record.provenance;
     if record.schema != SCHEMA {
         return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());
     }
-    if record.system.states.len() != NX || record.system.name != plant.system.name() {
+    if record.system.name != plant.system.name() {
         return refuse("system.name", &record.system.name, plant.system.name());
+    }
+    if record.system.states.len() != NX {
+        let found = record.system.states.len().to_string();
+        return refuse("system.states length", &found, &NX.to_string());
     }
     if stored.physics_sha256 != physics {
         return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
@@ -125,7 +129,8 @@ where
     }
     if record.deviation.bound.len() != record.horizon as usize + 1 {
         let found = record.deviation.bound.len().to_string();
-        return refuse("deviation.bound length", &found, &(record.horizon + 1).to_string());
+        let expected = format!("{} by its horizon", record.horizon + 1);
+        return refuse("deviation.bound length", &found, &expected);
     }
     Ok(())
 }
