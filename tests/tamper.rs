@@ -1,4 +1,5 @@
-//! Edited by hand: certificates, field by field, and what `check` and `query` say about each.
+//! Edited by hand: certificates, field by field, and what `check` and `query` say about each; stored
+//! races and points, and links that lead elsewhere.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
@@ -11,6 +12,7 @@ use command::{Folder, reachcast};
 use common::cpu;
 use reachcast::Error;
 use reachcast::config::{Config, Job, PolicySource};
+use reachcast::files::{Data, npz_bytes, read_npz};
 use reachcast::policy::Policy;
 use reachcast::rollout::Plant;
 use reachcast::scenario::record::Record;
@@ -318,4 +320,115 @@ fn forged_digests_do_not_help() {
     }
     println!("{counts:?}: edits, named by check, refused by query");
     assert!(counts[0] > 200 && counts[2] > 100, "{counts:?}");
+}
+
+/// A race and a sweep, small.
+fn raced(folder: &Folder) -> (Vec<String>, String) {
+    let out = folder.path("race");
+    let words = "race configs/smoke.toml --backend cpu -q --starts 3 --set race.steps=12 \
+                 --set race.mppi.samples=16 --set race.soft.samples=16 --controllers mppi,mppi-soft";
+    let mut arguments: Vec<String> = words.split_whitespace().map(str::to_owned).collect();
+    arguments.extend(["--out".to_owned(), out.clone()]);
+    (arguments, out)
+}
+
+/// Runs and expects a refusal that names the file and the remedy.
+fn refuses(arguments: &[String], words: &[&str]) {
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    command::refused(&arguments, words);
+}
+
+#[test]
+fn logs_of_races_that_were_edited_or_swapped_are_noticed() {
+    let folder = Folder::new();
+    let (arguments, out) = raced(&folder);
+    let run = || command::done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    run();
+    let results = || fs::read(format!("{out}/results.json")).unwrap();
+    let before = results();
+    let [one, other] =
+        ["mppi", "mppi-soft"].map(|name| format!("{out}/races/{name}-seed1-from0.npz"));
+    let whole = fs::read(&one).unwrap();
+    let remedy = "remove the file, and the races are flown again";
+    // The same starts, steps and shapes, of another controller.
+    fs::copy(&other, &one).unwrap();
+    refuses(&arguments, &["mppi-seed1-from0.npz", "of another controller", remedy]);
+    // Each array in turn: one number, checksums and all.
+    let arrays = read_npz(std::path::Path::new(&other)).unwrap();
+    fs::write(&one, &whole).unwrap();
+    let arrays_of = |name: &str| read_npz(std::path::Path::new(name)).unwrap();
+    for name in arrays.keys().filter(|name| *name != "steps") {
+        let mut edited = arrays_of(&one);
+        match &mut edited.get_mut(name).unwrap().data {
+            Data::F32(values) => values[20] = if values[20] == 0.5 { 0.25 } else { 0.5 },
+            Data::F64(values) => values[7] += 1e-9,
+            Data::U8(values) => values[3] = if values[3] == 0 { 1 } else { 0 },
+            Data::U32(values) => values[3] += 1,
+            Data::U64(values) => values[3] += 1,
+        }
+        let edited: Vec<_> = edited.iter().map(|(name, array)| (name.as_str(), array.clone())).collect();
+        let path = format!("{out}/races/mppi-seed1-from0.npz");
+        fs::write(&path, npz_bytes(&edited).unwrap()).unwrap();
+        refuses(&arguments, &["mppi-seed1-from0.npz", "edited", remedy]);
+        fs::write(&path, &whole).unwrap();
+    }
+    // The remedy works.
+    fs::remove_file(&one).unwrap();
+    run();
+    assert!(results() == before);
+}
+
+#[test]
+fn points_of_a_sweep_that_were_edited_are_noticed() {
+    let folder = Folder::new();
+    let out = folder.path("sweep");
+    let words = "sweep configs/smoke.toml --backend cpu -q --starts 2 --set race.steps=8 --samples 8,16";
+    let mut arguments: Vec<String> = words.split_whitespace().map(str::to_owned).collect();
+    arguments.extend(["--out".to_owned(), out.clone()]);
+    command::done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    let points: Vec<_> = fs::read_dir(format!("{out}/points")).unwrap().map(|e| e.unwrap()).collect();
+    let path = points[0].path();
+    let text = fs::read_to_string(&path).unwrap();
+    let document: Value = serde_json::from_str(&text).unwrap();
+    let mut found = Vec::new();
+    places(&document, &Vec::new(), &mut found);
+    let name = points[0].file_name().into_string().unwrap();
+    let mut count = 0;
+    for place in found {
+        for (how, edited) in edits(&document, &place) {
+            // An entry that is missing says the same as one that is null; unknown ones are not read.
+            let says_more = how == "added to" || document.pointer(&pointer(&place)).unwrap().is_null();
+            if says_more && how != "filled" {
+                continue;
+            }
+            fs::write(&path, edited.to_string()).unwrap();
+            refuses(&arguments, &[&name, "remove the file, and the point is computed again"]);
+            count += 1;
+        }
+    }
+    assert!(count > 60, "{count} edits");
+    fs::write(&path, text).unwrap();
+    command::done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+}
+
+/// Folders within the folder of the results that lead elsewhere.
+#[test]
+#[cfg(unix)]
+fn links_out_of_the_folder_are_refused() {
+    let folder = Folder::new();
+    let elsewhere = folder.path("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    let (arguments, out) = raced(&folder);
+    fs::create_dir(&out).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, format!("{out}/races")).unwrap();
+    refuses(&arguments, &["race/races", "a link", "remove it"]);
+    fs::remove_file(format!("{out}/races")).unwrap();
+    // A link in the place of a file is replaced, not followed.
+    let mine = folder.path("elsewhere/mine.json");
+    fs::write(&mine, "mine").unwrap();
+    std::os::unix::fs::symlink(&mine, format!("{out}/results.json")).unwrap();
+    command::done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    assert_eq!(fs::read(&mine).unwrap(), b"mine");
+    assert!(!fs::symlink_metadata(format!("{out}/results.json")).unwrap().is_symlink());
+    assert_eq!(fs::read_dir(&elsewhere).unwrap().count(), 1);
 }

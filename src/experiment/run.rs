@@ -88,8 +88,9 @@ impl Experiment<'_> {
         let runs = |name: &Name| !absent.iter().any(|(missing, _)| missing == name);
         let names: Vec<Name> = self.names.iter().copied().filter(runs).collect();
         self.check(&names)?;
-        self.claim_folder()?;
-        self.check_room(&names)?;
+        let manifest = format!("{:#}\n", self.manifest());
+        claim_folder(&self.folder, &manifest, self.need(&names))?;
+        Staged::within(&self.folder, RACES)?;
         let (mut summaries, mut timings) = (Vec::new(), Vec::new());
         for name in names {
             let mut summary = self.controller(name, watch)?;
@@ -128,9 +129,8 @@ impl Experiment<'_> {
         Ok(())
     }
 
-    /// Makes sure that the races that are still to be flown can be stored.
-    fn check_room(&self, names: &[Name]) -> Result<()> {
-        Staged::within(&self.folder, RACES)?;
+    /// Room that the races take which are still to be flown, with the results of all, bytes.
+    fn need(&self, names: &[Name]) -> u64 {
         let races = self.folder.join(RACES);
         let mut missing = 0;
         for &name in names {
@@ -144,7 +144,7 @@ impl Experiment<'_> {
         }
         let race = arrays(&[RaceLog::default()], self.world.race.steps as usize);
         let bytes: usize = race.iter().map(|(_, array)| array.data.bytes()).sum();
-        check_room(&self.folder, missing * bytes as u64 + RECORD_BYTES)
+        missing * bytes as u64 + RECORD_BYTES
     }
 
     /// All races of one controller.
@@ -306,11 +306,6 @@ impl Experiment<'_> {
         digest::sha256([bytemuck::cast_slice(&self.starts)])
     }
 
-    /// Makes sure that the folder is of this experiment, and says so in it.
-    fn claim_folder(&self) -> Result<()> {
-        claim_folder(&self.folder, &format!("{:#}\n", self.manifest()))
-    }
-
     /// Everything that the races depend on but their controller and noise seed, the program included.
     pub(super) fn manifest(&self) -> serde_json::Value {
         let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
@@ -330,30 +325,29 @@ impl Experiment<'_> {
     }
 }
 
-/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and says so in
-/// it.
-pub(super) fn claim_folder(folder: &Path, manifest: &str) -> Result<()> {
+/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and has room
+/// for `need` bytes more, and says so in it.
+pub(super) fn claim_folder(folder: &Path, manifest: &str, need: u64) -> Result<()> {
+    let mut staged = Staged::new(folder)?;
     let path = folder.join(MANIFEST);
     match std::fs::read_to_string(&path) {
-        Ok(text) if text == manifest => Staged::new(folder).map(drop),
+        Ok(text) if text == manifest => return check_room(folder, need),
         Ok(_) => {
             let problem = "another experiment is stored here (other configuration, starts, \
                            parameters, networks, backend or program); give another --out, or \
                            remove this folder";
-            Err(Error::file(&path, problem))
+            return Err(Error::file(&path, problem));
         }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            if folder.join(REPORT).exists() {
-                let problem =
-                    "a report of something else is here; give another --out, or remove it";
-                return Err(Error::file(&folder.join(REPORT), problem));
-            }
-            let mut staged = Staged::new(folder)?;
-            staged.add(MANIFEST, manifest.as_bytes())?;
-            staged.publish().map(|_| ())
-        }
-        Err(error) => Err(Error::file(&path, error)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(Error::file(&path, error)),
     }
+    if folder.join(REPORT).exists() {
+        let problem = "a report of something else is here; give another --out, or remove it";
+        return Err(Error::file(&folder.join(REPORT), problem));
+    }
+    check_room(folder, need)?;
+    staged.add(MANIFEST, manifest.as_bytes())?;
+    staged.publish().map(drop)
 }
 
 /// SHA-256 of the program that runs.

@@ -10,7 +10,7 @@ use super::table::table;
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::experiment::run::claim_folder;
-use crate::files::{Staged, check_room, json};
+use crate::files::{Staged, json};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);
@@ -50,9 +50,9 @@ impl Store {
     pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
         let axes: Vec<&str> = record.axes.iter().map(|axis| axis.name.as_str()).collect();
         let manifest = serde_json::json!({ "axes": axes, "shared": identity });
-        claim_folder(folder, &format!("{manifest:#}\n"))?;
+        let need = record.total * POINT_BYTES + PAGE_BYTES;
+        claim_folder(folder, &format!("{manifest:#}\n"), need)?;
         Staged::within(folder, POINTS)?;
-        check_room(folder, record.total * POINT_BYTES + PAGE_BYTES)?;
         let folder = folder.to_owned();
         Ok(Self { folder, record, written: None })
     }
