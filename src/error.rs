@@ -99,7 +99,10 @@ impl Error {
             | Self::File { .. }
             | Self::Device(_)
             | Self::Refused(_) => 2,
-            Self::Write { .. } | Self::NoRoom { .. } | Self::DeviceFailed(_) | Self::Interrupted => 1,
+            Self::Write { .. }
+            | Self::NoRoom { .. }
+            | Self::DeviceFailed(_)
+            | Self::Interrupted => 1,
         }
     }
 }

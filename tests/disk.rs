@@ -203,6 +203,21 @@ fn what_is_needed_and_what_is_free_is_said() {
     work(&rollout, "--measures", "measures.csv").fails(&disk.at, &["need about", "are free"]);
 }
 
+/// A run that is taken up again looks at the folder as well before it works.
+#[test]
+fn a_folder_that_became_read_only() {
+    let Some(disk) = Disk::new("8m") else { return };
+    let race = |controllers: &str| {
+        let text = "race configs/smoke.toml --backend cpu -q --starts 8 --set race.steps=10 \
+                    --set race.mppi.samples=500000 --controllers";
+        let arguments = words(&format!("{text} {controllers}"));
+        Work { arguments, flag: "--out", name: "out", long: true }
+    };
+    assert!(race("policy").run(&disk.at).status.success());
+    disk.remount("ro");
+    race("policy,mppi").fails(&disk.at, &["cannot write", "Read-only file system", "writable"]);
+}
+
 /// A disk that fills up between the first look and the last file.
 #[test]
 fn a_disk_that_fills_up_loses_nothing() {

@@ -113,7 +113,9 @@ fn everywhere<T: Serialize + DeserializeOwned>(record: &T) -> T {
 /// No element, attribute, reference or control character of a hostile text has come through.
 fn assert_harmless(page: &str, case: &str) {
     let body = page.replace("<script>", "<script >");
-    for mark in ["<mark", "\" data-mark", "' data-mark", "&mark;", "<img", "</title></text", "\u{1b}"] {
+    for mark in
+        ["<mark", "\" data-mark", "' data-mark", "&mark;", "<img", "</title></text", "\u{1b}"]
+    {
         assert!(!page.contains(mark), "{case}: {mark:?}");
     }
     let controls = |c: char| c.is_control() && !c.is_whitespace();
@@ -197,7 +199,8 @@ fn names_steer_no_terminal() {
     };
     let config = folder.path(&format!("{steer}.toml"));
     expect(&["certify", &config], &["[31m", ".toml", "No such file"]);
-    fs::write(&config, format!("\"{}\" = 1\n[system]\nname = \"drone-race\"\n", "\\u001b[31m")).unwrap();
+    fs::write(&config, format!("\"{}\" = 1\n[system]\nname = \"drone-race\"\n", "\\u001b[31m"))
+        .unwrap();
     expect(&["certify", &config], &["unknown key"]);
     fs::write(&config, "[system]\nname = \"\\u001b[31mx\"\n").unwrap();
     expect(&["certify", &config], &["system.name"]);
@@ -207,7 +210,8 @@ fn names_steer_no_terminal() {
     let rollout = ["rollout", "configs/smoke.toml", "--starts", &states, "--measures", &measures];
     expect(&rollout, &["expected the states"]);
     let pth = folder.path("x.pth");
-    let pickle = checkpoint::replaced(&checkpoint::pickle("sequential.pth"), b"0.weight", b"\x1b[31mvy1");
+    let pickle =
+        checkpoint::replaced(&checkpoint::pickle("sequential.pth"), b"0.weight", b"\x1b[31mvy1");
     fs::write(&pth, checkpoint::with_pickle("sequential.pth", &pickle)).unwrap();
     let out = folder.path("policy.safetensors");
     expect(&["policy", "import", &pth, "--out", &out], &["[31mvy1"]);
@@ -231,8 +235,16 @@ fn no_result_leaves_its_folder() {
     let out = folder.path("out");
     for name in ["../x", "/x", "mppi/../../x", "mppi\n"] {
         for command in ["race", "sweep"] {
-            let arguments =
-                [command, "configs/smoke.toml", "--starts", "2", "--controllers", name, "--out", &out];
+            let arguments = [
+                command,
+                "configs/smoke.toml",
+                "--starts",
+                "2",
+                "--controllers",
+                name,
+                "--out",
+                &out,
+            ];
             assert_eq!(reachcast(&arguments).0, Some(2), "{command} {name}");
         }
     }

@@ -121,7 +121,8 @@ fn untimed(mut document: Value) -> Value {
     match &mut document {
         Value::Object(fields) => {
             for (key, value) in fields.iter_mut() {
-                *value = if TIMED.contains(&key.as_str()) { json!(0) } else { untimed(value.take()) };
+                *value =
+                    if TIMED.contains(&key.as_str()) { json!(0) } else { untimed(value.take()) };
             }
         }
         Value::Array(items) => items.iter_mut().for_each(|item| *item = untimed(item.take())),

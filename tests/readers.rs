@@ -69,9 +69,11 @@ fn damage() -> impl Strategy<Value = Damage> {
         proptest::collection::vec(any::<u8>(), 0..600).prop_map(Damage::Bytes),
         share().prop_map(Damage::Cut),
         proptest::collection::vec((share(), 0..8_u8), 1..6).prop_map(Damage::Flip),
-        (share(), number, length).prop_map(|(at, number, length)| Damage::Number(at, number, length)),
+        (share(), number, length)
+            .prop_map(|(at, number, length)| Damage::Number(at, number, length)),
         (share(), share(), 0..8_usize).prop_map(|(to, from, of)| Damage::Splice(to, from, of)),
-        (share(), share(), 1..40_usize).prop_map(|(at, part, times)| Damage::Repeat(at, part, times)),
+        (share(), share(), 1..40_usize)
+            .prop_map(|(at, part, times)| Damage::Repeat(at, part, times)),
     ]
 }
 
@@ -163,7 +165,8 @@ fn config(path: &Path) -> Result<(), String> {
 
 #[test]
 fn configurations() {
-    let valid = ["race", "smoke", "double_integrator"].map(|name| file(&format!("configs/{name}.toml")));
+    let valid =
+        ["race", "smoke", "double_integrator"].map(|name| file(&format!("configs/{name}.toml")));
     holds("damaged.toml", &valid, &config);
 }
 
@@ -246,8 +249,8 @@ fn entries(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
 
 fn zipped(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
-    let options = zip::write::SimpleFileOptions::default()
-        .compression_method(zip::CompressionMethod::Stored);
+    let options =
+        zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     for (name, content) in entries {
         archive.start_file(name.as_str(), options).unwrap();
         std::io::Write::write_all(&mut archive, content).unwrap();
@@ -394,7 +397,9 @@ fn names_in_archives_are_no_paths() {
     std::fs::create_dir(&inner).unwrap();
     let mut hostile = entries(&logs());
     let target = folder.path().join("escaped.npy");
-    for name in ["../escaped.npy", "/tmp/escaped.npy", "a/../../escaped.npy", target.to_str().unwrap()] {
+    for name in
+        ["../escaped.npy", "/tmp/escaped.npy", "a/../../escaped.npy", target.to_str().unwrap()]
+    {
         let content = hostile[0].1.clone();
         hostile.push((name.to_owned(), content));
     }

@@ -115,7 +115,9 @@ fn nudged(value: f64) -> f64 {
 }
 
 fn pointer(path: &Path) -> String {
-    path.iter().map(|step| format!("/{}", step.as_str().map_or(step.to_string(), Into::into))).collect()
+    path.iter()
+        .map(|step| format!("/{}", step.as_str().map_or(step.to_string(), Into::into)))
+        .collect()
 }
 
 /// The name of the field that holds the place: keys up to the first list.
@@ -304,9 +306,8 @@ fn forged_digests_do_not_help() {
                 Ok(other) if other != original => {}
                 _ => continue,
             }
-            let [checked, queried] = verdict(&edited).unwrap_or_else(|error| {
-                [Some(error.to_string()), Some(error.to_string())]
-            });
+            let [checked, queried] = verdict(&edited)
+                .unwrap_or_else(|error| [Some(error.to_string()), Some(error.to_string())]);
             let checked = checked.unwrap_or_else(|| panic!("check takes {name} {how}"));
             let last = path.last().unwrap().as_str().unwrap_or(&name).to_owned();
             println!("{name} {how}: {checked}");
@@ -366,7 +367,8 @@ fn logs_of_races_that_were_edited_or_swapped_are_noticed() {
             Data::U32(values) => values[3] += 1,
             Data::U64(values) => values[3] += 1,
         }
-        let edited: Vec<_> = edited.iter().map(|(name, array)| (name.as_str(), array.clone())).collect();
+        let edited: Vec<_> =
+            edited.iter().map(|(name, array)| (name.as_str(), array.clone())).collect();
         let path = format!("{out}/races/mppi-seed1-from0.npz");
         fs::write(&path, npz_bytes(&edited).unwrap()).unwrap();
         refuses(&arguments, &["mppi-seed1-from0.npz", "edited", remedy]);
@@ -382,11 +384,13 @@ fn logs_of_races_that_were_edited_or_swapped_are_noticed() {
 fn points_of_a_sweep_that_were_edited_are_noticed() {
     let folder = Folder::new();
     let out = folder.path("sweep");
-    let words = "sweep configs/smoke.toml --backend cpu -q --starts 2 --set race.steps=8 --samples 8,16";
+    let words =
+        "sweep configs/smoke.toml --backend cpu -q --starts 2 --set race.steps=8 --samples 8,16";
     let mut arguments: Vec<String> = words.split_whitespace().map(str::to_owned).collect();
     arguments.extend(["--out".to_owned(), out.clone()]);
     command::done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
-    let points: Vec<_> = fs::read_dir(format!("{out}/points")).unwrap().map(|e| e.unwrap()).collect();
+    let points: Vec<_> =
+        fs::read_dir(format!("{out}/points")).unwrap().map(|e| e.unwrap()).collect();
     let path = points[0].path();
     let text = fs::read_to_string(&path).unwrap();
     let document: Value = serde_json::from_str(&text).unwrap();
@@ -397,7 +401,8 @@ fn points_of_a_sweep_that_were_edited_are_noticed() {
     for place in found {
         for (how, edited) in edits(&document, &place) {
             // An entry that is missing says the same as one that is null; unknown ones are not read.
-            let says_more = how == "added to" || document.pointer(&pointer(&place)).unwrap().is_null();
+            let says_more =
+                how == "added to" || document.pointer(&pointer(&place)).unwrap().is_null();
             if says_more && how != "filled" {
                 continue;
             }

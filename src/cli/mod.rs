@@ -98,7 +98,8 @@ fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String
 /// `text` for a terminal: what a name from a file could steer it with is replaced, line breaks and
 /// tabs aside.
 fn plain(text: &str) -> String {
-    let steers = |c: char| c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let steers =
+        |c: char| c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let shown = |c: char| if steers(c) && c != '\n' && c != '\t' { '\u{fffd}' } else { c };
     text.chars().map(shown).collect()
 }

@@ -1,14 +1,15 @@
 //! A whole experiment: every controller with every noise seed, batch by batch, resumed where it
 //! stopped.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use serde::Serialize;
 
 use super::controller::{Name, World};
+use super::folder::{RACES, batch_file, claim_folder, store, stored};
 use super::judge::{Judge, safe_at_start};
-use super::log::{RaceLog, arrays, damaged, is_sealed, races, sealed};
+use super::log::{RaceLog, arrays};
 use super::picture::picture;
 use super::plan::Paths;
 use super::race::{STEP_SECONDS, fly, race_seed};
@@ -21,7 +22,7 @@ use super::summary::Summary;
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, check_room, npz_bytes, read_npz};
+use crate::files::Staged;
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
@@ -31,14 +32,8 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
-/// Folder of the stored races.
-const RACES: &str = "races";
 /// Room for record, page and manifest, bytes.
 const RECORD_BYTES: u64 = 2 << 20;
-/// Name of the file that says which experiment a folder holds.
-const MANIFEST: &str = "experiment.json";
-/// Name of the page that every command with results writes.
-const REPORT: &str = "report.html";
 
 /// What is to be raced.
 #[derive(Clone, Debug)]
@@ -200,9 +195,7 @@ impl Experiment<'_> {
         }
         let seeds = self.seeds(noise_seed, first, starts.len());
         let logs = flown(name, world, starts, &seeds, watch)?;
-        let mut staged = Staged::within(&self.folder, RACES)?;
-        staged.add(&file, &npz_bytes(&sealed(arrays(&logs, steps as usize), &label))?)?;
-        staged.publish()?;
+        store(&self.folder, &file, &logs, steps, &label)?;
         Ok(logs)
     }
 
@@ -325,31 +318,6 @@ impl Experiment<'_> {
     }
 }
 
-/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and has room
-/// for `need` bytes more, and says so in it.
-pub(super) fn claim_folder(folder: &Path, manifest: &str, need: u64) -> Result<()> {
-    let mut staged = Staged::new(folder)?;
-    let path = folder.join(MANIFEST);
-    match std::fs::read_to_string(&path) {
-        Ok(text) if text == manifest => return check_room(folder, need),
-        Ok(_) => {
-            let problem = "another experiment is stored here (other configuration, starts, \
-                           parameters, networks, backend or program); give another --out, or \
-                           remove this folder";
-            return Err(Error::file(&path, problem));
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(Error::file(&path, error)),
-    }
-    if folder.join(REPORT).exists() {
-        let problem = "a report of something else is here; give another --out, or remove it";
-        return Err(Error::file(&folder.join(REPORT), problem));
-    }
-    check_room(folder, need)?;
-    staged.add(MANIFEST, manifest.as_bytes())?;
-    staged.publish().map(drop)
-}
-
 /// SHA-256 of the program that runs.
 pub(super) fn program_sha256() -> &'static str {
     static DIGEST: OnceLock<String> = OnceLock::new();
@@ -371,33 +339,6 @@ pub(super) fn flown(
     let steps = world.race.steps;
     let flights = fly(controller.as_mut(), world.system, starts, seeds, steps, watch)?;
     Ok(flights.iter().map(RaceLog::from).collect())
-}
-
-/// The races that the file at `path` holds, if they are those from `starts` and of that length.
-fn stored(path: &Path, starts: &[[f32; 12]], steps: u32, label: &str) -> Result<Vec<RaceLog>> {
-    let arrays = read_npz(path).map_err(|error| match error {
-        Error::File { problem, .. } => damaged(path, &problem),
-        other => other,
-    })?;
-    let (stored, most) = races(&arrays).map_err(|problem| damaged(path, &problem))?;
-    if most != steps as usize {
-        return Err(damaged(path, &format!("it holds races of {most} steps, not of {steps}")));
-    }
-    if !stored.iter().map(|race| &race.states[0]).eq(starts) {
-        return Err(damaged(path, "its starts are others"));
-    }
-    match is_sealed(&arrays, label) {
-        true => Ok(stored),
-        false => {
-            let problem = "edited, or of another controller, noise seed or experiment";
-            Err(damaged(path, problem))
-        }
-    }
-}
-
-/// Name of the file of a batch of races.
-fn batch_file(name: Name, noise_seed: u64, first: usize) -> String {
-    format!("{}-seed{noise_seed}-from{first}.npz", name.text())
 }
 
 /// Mean of compute times; 0 without any.

@@ -78,7 +78,10 @@ impl Staged {
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         let mut parts = Path::new(name).components();
         let (Some(Component::Normal(_)), None) = (parts.next(), parts.next()) else {
-            return Err(Error::invalid(name, "not the name of a file in the folder of the results"));
+            return Err(Error::invalid(
+                name,
+                "not the name of a file in the folder of the results",
+            ));
         };
         let path = self.folder.join(name);
         let mut file = temporary(&self.folder)?;

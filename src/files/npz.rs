@@ -172,7 +172,10 @@ fn add(
 }
 
 /// SHA-256 over `label` and the arrays, in any order of their names.
-pub fn npz_sha256<'a>(label: &str, arrays: impl IntoIterator<Item = (&'a str, &'a Array)>) -> String {
+pub fn npz_sha256<'a>(
+    label: &str,
+    arrays: impl IntoIterator<Item = (&'a str, &'a Array)>,
+) -> String {
     let arrays: BTreeMap<&str, &Array> = arrays.into_iter().collect();
     let mut parts = vec![label.as_bytes().to_vec()];
     for (name, array) in arrays {
@@ -180,7 +183,8 @@ pub fn npz_sha256<'a>(label: &str, arrays: impl IntoIterator<Item = (&'a str, &'
         parts.extend([name.into(), header(array.data.descr(), &shape), array.data.to_bytes()]);
     }
     // Each part after its length: no two lists of parts are the same bytes.
-    let lengths: Vec<[u8; 8]> = parts.iter().map(|part| (part.len() as u64).to_le_bytes()).collect();
+    let lengths: Vec<[u8; 8]> =
+        parts.iter().map(|part| (part.len() as u64).to_le_bytes()).collect();
     sha256(lengths.iter().zip(&parts).flat_map(|(length, part)| [&length[..], part]))
 }
 

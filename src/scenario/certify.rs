@@ -6,7 +6,8 @@ use std::time::Instant;
 use super::boundary;
 use super::ledger::{Entry, Ledger, Spend};
 use super::record::{
-    ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance, Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
+    ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
+    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
 };
 use super::settings::Settings;
 use super::{Context, Watch, derived, deviation, global, growth, lipschitz};

@@ -100,10 +100,7 @@ pub(super) fn statements<const NX: usize>(
 }
 
 /// The certified share of the box in words.
-fn share_statement<const NX: usize>(
-    global: &GlobalRecord,
-    settings: &Settings<NX>,
-) -> String {
+fn share_statement<const NX: usize>(global: &GlobalRecord, settings: &Settings<NX>) -> String {
     let [low, high] = global.share_interval;
     format!(
         "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \

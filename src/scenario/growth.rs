@@ -178,14 +178,10 @@ where
 {
     let asked = &settings.growth;
     let mut record = GrowthRecord {
-        outcome: GrowthOutcome::NoBoundary,
-        boundary: asked.boundary,
-        distance: None,
-        radius: 0.0,
-        volume: 0.0,
-        varies: asked.varies.to_vec(),
-        claim: None,
-        ..stored.clone()
+        center: stored.center.clone(),
+        rounds: stored.rounds.clone(),
+        samples: stored.samples.clone(),
+        ..nothing(asked)
     };
     let center = stored.center.as_ref().and_then(|x| <[f32; NX]>::try_from(x.as_slice()).ok());
     let Some(center) = center else { return Ok(record) };
@@ -201,6 +197,22 @@ where
         verified(&mut record, system, settings, ball)?;
     }
     Ok(record)
+}
+
+/// The record of a growth that had nothing to grow from.
+fn nothing<const NX: usize>(asked: &GrowthSettings<NX>) -> GrowthRecord {
+    GrowthRecord {
+        outcome: GrowthOutcome::NoBoundary,
+        boundary: asked.boundary,
+        center: None,
+        distance: None,
+        radius: 0.0,
+        volume: 0.0,
+        varies: asked.varies.to_vec(),
+        rounds: Vec::new(),
+        claim: None,
+        samples: Vec::new(),
+    }
 }
 
 /// Enters a ball that passed clean.
@@ -233,18 +245,7 @@ where
 {
     let asked = &settings.growth;
     check_scenarios(asked)?;
-    let mut record = GrowthRecord {
-        outcome: GrowthOutcome::NoBoundary,
-        boundary: asked.boundary,
-        center: None,
-        distance: None,
-        radius: 0.0,
-        volume: 0.0,
-        varies: asked.varies.to_vec(),
-        rounds: Vec::new(),
-        claim: None,
-        samples: Vec::new(),
-    };
+    let mut record = nothing(asked);
     let Some(boundary) = boundary else {
         return Ok(record);
     };

@@ -36,7 +36,8 @@ impl Record {
     /// [`Error::Refused`], naming the fields that were changed, added or removed, or what else is
     /// wrong with the document.
     pub fn read(text: &str) -> Result<Self> {
-        let refused = |what: &str, e: &dyn std::fmt::Display| Error::Refused(format!("{what} ({e})"));
+        let refused =
+            |what: &str, e: &dyn std::fmt::Display| Error::Refused(format!("{what} ({e})"));
         let document: Value =
             serde_json::from_str(text).map_err(|e| refused("not a certificate", &e))?;
         let schema = document.get("schema").unwrap_or(&Value::Null);

@@ -107,7 +107,9 @@ where
     P: Policy<NX, NU>,
 {
     let refuse = |field: &str, stored: &str, found: &str| {
-        Err(Error::Refused(format!("{field} is {stored} in the record, {found} here; certify again")))
+        Err(Error::Refused(format!(
+            "{field} is {stored} in the record, {found} here; certify again"
+        )))
     };
     let (physics, policy) = hashes(plant);
     let stored = &record.provenance;

@@ -9,7 +9,7 @@ use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::experiment::run::claim_folder;
+use crate::experiment::folder::claim_folder;
 use crate::files::{Staged, json};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
