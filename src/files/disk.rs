@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::named;
 use crate::error::{Error, Result};
 
 /// Refuses work whose results, about `need` bytes, do not fit on the disk of `folder`, which is
@@ -13,7 +14,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::NoRoom`] with both figures. A system that does not tell what is free is no obstacle.
 pub fn check_room(folder: &Path, need: u64) -> Result<()> {
-    match fs4::available_space(folder) {
+    match fs4::available_space(named(folder)) {
         Ok(free) if free < need => Err(Error::NoRoom { folder: folder.to_owned(), need, free }),
         _ => Ok(()),
     }

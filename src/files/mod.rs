@@ -49,6 +49,7 @@ impl Staged {
     /// # Errors
     /// [`Error::Write`] if it cannot.
     pub fn new(folder: &Path) -> Result<Self> {
+        let folder = named(folder);
         let refused = |source| Error::Write { path: folder.to_owned(), source };
         std::fs::create_dir_all(folder).map_err(refused)?;
         clear(folder);
@@ -115,10 +116,12 @@ fn sync(folder: &Path) {
 
 /// The folder of `path`, `.` for a bare name.
 fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
+    path.parent().map_or(Path::new("."), named)
+}
+
+/// `folder` with a name: `.` where it has none.
+fn named(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }
 
 /// Whether the name of `path` ends in `.npy` or `.csv`.
