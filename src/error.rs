@@ -45,12 +45,26 @@ pub enum Error {
         problem: String,
     },
     /// An output could not be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {source}{}", path.display(), remedy(source))]
     Write {
         /// The file or folder.
         path: PathBuf,
         /// The system's reason.
         source: std::io::Error,
+    },
+    /// The disk has less room than the results need.
+    #[error(
+        "{}: the results need about {} of room, {} are free; make room there, or write to another \
+         folder",
+        folder.display(), size(*need), size(*free)
+    )]
+    NoRoom {
+        /// The folder of the results.
+        folder: PathBuf,
+        /// Bytes that are to be written, estimated.
+        need: u64,
+        /// Bytes that are free.
+        free: u64,
     },
     /// A device that was asked for is not there, or cannot hold the work.
     #[error("{0}")]
@@ -85,7 +99,38 @@ impl Error {
             | Self::File { .. }
             | Self::Device(_)
             | Self::Refused(_) => 2,
-            Self::Write { .. } | Self::DeviceFailed(_) | Self::Interrupted => 1,
+            Self::Write { .. }
+            | Self::NoRoom { .. }
+            | Self::DeviceFailed(_)
+            | Self::Interrupted => 1,
         }
+    }
+}
+
+/// What helps against a refusal of the system to write.
+fn remedy(source: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match source.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "; make room there, or write to another folder, and run the command again"
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "; make it writable, or write to another folder"
+        }
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
+            "; a file is in the way: remove it, or write to another folder"
+        }
+        _ => "",
+    }
+}
+
+/// A number of bytes in the unit that suits it.
+fn size(bytes: u64) -> String {
+    let scaled = |exponent: i32| bytes as f64 / 1024.0_f64.powi(exponent);
+    match bytes {
+        0..10_240 => format!("{bytes} bytes"),
+        10_240..10_485_760 => format!("{:.0} KiB", scaled(1)),
+        10_485_760..10_737_418_240 => format!("{:.0} MiB", scaled(2)),
+        _ => format!("{:.1} GiB", scaled(3)),
     }
 }

@@ -143,7 +143,7 @@ fn a_certificate_of_another_plant_is_refused() {
     let other = Plant { system: &wider, policy: &policy };
     let checked = check(&backend, other, &record, &settings, &Unwatched);
     assert!(matches!(checked, Err(Error::Refused(_))), "{checked:?}");
-    let queried = query(&backend, other, &record, &[[0.0; 2]]);
+    let queried = query(&backend, other, &record, &settings, &[[0.0; 2]]);
     assert!(matches!(queried, Err(Error::Refused(_))), "{queried:?}");
 }
 
@@ -159,7 +159,7 @@ fn tiers_are_those_of_their_definition() {
     let node = |i: u16, half: f32| half * (f32::from(2 * i + 1) / 120.0 - 1.0);
     let states: Vec<[f32; 2]> =
         (0..120 * 120).map(|i| [node(i / 120, 1.2), node(i % 120, 1.5)]).collect();
-    let rows = query(&backend, plant, &record, &states).expect("tiers");
+    let rows = query(&backend, plant, &record, &settings, &states).expect("tiers");
     assert_eq!(rows.len(), states.len());
     let mut counts = [0; 4];
     for (x, row) in states.iter().zip(&rows) {
@@ -180,6 +180,6 @@ fn tiers_are_those_of_their_definition() {
     println!("states per tier: {counts:?}");
     assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
     // The state of the certificate has the tier that a query finds.
-    let own = query(&backend, plant, &record, &[settings.state]).expect("tier");
+    let own = query(&backend, plant, &record, &settings, &[settings.state]).expect("tier");
     assert_eq!(own[0].tier, record.state.tier);
 }

@@ -164,6 +164,6 @@ fn a_folder_that_cannot_be_written_to() {
     std::fs::write(&file, "not a folder").unwrap();
     let output =
         command(&file, &["--samples", "8,16"]).args(["--backend", "cpu"]).output().unwrap();
-    let message = message_of(&output, 2);
-    assert!(message.contains("file"), "{message}");
+    let message = message_of(&output, 1);
+    assert!(message.contains("file is in the way"), "{message}");
 }

@@ -8,7 +8,7 @@ use super::data::{self, Data};
 use crate::backend::Backend;
 use crate::cost::RaceCost;
 use crate::error::Result;
-use crate::files::{Staged, json, npy_bytes};
+use crate::files::{Staged, check_room, json, npy_bytes};
 use crate::policy::Mlp;
 use crate::rollout::{CostQuery, MppiTask, Plant, Query, ReachAvoidTask, Starts, Tightening};
 use crate::system::DroneRace;
@@ -17,6 +17,9 @@ use crate::system::DroneRace;
 const MEASURES: usize = 4096;
 /// Samples of the plan whose controls and costs are exported.
 const SAMPLES: u32 = 1024;
+
+/// Room for all files, bytes.
+const EXPORT_BYTES: u64 = 8 << 20;
 
 /// The numbers beside the arrays: `settings.json`.
 #[derive(Serialize)]
@@ -55,8 +58,9 @@ struct MppiNumbers {
 /// # Errors
 /// Those of the backend, and [`crate::Error::Write`].
 pub fn export(backend: &Backend, seed: u64, folder: &Path) -> Result<Vec<PathBuf>> {
-    let data = Data::new(seed)?;
     let mut staged = Staged::new(folder)?;
+    check_room(folder, EXPORT_BYTES)?;
+    let data = Data::new(seed)?;
     let networks = data.networks.iter().map(|(name, network)| (*name, &**network));
     let networks: Vec<_> = networks.chain([("race", &*data.policy)]).collect();
     for (name, network) in &networks {

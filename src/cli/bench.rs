@@ -13,8 +13,10 @@ use crate::bench::measure::Timing;
 use crate::bench::record::{BenchRecord, KernelRecord, ScalingRecord, WorkloadRecord};
 use crate::bench::run::{self as benchmark, Asked};
 use crate::error::Result;
-use crate::files::{Staged, json};
+use crate::files::{Staged, check_room, json};
 
+/// Room for the record, bytes.
+const RECORD_BYTES: u64 = 1 << 20;
 /// Seed unless `--seed` says otherwise.
 const SEED: u64 = 1;
 
@@ -27,10 +29,12 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     let threads = global.threads.map(usize::from);
     let asked = Asked { quick: asked.quick, filter: asked.workload.clone(), seed, threads };
     let progress = Progress::new(global);
+    // Before the work: a folder that cannot be written to would waste it.
+    let staged = global.out.as_deref().map(Staged::new).transpose()?;
+    global.out.as_deref().map_or(Ok(()), |out| check_room(out, RECORD_BYTES))?;
     let record = benchmark::run(&asked, &devices::all(global)?, &progress)?;
     progress.finish();
-    if let Some(folder) = &global.out {
-        let mut staged = Staged::new(folder)?;
+    if let Some(mut staged) = staged {
         staged.add("bench.json", json("bench.json", &record)?.as_bytes())?;
         staged.publish()?;
     }

@@ -8,15 +8,20 @@ use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::Result;
-use crate::files::{Staged, json, npy_bytes};
+use crate::files::{Staged, check_room, json, npy_bytes};
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::scenario;
 use crate::scenario::record::{DeviationRecord, Record};
+use crate::scenario::settings::Settings;
 use crate::system::System;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-out";
+/// Rollouts that a picture shows.
+const PICTURED: usize = 13;
+/// Starts that a picture shows.
+const KEPT: usize = 400;
 /// Name of the stored certificate.
 pub(super) const CERTIFICATE: &str = "certificate.json";
 /// Name of the copy of the network, which makes the folder self-contained.
@@ -59,11 +64,19 @@ impl Job for Certify<'_> {
         let progress = Progress::new(self.global);
         // Before the work: a folder that cannot be written to would waste it.
         let staged = Staged::new(self.out)?;
+        check_room(self.out, estimate(&settings))?;
         let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
         progress.check()?;
-        Ok((record, staged))
+        Ok((record.sealed()?, staged))
     }
+}
+
+/// About what the files of the folder take, bytes: a number takes some 20 characters in a text.
+fn estimate<const NX: usize>(settings: &Settings<NX>) -> u64 {
+    let [x, y] = settings.slice.each_ref().map(|axis| axis.values.len());
+    let states = PICTURED * (settings.spec.horizon as usize + 1) + KEPT;
+    (1 << 20) + 20 * (8 * x * y + 2 * NX * states) as u64
 }
 
 /// Writes all files of the folder, the certificate itself last.
@@ -71,12 +84,21 @@ fn stage(staged: &mut Staged, record: &Record, policy: &PolicySource) -> Result<
     if let PolicySource::Network { bytes, .. } = policy {
         staged.add(POLICY, bytes)?;
     }
+    for (name, bytes) in derived_files(record) {
+        staged.add(name, &bytes)?;
+    }
+    staged.add(CERTIFICATE, json(CERTIFICATE, record)?.as_bytes())
+}
+
+/// The files that say again what the record says.
+pub(super) fn derived_files(record: &Record) -> [(&'static str, Vec<u8>); 3] {
     let slice = &record.slice;
     let shape = [slice.y.values.len(), slice.x.values.len()];
-    staged.add("slice.npy", &npy_bytes(&slice.check_margin, shape))?;
-    staged.add("deviation.csv", deviation_csv(&record.deviation).as_bytes())?;
-    staged.add("report.html", crate::report::html(record).as_bytes())?;
-    staged.add(CERTIFICATE, json(CERTIFICATE, record)?.as_bytes())
+    [
+        ("slice.npy", npy_bytes(&slice.check_margin, shape)),
+        ("deviation.csv", deviation_csv(&record.deviation).into_bytes()),
+        ("report.html", crate::report::html(record).into_bytes()),
+    ]
 }
 
 /// The bounds of each step; the column `exact` is empty for a system that is not linear.

@@ -50,7 +50,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NotObtained) => 3,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = writeln!(std::io::stderr(), "error: {}", plain(&error.to_string()));
             error.exit_code()
         }
     }
@@ -83,7 +83,7 @@ fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String
     let text = match (global.json, global.quiet) {
         (true, _) => json("--json", value)?,
         (false, true) => return Ok(()),
-        (false, false) => text(),
+        (false, false) => plain(&text()),
     };
     let mut output = std::io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
@@ -93,6 +93,15 @@ fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String
         }
         _ => Ok(()),
     }
+}
+
+/// `text` for a terminal: what a name from a file could steer it with is replaced, line breaks and
+/// tabs aside.
+fn plain(text: &str) -> String {
+    let steers =
+        |c: char| c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let shown = |c: char| if steers(c) && c != '\n' && c != '\t' { '\u{fffd}' } else { c };
+    text.chars().map(shown).collect()
 }
 
 /// The folder that `path` lies in.

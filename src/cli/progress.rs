@@ -81,7 +81,7 @@ impl Watch for Progress {
             bar.finish_and_clear();
             *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden())
                 .with_style(style)
-                .with_message(stage.to_owned());
+                .with_message(super::plain(stage));
         });
     }
 

@@ -11,7 +11,7 @@ use super::{Outcome, devices, folder_of, report};
 use crate::backend::Backend;
 use crate::config::{Config, Job};
 use crate::error::Result;
-use crate::files::{MeasureWriter, StateReader};
+use crate::files::{MeasureWriter, StateReader, check_room};
 use crate::policy::Policy;
 use crate::rollout::{NON_FINITE, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
 use crate::scenario::Watch;
@@ -20,6 +20,8 @@ use crate::system::System;
 
 /// Starts that are held in memory at a time.
 const CHUNK: usize = 1 << 18;
+/// The most that a measure takes in a file, bytes.
+const MEASURE_BYTES: u64 = 16;
 /// One minus the confidence of the interval of the success rate.
 const BETA: f64 = 0.05;
 
@@ -76,6 +78,7 @@ impl Job for Rollout<'_> {
         let mut reader = StateReader::<NX>::open(self.starts, names)?;
         let backend = devices::open(self.global)?;
         let mut writer = MeasureWriter::create(self.measures)?;
+        check_room(folder_of(self.measures), MEASURE_BYTES * reader.left().unwrap_or(0))?;
         let progress = Progress::new(self.global);
         let begun = Instant::now();
         progress.begin("rollouts", reader.left().unwrap_or(0));

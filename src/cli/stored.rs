@@ -2,10 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
 use super::args::Global;
-use super::certify::{CERTIFICATE, POLICY};
+use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::config::{Config, Job, PolicySource};
@@ -13,8 +11,8 @@ use crate::error::{Error, Result};
 use crate::files::{Staged, StateReader};
 use crate::policy::Policy;
 use crate::rollout::Plant;
-use crate::scenario::record::{Record, SCHEMA};
-use crate::scenario::{self, CheckReport, QueryRow};
+use crate::scenario::record::Record;
+use crate::scenario::{self, CheckReport, Finding, QueryRow};
 use crate::system::System;
 
 /// A stored certificate with the configuration and the policy that it was made with.
@@ -22,12 +20,6 @@ struct Stored {
     record: Record,
     config: Config,
     policy: PolicySource,
-}
-
-/// The part of a certificate that says how to read the rest.
-#[derive(Deserialize)]
-struct Schema {
-    schema: u32,
 }
 
 impl Stored {
@@ -39,14 +31,7 @@ impl Stored {
         }
         let path = folder.join(CERTIFICATE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
-        let Schema { schema } = serde_json::from_str(&text)
-            .map_err(|e| Error::file(&path, format!("not a certificate ({e})")))?;
-        if schema != SCHEMA {
-            let problem = format!("schema is {schema}, this program reads {SCHEMA}");
-            return Err(Error::Refused(problem));
-        }
-        let record: Record = serde_json::from_str(&text)
-            .map_err(|e| Error::file(&path, format!("damaged certificate ({e})")))?;
+        let record = Record::read(&text).map_err(|error| at(&path, error))?;
         let config = Config::from_json(&record.provenance.config)?;
         let policy = match &config.policy.file {
             Some(_) => PolicySource::read(folder.join(POLICY))?,
@@ -56,15 +41,25 @@ impl Stored {
     }
 }
 
+/// The refusal with the file that it is about.
+fn at(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Refused(problem) => Error::Refused(format!("{}: {problem}", path.display())),
+        other => other,
+    }
+}
+
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
     let stored = Stored::read(global, folder)?;
-    let job = Ask { global, record: &stored.record, states };
+    // Before the work: a folder that cannot be written to would waste it.
+    let staged = global.out.as_deref().map(Staged::new).transpose()?;
+    let job = Ask { global, stored: &stored, states };
     let rows = stored.config.with_plant(&stored.policy, job)?;
-    match &global.out {
+    match staged {
         None => report(global, &rows, || csv(&rows))?,
-        Some(out) => {
-            let path = write(out, &rows)?;
+        Some(staged) => {
+            let path = write(staged, &rows)?;
             report(global, &rows, || counts(&rows, &path))?;
         }
     }
@@ -74,7 +69,7 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
 /// `query` for one plant.
 struct Ask<'a> {
     global: &'a Global,
-    record: &'a Record,
+    stored: &'a Stored,
     states: &'a Path,
 }
 
@@ -91,14 +86,15 @@ impl Job for Ask<'_> {
     {
         let names = plant.system.states().map(|axis| axis.name);
         let states = StateReader::<NX>::open(self.states, names)?.rest()?;
+        let Stored { record, config, .. } = self.stored;
+        let settings = config.settings(&plant.system.states())?;
         let backend = devices::open(self.global)?;
-        scenario::query(&backend, plant, self.record, &states)
+        scenario::query(&backend, plant, record, &settings, &states)
     }
 }
 
-/// Writes the rows to `query.csv` in the folder `out`.
-fn write(out: &Path, rows: &[QueryRow]) -> Result<PathBuf> {
-    let mut staged = Staged::new(out)?;
+/// Writes the rows to `query.csv`.
+fn write(mut staged: Staged, rows: &[QueryRow]) -> Result<PathBuf> {
     staged.add("query.csv", csv(rows).as_bytes())?;
     Ok(staged.publish()?.remove(0))
 }
@@ -128,9 +124,38 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
 pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
     let stored = Stored::read(global, folder)?;
     let job = Verify { global, stored: &stored };
-    let found = stored.config.with_plant(&stored.policy, job)?;
+    let mut found = stored.config.with_plant(&stored.policy, job)?;
+    // Of a record that does not hold, a page may not even be made.
+    if found.holds {
+        found.add(files(folder, &stored.record)?);
+    }
     report(global, &found, || findings(&found))?;
     Ok(if found.holds { Outcome::Done } else { Outcome::NotObtained })
+}
+
+/// Whether the files beside the certificate say what it says; one that is gone says nothing, and
+/// another version of the program may have laid them out differently.
+fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
+    let mut findings = Vec::new();
+    if record.provenance.version != env!("CARGO_PKG_VERSION") {
+        return Ok(findings);
+    }
+    for (name, bytes) in derived_files(record) {
+        let path = folder.join(name);
+        let found = match std::fs::read(&path) {
+            Ok(found) => found,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => continue,
+            Err(error) => return Err(Error::file(&path, error)),
+        };
+        let holds = found == bytes;
+        findings.push(Finding {
+            name: name.to_owned(),
+            stored: format!("as {CERTIFICATE} gives it"),
+            found: if holds { "the same" } else { "other content" }.to_owned(),
+            holds,
+        });
+    }
+    Ok(findings)
 }
 
 /// `check` for one plant.
@@ -160,7 +185,7 @@ impl Job for Verify<'_> {
 
 /// The findings, a line each, and the verdict.
 fn findings(found: &CheckReport) -> String {
-    let line = |finding: &scenario::Finding| {
+    let line = |finding: &Finding| {
         let mark = if finding.holds { "ok   " } else { "FAILS" };
         format!("{mark} {}: stored {}, found {}\n", finding.name, finding.stored, finding.found)
     };

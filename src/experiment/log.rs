@@ -6,7 +6,7 @@ use super::controller::Decision;
 use super::race::Flight;
 use crate::control::FilterStatus;
 use crate::error::Error;
-use crate::files::{Array, Data};
+use crate::files::{Array, Data, npz_sha256};
 
 /// Stands for "none" among small numbers.
 const NONE: u8 = u8::MAX;
@@ -256,6 +256,29 @@ fn numbers<'a, T>(
 ) -> Result<&'a [T], String> {
     let array = arrays.get(name).ok_or_else(|| format!("no array `{name}`"))?;
     part(&array.data).ok_or_else(|| format!("`{name}` has numbers of another type"))
+}
+
+/// The array of the digest.
+const DIGEST: &str = "sha256";
+
+/// The arrays and a digest, as hexadecimal letters, over them and `label`, which says what races
+/// they are of.
+pub(super) fn sealed(
+    mut arrays: Vec<(&'static str, Array)>,
+    label: &str,
+) -> Vec<(&'static str, Array)> {
+    let digest = npz_sha256(label, arrays.iter().map(|(name, array)| (*name, array)));
+    let digest = Array { shape: vec![digest.len()], data: Data::U8(digest.into_bytes()) };
+    arrays.push((DIGEST, digest));
+    arrays
+}
+
+/// Whether the arrays are as [`sealed`] left them, with the same label.
+pub(super) fn is_sealed(arrays: &BTreeMap<String, Array>, label: &str) -> bool {
+    let others = arrays.iter().filter(|(name, _)| *name != DIGEST);
+    let digest = npz_sha256(label, others.map(|(name, array)| (name.as_str(), array)));
+    let sealed = arrays.get(DIGEST).and_then(|array| array.data.as_u8());
+    sealed == Some(digest.as_bytes())
 }
 
 /// The refusal of a file of races.

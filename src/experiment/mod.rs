@@ -2,6 +2,7 @@
 
 mod baseline;
 pub mod controller;
+mod folder;
 mod hybrid;
 pub mod judge;
 pub mod log;

@@ -1,14 +1,15 @@
 //! A whole experiment: every controller with every noise seed, batch by batch, resumed where it
 //! stopped.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use serde::Serialize;
 
 use super::controller::{Name, World};
+use super::folder::{RACES, batch_file, claim_folder, store, stored};
 use super::judge::{Judge, safe_at_start};
-use super::log::{RaceLog, arrays, damaged, races};
+use super::log::{RaceLog, arrays};
 use super::picture::picture;
 use super::plan::Paths;
 use super::race::{STEP_SECONDS, fly, race_seed};
@@ -21,7 +22,7 @@ use super::summary::Summary;
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, npz_bytes, read_npz};
+use crate::files::Staged;
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
@@ -31,10 +32,8 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
-/// Name of the file that says which experiment a folder holds.
-const MANIFEST: &str = "experiment.json";
-/// Name of the page that every command with results writes.
-const REPORT: &str = "report.html";
+/// Room for record, page and manifest, bytes.
+const RECORD_BYTES: u64 = 2 << 20;
 
 /// What is to be raced.
 #[derive(Clone, Debug)]
@@ -84,7 +83,9 @@ impl Experiment<'_> {
         let runs = |name: &Name| !absent.iter().any(|(missing, _)| missing == name);
         let names: Vec<Name> = self.names.iter().copied().filter(runs).collect();
         self.check(&names)?;
-        self.claim_folder()?;
+        let manifest = format!("{:#}\n", self.manifest());
+        claim_folder(&self.folder, &manifest, self.need(&names))?;
+        Staged::within(&self.folder, RACES)?;
         let (mut summaries, mut timings) = (Vec::new(), Vec::new());
         for name in names {
             let mut summary = self.controller(name, watch)?;
@@ -121,6 +122,24 @@ impl Experiment<'_> {
             controller(name, World { race: &race, ..self.world }, 1, Paths::None)?;
         }
         Ok(())
+    }
+
+    /// Room that the races take which are still to be flown, with the results of all, bytes.
+    fn need(&self, names: &[Name]) -> u64 {
+        let races = self.folder.join(RACES);
+        let mut missing = 0;
+        for &name in names {
+            for &seed in &self.noise_seeds {
+                for first in (0..self.starts.len()).step_by(BATCH) {
+                    if !races.join(batch_file(name, seed, first)).exists() {
+                        missing += BATCH.min(self.starts.len() - first) as u64;
+                    }
+                }
+            }
+        }
+        let race = arrays(&[RaceLog::default()], self.world.race.steps as usize);
+        let bytes: usize = race.iter().map(|(_, array)| array.data.bytes()).sum();
+        missing * bytes as u64 + RECORD_BYTES
     }
 
     /// All races of one controller.
@@ -167,18 +186,16 @@ impl Experiment<'_> {
     ) -> Result<Vec<RaceLog>> {
         let starts = &self.starts[first..self.starts.len().min(first + BATCH)];
         let steps = world.race.steps;
-        let file = format!("{}-seed{noise_seed}-from{first}.npz", name.text());
-        let folder = self.folder.join("races");
-        let path = folder.join(&file);
+        let file = batch_file(name, noise_seed, first);
+        let path = self.folder.join(RACES).join(&file);
+        let label = format!("{file} {}", self.manifest());
         if path.exists() {
             watch.advance(starts.len() as u64 * u64::from(steps))?;
-            return stored(&path, starts, steps);
+            return stored(&path, starts, steps, &label);
         }
         let seeds = self.seeds(noise_seed, first, starts.len());
         let logs = flown(name, world, starts, &seeds, watch)?;
-        let mut staged = Staged::new(&folder)?;
-        staged.add(&file, &npz_bytes(&arrays(&logs, steps as usize))?)?;
-        staged.publish()?;
+        store(&self.folder, &file, &logs, steps, &label)?;
         Ok(logs)
     }
 
@@ -282,11 +299,6 @@ impl Experiment<'_> {
         digest::sha256([bytemuck::cast_slice(&self.starts)])
     }
 
-    /// Makes sure that the folder is of this experiment, and says so in it.
-    fn claim_folder(&self) -> Result<()> {
-        claim_folder(&self.folder, &format!("{:#}\n", self.manifest()))
-    }
-
     /// Everything that the races depend on but their controller and noise seed, the program included.
     pub(super) fn manifest(&self) -> serde_json::Value {
         let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
@@ -303,32 +315,6 @@ impl Experiment<'_> {
             "disturbance_sha256": digest(disturbance),
             "ppo_sha256": digest(ppo),
         })
-    }
-}
-
-/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and says so in
-/// it.
-pub(super) fn claim_folder(folder: &Path, manifest: &str) -> Result<()> {
-    let path = folder.join(MANIFEST);
-    match std::fs::read_to_string(&path) {
-        Ok(text) if text == manifest => Ok(()),
-        Ok(_) => {
-            let problem = "another experiment is stored here (other configuration, starts, \
-                           parameters, networks, backend or program); give another --out, or \
-                           remove this folder";
-            Err(Error::file(&path, problem))
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            if folder.join(REPORT).exists() {
-                let problem =
-                    "a report of something else is here; give another --out, or remove it";
-                return Err(Error::file(&folder.join(REPORT), problem));
-            }
-            let mut staged = Staged::new(folder)?;
-            staged.add(MANIFEST, manifest.as_bytes())?;
-            staged.publish().map(|_| ())
-        }
-        Err(error) => Err(Error::file(&path, error)),
     }
 }
 
@@ -353,22 +339,6 @@ pub(super) fn flown(
     let steps = world.race.steps;
     let flights = fly(controller.as_mut(), world.system, starts, seeds, steps, watch)?;
     Ok(flights.iter().map(RaceLog::from).collect())
-}
-
-/// The races that the file at `path` holds, if they are those from `starts` and of that length.
-fn stored(path: &Path, starts: &[[f32; 12]], steps: u32) -> Result<Vec<RaceLog>> {
-    let arrays = read_npz(path).map_err(|error| match error {
-        Error::File { problem, .. } => damaged(path, &problem),
-        other => other,
-    })?;
-    let (stored, most) = races(&arrays).map_err(|problem| damaged(path, &problem))?;
-    if most != steps as usize {
-        return Err(damaged(path, &format!("it holds races of {most} steps, not of {steps}")));
-    }
-    match stored.iter().map(|race| &race.states[0]).eq(starts) {
-        true => Ok(stored),
-        false => Err(damaged(path, "its starts are others")),
-    }
 }
 
 /// Mean of compute times; 0 without any.

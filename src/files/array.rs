@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use super::{Format, folder_of, temporary};
+use super::{Format, clear, folder_of, temporary};
 use crate::error::{Error, Result};
 
 /// First bytes of every .npy file.
@@ -117,6 +117,7 @@ impl MeasureWriter {
     /// [`Error::File`] for another ending, [`Error::Write`] if its folder is not writable.
     pub fn create(path: &Path) -> Result<Self> {
         let format = Format::of(path)?;
+        clear(folder_of(path));
         let mut file = BufWriter::new(temporary(folder_of(path))?);
         // The number of measures is known at the end only.
         let begun = match format {

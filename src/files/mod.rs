@@ -2,23 +2,27 @@
 
 mod archive;
 mod array;
+mod disk;
 mod npz;
 mod states;
 mod table;
+mod temporary;
 
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
-pub use npz::{Array, Data, npz_bytes, read_npz};
+pub use disk::check_room;
+pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
 pub use states::StateReader;
 pub use table::{Column, Table};
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use temporary::{clear, temporary};
 
 /// `value` as a JSON document that ends with its line; errors call it `name`.
 ///
@@ -39,22 +43,47 @@ pub struct Staged {
 }
 
 impl Staged {
-    /// Creates `folder` where it is missing and makes sure that it can be written to.
+    /// Creates `folder` where it is missing, makes sure that it can be written to, and removes
+    /// what killed runs left in it.
     ///
     /// # Errors
     /// [`Error::Write`] if it cannot.
     pub fn new(folder: &Path) -> Result<Self> {
+        let folder = named(folder);
         let refused = |source| Error::Write { path: folder.to_owned(), source };
         std::fs::create_dir_all(folder).map_err(refused)?;
-        temporary(folder)?;
+        clear(folder);
+        let mut trial = temporary(folder)?;
+        // A full disk may have room for a name and for nothing else.
+        trial.write_all(&[0; 4096]).and_then(|()| trial.as_file().sync_all()).map_err(refused)?;
         Ok(Self { folder: folder.to_owned(), files: Vec::new() })
+    }
+
+    /// The same for the folder `name` in `folder`.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it is a link, which may lead anywhere: results stay in `folder`.
+    pub fn within(folder: &Path, name: &str) -> Result<Self> {
+        let inner = folder.join(name);
+        if inner.is_symlink() {
+            let problem = "a link, which may lead out of the folder of the results; remove it";
+            return Err(Error::file(&inner, problem));
+        }
+        Self::new(&inner)
     }
 
     /// Writes `bytes` for the file `name`.
     ///
     /// # Errors
-    /// [`Error::Write`] with the system's reason.
+    /// [`Error::Invalid`] if `name` is a path, [`Error::Write`] with the system's reason.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let mut parts = Path::new(name).components();
+        let (Some(Component::Normal(_)), None) = (parts.next(), parts.next()) else {
+            return Err(Error::invalid(
+                name,
+                "not the name of a file in the folder of the results",
+            ));
+        };
         let path = self.folder.join(name);
         let mut file = temporary(&self.folder)?;
         let written = file.write_all(bytes).and_then(|()| file.as_file().sync_all());
@@ -72,29 +101,27 @@ impl Staged {
             Ok(_) => Ok(path),
             Err(error) => Err(Error::Write { path, source: error.error }),
         };
-        self.files.into_iter().map(rename).collect()
+        let paths = self.files.into_iter().map(rename).collect();
+        sync(&self.folder);
+        paths
     }
 }
 
-/// A temporary file in `folder` with the permissions that a new file has there.
-fn temporary(folder: &Path) -> Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".reachcast-");
-    #[cfg(unix)]
-    let builder = {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666))
-    };
-    let refused = |source| Error::Write { path: folder.to_owned(), source };
-    builder.tempfile_in(folder).map_err(refused)
+/// Makes names in `folder` outlast a power cut, where the system can.
+fn sync(folder: &Path) {
+    if cfg!(unix) {
+        _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
+    }
 }
 
 /// The folder of `path`, `.` for a bare name.
 fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
+    path.parent().map_or(Path::new("."), named)
+}
+
+/// `folder` with a name: `.` where it has none.
+fn named(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }
 
 /// Whether the name of `path` ends in `.npy` or `.csv`.

@@ -11,6 +11,7 @@ use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::archive::Archive;
 use super::array::{NpyHeader, header};
+use crate::digest::sha256;
 use crate::error::{Error, Result};
 
 /// Ending of the names in the archive.
@@ -77,6 +78,16 @@ impl Data {
     /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Size of the elements, bytes.
+    pub fn bytes(&self) -> usize {
+        let each = match self {
+            Self::U8(_) => 1,
+            Self::F32(_) | Self::U32(_) => 4,
+            Self::F64(_) | Self::U64(_) => 8,
+        };
+        each * self.len()
     }
 
     /// Type of the elements as .npy headers have it.
@@ -158,6 +169,23 @@ fn add(
         .large_file(u32::try_from(bytes.len()).is_err());
     archive.start_file(format!("{name}{ENDING}"), options)?;
     Ok(archive.write_all(&bytes)?)
+}
+
+/// SHA-256 over `label` and the arrays, in any order of their names.
+pub fn npz_sha256<'a>(
+    label: &str,
+    arrays: impl IntoIterator<Item = (&'a str, &'a Array)>,
+) -> String {
+    let arrays: BTreeMap<&str, &Array> = arrays.into_iter().collect();
+    let mut parts = vec![label.as_bytes().to_vec()];
+    for (name, array) in arrays {
+        let shape: Vec<u64> = array.shape.iter().map(|&length| length as u64).collect();
+        parts.extend([name.into(), header(array.data.descr(), &shape), array.data.to_bytes()]);
+    }
+    // Each part after its length: no two lists of parts are the same bytes.
+    let lengths: Vec<[u8; 8]> =
+        parts.iter().map(|part| (part.len() as u64).to_le_bytes()).collect();
+    sha256(lengths.iter().zip(&parts).flat_map(|(length, part)| [&length[..], part]))
 }
 
 /// The arrays of a .npz file by their names, as [`npz_bytes`] and NumPy's `savez` write them.

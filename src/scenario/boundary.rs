@@ -105,7 +105,7 @@ fn nearest<const NX: usize>(
 }
 
 /// Euclidean distance.
-fn distance<const NX: usize>(a: &[f32; NX], b: &[f32; NX]) -> f64 {
+pub(super) fn distance<const NX: usize>(a: &[f32; NX], b: &[f32; NX]) -> f64 {
     let square = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).powi(2);
     a.iter().zip(b).map(square).sum::<f64>().sqrt()
 }

@@ -1,15 +1,16 @@
 //! The certificate as a whole: constants, deviation, certified set, slice, boundary, growth.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::boundary;
 use super::ledger::{Entry, Ledger, Spend};
 use super::record::{
-    ConstantRecord, ConstantsRecord, DeviationRecord, GrowthOutcome, GrowthRecord, PictureRecord,
-    Provenance, Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
+    ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
+    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
 };
 use super::settings::Settings;
-use super::{Context, Watch, deviation, global, growth, lipschitz};
+use super::{Context, Watch, derived, deviation, global, growth, lipschitz};
 use crate::backend::{Backend, physics};
 use crate::digest;
 use crate::error::{Error, Result};
@@ -69,33 +70,16 @@ where
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, (&growth, global.band))?;
     let picture = picture(plant, settings, &growth);
-    let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
-    let mut statements: Vec<String> =
-        claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
-    statements.insert(2, share_statement(&global, settings));
-    statements.extend(growth_statement(&growth));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
-    let holds = deviation.non_finite == 0
-        && global.accepted > 0
-        && global.claim.certified_risk <= settings.deviation.epsilon
-        && growth.outcome == GrowthOutcome::Verified;
-    let mut states = plant.system.states();
-    for (axis, (low, high)) in states.iter_mut().zip(settings.low.into_iter().zip(settings.high)) {
-        (axis.low, axis.high) = (low, high);
-    }
     Ok(Record {
         schema: SCHEMA,
-        holds,
-        statements,
+        digests: BTreeMap::new(),
+        holds: derived::holds(&deviation, &global, &growth),
+        statements: derived::statements(settings, &deviation, &global, &growth),
         provenance: provenance(backend, plant, settings.seed, config),
-        system: SystemRecord {
-            name: plant.system.name().to_owned(),
-            states: states.to_vec(),
-            controls: plant.system.controls().to_vec(),
-            bodies: plant.system.bodies(),
-        },
+        system: system_record(plant.system, settings),
         horizon: settings.spec.horizon,
         gamma: f64::from(settings.spec.gamma),
         constants,
@@ -109,6 +93,26 @@ where
         picture,
         timing: Timing { wall_seconds: begun.elapsed().as_secs_f64(), threads: 0, rollouts },
     })
+}
+
+/// Names, boxes and bodies of the system, with the box of starts that `settings` ask for.
+pub(super) fn system_record<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+) -> SystemRecord
+where
+    S: System<NX, NU>,
+{
+    let mut states = system.states();
+    for (axis, (low, high)) in states.iter_mut().zip(settings.low.into_iter().zip(settings.high)) {
+        (axis.low, axis.high) = (low, high);
+    }
+    SystemRecord {
+        name: system.name().to_owned(),
+        states: states.to_vec(),
+        controls: system.controls().to_vec(),
+        bodies: system.bodies(),
+    }
 }
 
 /// Refuses settings whose claims could not be made, as far as that shows without work: scenarios
@@ -163,7 +167,7 @@ pub struct Tightened {
 }
 
 /// The Lipschitz constants, computed, sampled, and used as `settings` ask.
-fn constants<S, const NX: usize, const NU: usize>(
+pub(super) fn constants<S, const NX: usize, const NU: usize>(
     system: &S,
     settings: &Settings<NX>,
 ) -> Result<ConstantsRecord>
@@ -217,7 +221,7 @@ where
 }
 
 /// The ledger of all claims; growth books every round it may take.
-fn ledger<const NX: usize>(settings: &Settings<NX>) -> Result<Ledger> {
+pub(super) fn ledger<const NX: usize>(settings: &Settings<NX>) -> Result<Ledger> {
     let growth = &settings.growth;
     let rounds = f64::from(growth.rounds);
     let global = settings.global.beta;
@@ -242,7 +246,7 @@ fn ledger<const NX: usize>(settings: &Settings<NX>) -> Result<Ledger> {
 }
 
 /// The ledger's lines as records.
-fn spendings(ledger: &Ledger) -> Vec<Spending> {
+pub(super) fn spendings(ledger: &Ledger) -> Vec<Spending> {
     let line = |entry: &Entry| Spending {
         claim: entry.claim.clone(),
         item: match entry.purpose.as_str() {
@@ -342,35 +346,4 @@ where
         }
     });
     PictureRecord { rollouts: rollouts.collect() }
-}
-
-/// The certified share of the box in words.
-fn share_statement<const NX: usize>(
-    global: &super::record::GlobalRecord,
-    settings: &Settings<NX>,
-) -> String {
-    let [low, high] = global.share_interval;
-    format!(
-        "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
-         ({} of {} starts).",
-        settings.global.beta,
-        100.0 * low,
-        100.0 * high,
-        global.accepted,
-        global.draws
-    )
-}
-
-/// What came of the growth, where it is not a claim.
-fn growth_statement(growth: &GrowthRecord) -> Option<String> {
-    match growth.outcome {
-        GrowthOutcome::Verified => None,
-        GrowthOutcome::Exhausted => Some(format!(
-            "Local growth is exhausted: each of {} rounds had a failure, no ball is verified.",
-            growth.rounds.len()
-        )),
-        GrowthOutcome::NoBoundary => Some(
-            "No boundary of the certified set was found: there is nothing to grow from.".into(),
-        ),
-    }
 }

@@ -9,8 +9,10 @@ use super::verify::Finding;
 const TOLERANCE: f64 = 1e-3;
 /// Difference of a count beside its share of the draws that another device's rounding may make.
 const MOVED: f64 = 2.0;
-/// Fields that a second run may change: who ran it and how long it took.
-const FREE: [&str; 4] = ["timing", "provenance.backend", "provenance.device", "provenance.version"];
+/// Fields that a second run may change: who ran it and how long it took, and the digests, which are
+/// checked when a record is read.
+const FREE: [&str; 5] =
+    ["digests", "timing", "provenance.backend", "provenance.device", "provenance.version"];
 /// Fields that are measured on the device, or that put its numbers into words.
 const OF_THE_DEVICE: [&str; 5] =
     ["statements", "global.f32_error", "global.band", "global.f64_reruns", "growth.rounds"];

@@ -75,12 +75,39 @@ where
     let largest: Vec<f64> = sample.farthest.iter().map(|f| f64::from(f.distance)).collect();
     let (scenario_bound, scale, support) =
         conclude(&sample.farthest, shape.as_deref(), asked.radius);
+    let measured =
+        Measured { bound: scenario_bound, largest, scale, support, non_finite: sample.non_finite };
+    record(context.plant.system, settings, (&program, exact), measured)
+}
+
+/// What only rollouts tell.
+struct Measured {
+    /// The scenario bound of each step.
+    bound: Vec<f64>,
+    largest: Vec<f64>,
+    scale: Option<f64>,
+    support: u64,
+    non_finite: u64,
+}
+
+/// The record, with what follows from the settings.
+fn record<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    (program, exact): (&Program, Option<Vec<f64>>),
+    measured: Measured,
+) -> Result<DeviationRecord>
+where
+    S: System<NX, NU>,
+{
+    let asked = &settings.deviation;
+    let Measured { bound, largest, scale, support, non_finite } = measured;
     let bound = match (asked.source, &exact) {
         (DeviationSource::Exact, Some(exact)) => exact.clone(),
-        _ => scenario_bound,
+        _ => bound,
     };
     Ok(DeviationRecord {
-        claim: claim(context.plant.system, settings, &program)?,
+        claim: claim(system, settings, program)?,
         // As it was written: 0.1, not 0.10000000149.
         radius: asked.radius.to_string().parse().unwrap_or(f64::from(asked.radius)),
         control: asked.control,
@@ -89,12 +116,29 @@ where
         bound,
         largest,
         exact,
-        pilot: pilot.unwrap_or(0),
+        pilot: if asked.joint == Joint::FixedShape { asked.pilot } else { 0 },
         scale,
         support,
         posterior_risk: wait_and_judge(asked.scenarios, support, program.beta),
-        non_finite: sample.non_finite,
+        non_finite,
     })
+}
+
+/// What `stored` says as its own numbers and `settings` give it.
+pub(super) fn derived<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    stored: &DeviationRecord,
+) -> Result<DeviationRecord>
+where
+    S: System<NX, NU>,
+{
+    let program = check_scenarios(&settings.deviation, settings.spec.horizon)?;
+    let exact = exact(system, settings)?;
+    let DeviationRecord { scale, support, non_finite, .. } = *stored;
+    let (bound, largest) = (stored.bound.clone(), stored.largest.clone());
+    let measured = Measured { bound, largest, scale, support, non_finite };
+    record(system, settings, (&program, exact), measured)
 }
 
 /// The program of the bound; refuses fewer pairs than it needs.

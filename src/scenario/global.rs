@@ -125,8 +125,6 @@ where
 {
     let draws = settings.global.draws;
     let region = Region::new_box(settings.low, settings.high)?;
-    let box_volume = region.volume();
-    let (dimension, frozen) = super::certify::coordinates(context.plant.system, &region.varies());
     let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
@@ -141,12 +139,43 @@ where
     };
     context.watch.begin("certified set", draws);
     let f32_error = f32_error(context, &task)?;
-    let mut count = Count::new(band_of(f32_error));
+    let mut count = Count { band: band_of(f32_error), ..Count::default() };
     context.backend.deviation(context.plant, &task, &mut |first, pairs| {
         count.add(context.plant, &task, first, pairs);
         context.watch.advance(pairs.len() as u64)
     })?;
-    let beta = settings.global.beta;
+    conclude(context.plant.system, settings, &count, f32_error)
+}
+
+/// What `stored` says as its own counts and `settings` give it.
+pub(super) fn derived<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    stored: &GlobalRecord,
+) -> Result<GlobalRecord>
+where
+    S: System<NX, NU>,
+{
+    let GlobalRecord { accepted, reached, non_finite, f32_error, f64_reruns, .. } = *stored;
+    let (band, failures) = (band_of(f32_error), stored.claim.failures);
+    let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
+    conclude(system, settings, &count, f32_error)
+}
+
+/// Claim and intervals that the counts support.
+fn conclude<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    count: &Count,
+    f32_error: f64,
+) -> Result<GlobalRecord>
+where
+    S: System<NX, NU>,
+{
+    let region = Region::new_box(settings.low, settings.high)?;
+    let box_volume = region.volume();
+    let (dimension, frozen) = super::certify::coordinates(system, &region.varies());
+    let (draws, beta) = (settings.global.draws, settings.global.beta);
     let (low, high) = interval(count.accepted, draws, beta);
     let risk = certified_risk(count.accepted, count.failures, beta);
     let claim = Claim {
@@ -191,6 +220,7 @@ where
 }
 
 /// Counts over the pairs.
+#[derive(Default)]
 struct Count {
     band: f64,
     accepted: u64,
@@ -201,10 +231,6 @@ struct Count {
 }
 
 impl Count {
-    fn new(band: f64) -> Self {
-        Self { band, accepted: 0, failures: 0, reached: 0, non_finite: 0, f64_reruns: 0 }
-    }
-
     /// Adds the pairs `first..`; a measure within the band is run again in f64.
     fn add<S, P, const NX: usize, const NU: usize>(
         &mut self,

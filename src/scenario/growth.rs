@@ -1,7 +1,7 @@
 //! Local growth, Algorithm 1: the largest ball around a boundary point that passes clean.
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
-use super::boundary::Boundary;
+use super::boundary::{self, Boundary};
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord};
 use super::settings::{GrowthSettings, Settings};
 use super::{Context, certify};
@@ -167,6 +167,71 @@ where
     Ok(Round { record, samples })
 }
 
+/// What `stored` says as its own failures and `settings` give it.
+pub(super) fn derived<S, const NX: usize, const NU: usize>(
+    system: &S,
+    settings: &Settings<NX>,
+    stored: &GrowthRecord,
+) -> Result<GrowthRecord>
+where
+    S: System<NX, NU>,
+{
+    let asked = &settings.growth;
+    let mut record = GrowthRecord {
+        center: stored.center.clone(),
+        rounds: stored.rounds.clone(),
+        samples: stored.samples.clone(),
+        ..nothing(asked)
+    };
+    let center = stored.center.as_ref().and_then(|x| <[f32; NX]>::try_from(x.as_slice()).ok());
+    let Some(center) = center else { return Ok(record) };
+    record.distance = Some(boundary::distance(&center, &settings.state));
+    record.outcome = GrowthOutcome::Exhausted;
+    let mut ball = Ball { center, radius: asked.radius, varies: asked.varies };
+    for (number, round) in (0..).zip(&mut record.rounds) {
+        (round.radius, round.scenarios) = (f64::from(ball.radius), asked.scenarios);
+        let next = round.nearest_failure.and_then(|far| next_radius(asked, number, far));
+        ball.radius = next.unwrap_or(ball.radius);
+    }
+    if record.rounds.last().is_some_and(|round| round.failures == 0) {
+        verified(&mut record, system, settings, ball)?;
+    }
+    Ok(record)
+}
+
+/// The record of a growth that had nothing to grow from.
+fn nothing<const NX: usize>(asked: &GrowthSettings<NX>) -> GrowthRecord {
+    GrowthRecord {
+        outcome: GrowthOutcome::NoBoundary,
+        boundary: asked.boundary,
+        center: None,
+        distance: None,
+        radius: 0.0,
+        volume: 0.0,
+        varies: asked.varies.to_vec(),
+        rounds: Vec::new(),
+        claim: None,
+        samples: Vec::new(),
+    }
+}
+
+/// Enters a ball that passed clean.
+fn verified<S, const NX: usize, const NU: usize>(
+    record: &mut GrowthRecord,
+    system: &S,
+    settings: &Settings<NX>,
+    ball: Ball<NX>,
+) -> Result<()>
+where
+    S: System<NX, NU>,
+{
+    record.outcome = GrowthOutcome::Verified;
+    record.radius = f64::from(ball.radius);
+    record.claim = Some(claim(system, settings, &ball)?);
+    record.volume = Region::Ball(ball).volume();
+    Ok(())
+}
+
 /// The growth as a record: boundary search, rounds, outcome and claim.
 pub(super) fn record<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
@@ -180,18 +245,7 @@ where
 {
     let asked = &settings.growth;
     check_scenarios(asked)?;
-    let mut record = GrowthRecord {
-        outcome: GrowthOutcome::NoBoundary,
-        boundary: asked.boundary,
-        center: None,
-        distance: None,
-        radius: 0.0,
-        volume: 0.0,
-        varies: asked.varies.to_vec(),
-        rounds: Vec::new(),
-        claim: None,
-        samples: Vec::new(),
-    };
+    let mut record = nothing(asked);
     let Some(boundary) = boundary else {
         return Ok(record);
     };
@@ -202,10 +256,7 @@ where
     record.samples = samples;
     record.outcome = GrowthOutcome::Exhausted;
     if let Growth::Verified(ball) = growth {
-        record.outcome = GrowthOutcome::Verified;
-        record.radius = f64::from(ball.radius);
-        record.volume = Region::Ball(ball.clone()).volume();
-        record.claim = Some(claim(context.plant.system, settings, &ball)?);
+        verified(&mut record, context.plant.system, settings, ball)?;
     }
     Ok(record)
 }

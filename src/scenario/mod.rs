@@ -4,6 +4,7 @@ pub mod bound;
 pub mod boundary;
 mod certify;
 mod compare;
+mod derived;
 pub mod deviation;
 pub mod global;
 pub mod growth;
@@ -13,6 +14,7 @@ pub mod linear;
 pub mod lipschitz;
 pub mod record;
 pub mod settings;
+mod stored;
 pub(crate) mod tail;
 mod verify;
 

@@ -1,5 +1,7 @@
 //! What a certificate prints and stores: plain records, written as `certificate.json`.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::settings::{BoundarySearch, DeviationSource, Joint};
@@ -15,6 +17,9 @@ pub const SCHEMA: u32 = 1;
 pub struct Record {
     /// [`SCHEMA`].
     pub schema: u32,
+    /// SHA-256 of every other field by its path, as in `global.claim.epsilon`; none before the
+    /// record is stored.
+    pub digests: BTreeMap<String, String>,
     /// Whether every claim that was asked for was obtained.
     pub holds: bool,
     /// The claims in words, one sentence or two each.

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::bound::lower_bound;
-use super::certify::{certify, hashes, tightening};
+use super::certify::{certify, hashes, provenance, tightening};
+use super::derived::derived;
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
 use super::settings::Settings;
 use super::{Context, Unwatched, Watch, compare, global};
@@ -11,7 +12,7 @@ use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::policy::Policy;
 use crate::rollout::{
-    Ball, Plant, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening,
+    Ball, Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening,
 };
 use crate::system::System;
 
@@ -57,6 +58,19 @@ pub struct CheckReport {
     pub findings: Vec<Finding>,
 }
 
+impl CheckReport {
+    /// The report of these findings.
+    fn new(findings: Vec<Finding>) -> Self {
+        Self { holds: findings.iter().all(|finding| finding.holds), findings }
+    }
+
+    /// Adds what was found beside.
+    pub fn add(&mut self, findings: Vec<Finding>) {
+        self.holds &= findings.iter().all(|finding| finding.holds);
+        self.findings.extend(findings);
+    }
+}
+
 /// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
 pub(super) fn tier<const NX: usize>(
     target_margin: f64,
@@ -93,15 +107,21 @@ where
     P: Policy<NX, NU>,
 {
     let refuse = |field: &str, stored: &str, found: &str| {
-        Err(Error::Refused(format!("{field} is {stored} in the record, {found} here")))
+        Err(Error::Refused(format!(
+            "{field} is {stored} in the record, {found} here; certify again"
+        )))
     };
     let (physics, policy) = hashes(plant);
     let stored = &record.provenance;
     if record.schema != SCHEMA {
         return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());
     }
-    if record.system.states.len() != NX || record.system.name != plant.system.name() {
+    if record.system.name != plant.system.name() {
         return refuse("system.name", &record.system.name, plant.system.name());
+    }
+    if record.system.states.len() != NX {
+        let found = record.system.states.len().to_string();
+        return refuse("system.states length", &found, &NX.to_string());
     }
     if stored.physics_sha256 != physics {
         return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
@@ -111,19 +131,43 @@ where
     }
     if record.deviation.bound.len() != record.horizon as usize + 1 {
         let found = record.deviation.bound.len().to_string();
-        return refuse("deviation.bound length", &found, &(record.horizon + 1).to_string());
+        let expected = format!("{} by its horizon", record.horizon + 1);
+        return refuse("deviation.bound length", &found, &expected);
     }
     Ok(())
+}
+
+/// Refuses a record of which some field does not follow from its settings and its own counts.
+fn check_derived<S, P, const NX: usize, const NU: usize>(
+    backend: &Backend,
+    plant: Plant<'_, S, P>,
+    record: &Record,
+    settings: &Settings<NX>,
+) -> Result<()>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let mut again = derived(plant, settings, record)?;
+    let here = provenance(backend, plant, settings.seed, record.provenance.config.clone());
+    again.provenance = here;
+    let finding = compare::fields(record, &again);
+    if finding.holds {
+        return Ok(());
+    }
+    Err(Error::Refused(format!("{}; certify again", finding.found)))
 }
 
 /// Tier and `V_check` of each of `states` against a stored certificate.
 ///
 /// # Errors
-/// [`Error::Refused`] if the record is of another plant; those of the backend.
+/// [`Error::Refused`] if the record is of another plant, or if a field does not follow from its
+/// settings and its own counts; those of the backend.
 pub fn query<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
     plant: Plant<'_, S, P>,
     record: &Record,
+    settings: &Settings<NX>,
     states: &[[f32; NX]],
 ) -> Result<Vec<QueryRow>>
 where
@@ -131,7 +175,8 @@ where
     P: Policy<NX, NU>,
 {
     check_identity(plant, record)?;
-    let spec = RolloutSpec::new(record.horizon, record.gamma as f32)?;
+    check_derived(backend, plant, record, settings)?;
+    let spec = settings.spec;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
     let context = Context { backend, plant, watch: &Unwatched };
     let margins = global::check_margins(
@@ -190,7 +235,7 @@ where
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
         findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
     }
-    Ok(CheckReport { holds: findings.iter().all(|finding| finding.holds), findings })
+    Ok(CheckReport::new(findings))
 }
 
 /// Compares the stored record with the one computed again from its seed.

@@ -1,6 +1,8 @@
 //! Records for the tests of the report: realistic numbers from closed formulas, no certificate run.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+use std::collections::BTreeMap;
+
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::rollout::{PairControl, reach_avoid};
@@ -129,6 +131,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
         };
         Record {
             schema: SCHEMA,
+            digests: BTreeMap::new(),
             holds: true,
             statements: statements(self.radius),
             provenance: provenance(policy),

@@ -3,14 +3,32 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
+
 use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
+use crate::digest;
 use crate::error::{Error, Result};
-use crate::experiment::run::claim_folder;
+use crate::experiment::folder::claim_folder;
 use crate::files::{Staged, json};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);
+/// Folder of the points.
+const POINTS: &str = "points";
+/// Room for a point in its file, the tables, the record and the page, bytes.
+const POINT_BYTES: u64 = 16 << 10;
+/// Room for what does not grow with the points, bytes.
+const PAGE_BYTES: u64 = 1 << 20;
+
+/// A point as its file holds it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredPoint {
+    /// SHA-256 over the point as JSON.
+    content_sha256: String,
+    point: PointRecord,
+}
 
 /// A sweep whose points are stored as they come.
 #[derive(Debug)]
@@ -32,7 +50,9 @@ impl Store {
     pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
         let axes: Vec<&str> = record.axes.iter().map(|axis| axis.name.as_str()).collect();
         let manifest = serde_json::json!({ "axes": axes, "shared": identity });
-        claim_folder(folder, &format!("{manifest:#}\n"))?;
+        let need = record.total * POINT_BYTES + PAGE_BYTES;
+        claim_folder(folder, &format!("{manifest:#}\n"), need)?;
+        Staged::within(folder, POINTS)?;
         let folder = folder.to_owned();
         Ok(Self { folder, record, written: None })
     }
@@ -49,7 +69,7 @@ impl Store {
         compute: impl FnOnce() -> Result<PointResult>,
     ) -> Result<()> {
         let file = format!("{sha256}.json");
-        let path = self.folder.join("points").join(&file);
+        let path = self.folder.join(POINTS).join(&file);
         let found = stored(&path, &sha256)?;
         let is_new = found.is_none();
         let result = match found.map_or_else(compute, Ok) {
@@ -64,8 +84,9 @@ impl Store {
             return Ok(());
         }
         let point = self.record.points.last().expect("one was added");
-        let mut staged = Staged::new(&self.folder.join("points"))?;
-        staged.add(&file, json(&file, point)?.as_bytes())?;
+        let stored = StoredPoint { content_sha256: digest_of(point)?, point: point.clone() };
+        let mut staged = Staged::within(&self.folder, POINTS)?;
+        staged.add(&file, json(&file, &stored)?.as_bytes())?;
         staged.publish()?;
         match self.written.is_some_and(|written| written.elapsed() < TABLE_PERIOD) {
             true => Ok(()),
@@ -113,9 +134,18 @@ fn stored(path: &Path, sha256: &str) -> Result<Option<PointResult>> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(damaged(&error)),
     };
-    let point: PointRecord = serde_json::from_str(&text).map_err(|error| damaged(&error))?;
-    match point.sha256 == sha256 {
-        true => Ok(Some(point.result)),
-        false => Err(damaged(&"it is of another point")),
+    let StoredPoint { content_sha256, point } =
+        serde_json::from_str(&text).map_err(|error| damaged(&error))?;
+    if point.sha256 != sha256 {
+        return Err(damaged(&"it is of another point"));
     }
+    match digest_of(&point)? == content_sha256 {
+        true => Ok(Some(point.result)),
+        false => Err(damaged(&"it was edited after it was stored")),
+    }
+}
+
+/// SHA-256 of a point.
+fn digest_of(point: &PointRecord) -> Result<String> {
+    Ok(digest::sha256([json("point", point)?.as_bytes()]))
 }

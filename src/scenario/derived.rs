@@ -1,0 +1,128 @@
+//! What of a record follows from its settings and its own counts, without a rollout.
+
+use super::certify::{constants, hashes, ledger, spendings, system_record};
+use super::record::{
+    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, Record, SliceAxisRecord,
+};
+use super::settings::Settings;
+use super::{deviation, global, growth, verify};
+use crate::error::Result;
+use crate::policy::Policy;
+use crate::rollout::{GENERATOR, Plant};
+use crate::system::System;
+
+/// `stored` with everything that follows from `settings` and its own counts computed again: claims,
+/// intervals, constants, the ledger, margins of the states, words. What rollouts came to is taken
+/// from `stored` as it is.
+///
+/// # Errors
+/// Settings whose claims could not be made.
+pub(super) fn derived<S, P, const NX: usize, const NU: usize>(
+    plant: Plant<'_, S, P>,
+    settings: &Settings<NX>,
+    stored: &Record,
+) -> Result<Record>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let system = plant.system;
+    let mut record = stored.clone();
+    record.horizon = settings.spec.horizon;
+    record.gamma = f64::from(settings.spec.gamma);
+    record.provenance.seed = settings.seed;
+    record.provenance.generator = GENERATOR.to_owned();
+    record.provenance.policy = plant.policy.name();
+    (record.provenance.physics_sha256, record.provenance.policy_sha256) = hashes(plant);
+    record.system = system_record(system, settings);
+    record.constants = constants(system, settings)?;
+    record.deviation = deviation::derived(system, settings, &stored.deviation)?;
+    record.global = global::derived(system, settings, &stored.global)?;
+    record.growth = growth::derived(system, settings, &stored.growth)?;
+    let ledger = ledger(settings)?;
+    (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
+    margins(&mut record, system, settings);
+    record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    record.holds = holds(&record.deviation, &record.global, &record.growth);
+    Ok(record)
+}
+
+/// The states of the record, their margins of target and constraint, and the tier.
+fn margins<S, const NX: usize, const NU: usize>(
+    record: &mut Record,
+    system: &S,
+    settings: &Settings<NX>,
+) where
+    S: System<NX, NU>,
+{
+    let x = settings.state;
+    let state = &mut record.state;
+    state.x = x.to_vec();
+    state.target_margin = f64::from(system.target(x));
+    state.constraint_margin = f64::from(system.constraint(x));
+    state.tier = verify::tier(state.target_margin, state.check_margin, &record.growth, &x);
+    let axis = |i: usize| SliceAxisRecord {
+        state: settings.slice[i].state,
+        values: settings.slice[i].values.clone(),
+    };
+    let cells = global::slice_through(settings, &x);
+    let slice = &mut record.slice;
+    (slice.x, slice.y) = (axis(0), axis(1));
+    slice.target_margin = cells.iter().map(|x| system.target(*x)).collect();
+    slice.constraint_margin = cells.iter().map(|x| system.constraint(*x)).collect();
+}
+
+/// Whether every claim that is asked for was obtained.
+pub(super) fn holds(
+    deviation: &DeviationRecord,
+    global: &GlobalRecord,
+    growth: &GrowthRecord,
+) -> bool {
+    deviation.non_finite == 0
+        && global.accepted > 0
+        && global.claim.certified_risk <= deviation.claim.epsilon
+        && growth.outcome == GrowthOutcome::Verified
+}
+
+/// The claims in words.
+pub(super) fn statements<const NX: usize>(
+    settings: &Settings<NX>,
+    deviation: &DeviationRecord,
+    global: &GlobalRecord,
+    growth: &GrowthRecord,
+) -> Vec<String> {
+    let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
+    let mut statements: Vec<String> =
+        claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
+    statements.insert(2, share_statement(global, settings));
+    statements.extend(growth_statement(growth));
+    statements
+}
+
+/// The certified share of the box in words.
+fn share_statement<const NX: usize>(global: &GlobalRecord, settings: &Settings<NX>) -> String {
+    let [low, high] = global.share_interval;
+    format!(
+        "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
+         ({} of {} starts).",
+        settings.global.beta,
+        100.0 * low,
+        100.0 * high,
+        global.accepted,
+        global.draws
+    )
+}
+
+/// What came of the growth, where it is not a claim.
+fn growth_statement(growth: &GrowthRecord) -> Option<String> {
+    match growth.outcome {
+        GrowthOutcome::Verified => None,
+        GrowthOutcome::Exhausted => Some(format!(
+            "Local growth is exhausted: each of {} rounds had a failure, no ball is verified.",
+            growth.rounds.len()
+        )),
+        GrowthOutcome::NoBoundary => Some(
+            "No boundary of the certified set was found: there is nothing to grow from.".into(),
+        ),
+    }
+}
