@@ -21,7 +21,7 @@ use super::summary::Summary;
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, npz_bytes, read_npz};
+use crate::files::{Staged, claim_folder, npz_bytes, read_npz};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
@@ -31,10 +31,6 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
-/// Name of the file that says which experiment a folder holds.
-const MANIFEST: &str = "experiment.json";
-/// Name of the page that every command with results writes.
-const REPORT: &str = "report.html";
 
 /// What is to be raced.
 #[derive(Clone, Debug)]
@@ -303,32 +299,6 @@ impl Experiment<'_> {
             "disturbance_sha256": digest(disturbance),
             "ppo_sha256": digest(ppo),
         })
-    }
-}
-
-/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and says so in
-/// it.
-pub(super) fn claim_folder(folder: &Path, manifest: &str) -> Result<()> {
-    let path = folder.join(MANIFEST);
-    match std::fs::read_to_string(&path) {
-        Ok(text) if text == manifest => Ok(()),
-        Ok(_) => {
-            let problem = "another experiment is stored here (other configuration, starts, \
-                           parameters, networks, backend or program); give another --out, or \
-                           remove this folder";
-            Err(Error::file(&path, problem))
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            if folder.join(REPORT).exists() {
-                let problem =
-                    "a report of something else is here; give another --out, or remove it";
-                return Err(Error::file(&folder.join(REPORT), problem));
-            }
-            let mut staged = Staged::new(folder)?;
-            staged.add(MANIFEST, manifest.as_bytes())?;
-            staged.publish().map(|_| ())
-        }
-        Err(error) => Err(Error::file(&path, error)),
     }
 }
 

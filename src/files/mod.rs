@@ -2,12 +2,14 @@
 
 mod archive;
 mod array;
+mod claim;
 mod npz;
 mod states;
 mod table;
 
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
+pub(crate) use claim::claim_folder;
 pub use npz::{Array, Data, npz_bytes, read_npz};
 pub use states::StateReader;
 pub use table::{Column, Table};

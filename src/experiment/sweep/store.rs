@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
 use crate::error::{Error, Result};
-use crate::experiment::run::claim_folder;
-use crate::files::{Staged, json};
+use crate::files::{Staged, claim_folder, json};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);
