@@ -5,6 +5,8 @@ pub mod adam;
 pub mod analytic;
 pub mod checkpoint;
 #[cfg(feature = "train")]
+pub mod layer;
+#[cfg(feature = "train")]
 pub mod network;
 #[cfg(feature = "train")]
 pub mod physics;
