@@ -76,7 +76,9 @@ pub enum Error {
     #[error("stored certificate refused: {0}")]
     Refused(String),
     /// Stopped by Ctrl-C or a termination signal; nothing half-written is left.
-    #[error("interrupted; no result was written (batches of `race` that are done are kept)")]
+    #[error(
+        "interrupted; no result was written (what `race`, `sweep` and `train` have done is kept)"
+    )]
     Interrupted,
 }
 

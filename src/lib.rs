@@ -22,5 +22,6 @@ pub mod report;
 pub mod rollout;
 pub mod scenario;
 pub mod system;
+pub mod train;
 
 pub use error::{Error, Result};

@@ -418,7 +418,7 @@ fn fused_activations_take_the_workgroup_memory_that_is_planned() {
 }
 
 /// Layer of each top-level module; a file may name its own layer and those above it.
-const LAYERS: [(&str, u32); 18] = [
+const LAYERS: [(&str, u32); 19] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -432,6 +432,7 @@ const LAYERS: [(&str, u32); 18] = [
     ("control", 5),
     ("experiment", 7),
     ("bench", 7),
+    ("train", 7),
     ("report", 8),
     ("cli", 9),
     ("config", 9),

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::sweep::SweepArguments;
 use crate::config::{Overrides, Profile};
 use crate::policy::{Activation, OutputActivation};
+use crate::train::settings::Method;
 
 /// Batch rollouts and the probabilistic reach-avoid certificates that they support.
 #[derive(Debug, Parser)]
@@ -28,6 +29,7 @@ Examples:
   reachcast check reachcast-out
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
+  reachcast train configs/train/race.toml
   reachcast policy import actor.pth --out policy.safetensors
   reachcast scenarios --epsilon 0.1 --beta 1e-3
   reachcast bench --quick
@@ -186,6 +188,27 @@ Examples:
   reachcast sweep configs/race.toml --of certificate --epsilon 0.05,0.1,0.2 --radius 0.02,0.05,0.1
   reachcast sweep configs/race.toml --of certificate --bound fixed-shape,variables,exact")]
     Sweep(Box<SweepArguments>),
+    /// Train a policy, or a network that tells its value
+    ///
+    /// Writes policy.safetensors (or value.safetensors, or action_value.safetensors), train.json,
+    /// curve.csv and report.html to the folder of --out (default: reachcast-train). Stopped half-way,
+    /// the same command goes on where it was; the network is the same. Needs a program that was built
+    /// with `--features train`.
+    #[command(after_help = "\
+Rollouts, scores and networks are functions of the configuration and the seed, on any number of
+threads. Everything in the section [train] of the configuration can be set.
+
+Examples:
+  reachcast train configs/train/race.toml
+  reachcast train configs/train/race.toml --seed 2 --set train.analytic.iterations=1500 --out quick
+  reachcast train configs/race.toml --method value --out value")]
+    Train {
+        /// Configuration (TOML)
+        config: PathBuf,
+        /// What is trained, and how, instead of the configuration's
+        #[arg(long, value_enum)]
+        method: Option<Method>,
+    },
     /// Import a policy from PyTorch or ONNX, or tell what is in a policy file
     #[command(subcommand)]
     Policy(PolicyCommand),

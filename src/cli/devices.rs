@@ -48,7 +48,7 @@ pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
 }
 
 /// The CPU with the threads asked for.
-fn cpu(global: &Global) -> Result<Backend> {
+pub(super) fn cpu(global: &Global) -> Result<Backend> {
     Cpu::new(global.threads.map(usize::from)).map(Backend::Cpu)
 }
 

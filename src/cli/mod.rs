@@ -13,6 +13,7 @@ mod scenarios;
 mod stored;
 mod summary;
 mod sweep;
+mod train;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -68,6 +69,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Check { folder } => stored::check(global, folder),
         Command::Race(asked) => race::run(global, asked),
         Command::Sweep(asked) => sweep::run(global, asked),
+        Command::Train { config, method } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
         Command::Policy(PolicyCommand::Inspect { file, config }) => {
             policy::inspect(global, file, config.as_deref())

@@ -8,9 +8,10 @@ mod section;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod train;
 mod value;
 
-pub use plant::{Job, PolicySource};
+pub use plant::{Job, PolicySource, SystemJob};
 pub use section::{
     BoxSection, Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection,
     PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection, StateSection,
@@ -42,7 +43,7 @@ impl Config {
     /// # Errors
     /// [`Error::File`] if the file is missing or no TOML, [`Error::Invalid`] naming the key that
     /// is unknown, with the nearest valid one, or that has a value of the wrong kind, or in the
-    /// section `race` a number that is not finite.
+    /// sections `race` and `train` a number that is not finite.
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
@@ -64,29 +65,42 @@ impl Config {
         if let Some(profile) = overrides.profile {
             given.insert("profile".to_owned(), profile.name().into());
         }
+        let trains = given.contains_key("train");
         let mut merged = defaults(&given, origin)?;
         let valid = keys::with_optional(&merged);
         for (origin, layer) in &layers {
             keys::check_known(&valid, layer, origin)?;
         }
         keys::overlay(&mut merged, given);
-        merged.get("race").map_or(Ok(()), |race| keys::check_finite("race", race))?;
+        for section in ["race", "train"] {
+            merged.get(section).map_or(Ok(()), |keys| keys::check_finite(section, keys))?;
+        }
         // Without a source text, the message ends with a line that names the key.
         let wrong_kind = |e: toml::de::Error| {
             Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
         };
         let mut config: Self = merged.try_into().map_err(wrong_kind)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
-        config.policy.check()?;
+        // What is about to be trained is not there yet.
+        config.policy.check(trains)?;
         Ok(config)
     }
 
-    /// The configuration as a certificate stores it, every default filled in.
+    /// The configuration as a certificate or a race stores it, every default filled in, without the
+    /// section `train`, which they do not depend on.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_json(&self) -> Result<serde_json::Value> {
-        serde_json::to_value(self).map_err(|e| Error::invalid("configuration", e.to_string()))
+        stored(&Self { train: None, ..self.clone() })
+    }
+
+    /// The configuration as training stores it, every default filled in, without the section `race`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a value has no JSON form.
+    pub fn to_train_json(&self) -> Result<serde_json::Value> {
+        stored(&Self { race: None, ..self.clone() })
     }
 
     /// The configuration that a certificate stores.
@@ -96,9 +110,14 @@ impl Config {
     pub fn from_json(value: &serde_json::Value) -> Result<Self> {
         let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("provenance.config: {e}"));
         let config = Self::deserialize(value).map_err(|e| refused(&e))?;
-        config.policy.check().map_err(|e| refused(&e))?;
+        config.policy.check(config.train.is_some()).map_err(|e| refused(&e))?;
         Ok(config)
     }
+}
+
+/// A configuration as JSON.
+fn stored(config: &Config) -> Result<serde_json::Value> {
+    serde_json::to_value(config).map_err(|e| Error::invalid("configuration", e.to_string()))
 }
 
 /// The defaults of the profile and the system that the table `given` names.

@@ -27,6 +27,20 @@ pub trait Job {
         P: Policy<NX, NU>;
 }
 
+/// Work on any system.
+pub trait SystemJob {
+    /// What comes of it.
+    type Output;
+
+    /// Does the work.
+    ///
+    /// # Errors
+    /// Those of the work.
+    fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Self::Output>
+    where
+        S: System<NX, NU>;
+}
+
 /// The policy that a configuration names: a formula, or a network and the bytes of its file.
 #[derive(Clone, Debug)]
 pub enum PolicySource {
@@ -74,51 +88,45 @@ impl Config {
     /// [`Error::Invalid`] for a parameter out of range or a formula that the system does not
     /// have, [`Error::File`] for a network of the wrong shape, and those of the job.
     pub fn with_plant<J: Job>(&self, policy: &PolicySource, job: J) -> Result<J::Output> {
-        let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
-        match self.system {
-            SystemSection::DroneRace { .. } => {
-                let (system, policy) = self.race_plant(policy)?;
+        match (self.any_system()?, policy) {
+            (AnySystem::DroneRace(system), PolicySource::Formula(name)) => {
+                Err(no_formula(&system, name, "none"))
+            }
+            (AnySystem::DoubleIntegrator(system), PolicySource::Formula(name)) => {
+                if name != "bang-bang" {
+                    return Err(no_formula(&system, name, "bang-bang"));
+                }
+                let policy = &BangBang { acceleration: system.acceleration };
                 job.run(Plant { system: &system, policy })
             }
-            SystemSection::DoubleIntegrator { target, corridor, acceleration } => {
-                let system = DoubleIntegrator {
-                    target: number("target", target)?,
-                    corridor: number("corridor", corridor)?,
-                    acceleration: number("acceleration", acceleration)?,
-                };
-                match policy {
-                    PolicySource::Formula(name) if name == "bang-bang" => {
-                        let acceleration = system.acceleration;
-                        let policy = &BangBang { acceleration };
-                        job.run(Plant { system: &system, policy })
-                    }
-                    PolicySource::Formula(name) => Err(no_formula(&system, name, "bang-bang")),
-                    PolicySource::Network { path, network, .. } => {
-                        with_network(&system, path, network, job)
-                    }
-                }
+            (AnySystem::DroneRace(system), PolicySource::Network { path, network, .. }) => {
+                with_network(&system, path, network, job)
+            }
+            (AnySystem::DoubleIntegrator(system), PolicySource::Network { path, network, .. }) => {
+                with_network(&system, path, network, job)
             }
         }
     }
-}
 
-impl Config {
+    /// Builds the system and runs `job` on it.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a parameter out of range, and those of the job.
+    pub fn with_system<J: SystemJob>(&self, job: J) -> Result<J::Output> {
+        match self.any_system()? {
+            AnySystem::DroneRace(system) => job.run(&system),
+            AnySystem::DoubleIntegrator(system) => job.run(&system),
+        }
+    }
+
     /// The drone race and its policy, a network.
     ///
     /// # Errors
     /// [`Error::Invalid`] for another system, a formula or a parameter out of range,
     /// [`Error::File`] for a network of the wrong shape.
     pub fn race_plant<'a>(&self, policy: &'a PolicySource) -> Result<(DroneRace, &'a Mlp)> {
-        let SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } = self.system
-        else {
+        let AnySystem::DroneRace(system) = self.any_system()? else {
             return Err(Error::invalid("system.name", "only `drone-race` has races"));
-        };
-        let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
-        let system = DroneRace {
-            ego_gain: number("ego_gain", ego_gain)?,
-            opponent_gain: number("opponent_gain", opponent_gain)?,
-            cone,
-            speed_limit,
         };
         match policy {
             PolicySource::Formula(name) => Err(no_formula(&system, name, "none")),
@@ -128,6 +136,34 @@ impl Config {
             }
         }
     }
+
+    /// The system, its parameters checked.
+    fn any_system(&self) -> Result<AnySystem> {
+        let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
+        Ok(match self.system {
+            SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } => {
+                AnySystem::DroneRace(DroneRace {
+                    ego_gain: number("ego_gain", ego_gain)?,
+                    opponent_gain: number("opponent_gain", opponent_gain)?,
+                    cone,
+                    speed_limit,
+                })
+            }
+            SystemSection::DoubleIntegrator { target, corridor, acceleration } => {
+                AnySystem::DoubleIntegrator(DoubleIntegrator {
+                    target: number("target", target)?,
+                    corridor: number("corridor", corridor)?,
+                    acceleration: number("acceleration", acceleration)?,
+                })
+            }
+        })
+    }
+}
+
+/// Any of the systems that a configuration can ask for.
+enum AnySystem {
+    DroneRace(DroneRace),
+    DoubleIntegrator(DoubleIntegrator),
 }
 
 /// The refusal of the formula `name`.

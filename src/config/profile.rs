@@ -5,6 +5,7 @@ use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection, SystemSection,
 };
+use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
@@ -59,6 +60,7 @@ fn drone_race(profile: Profile) -> Config {
     config.constants = ConstantsSection { target: given(10.0), constraint: given(20.0) };
     config.growth.heading = names(["ego_x", "ego_vx", "ego_y", "ego_vy"]);
     config.race = Some(race(profile));
+    config.train = Some(train::race());
     if profile == Profile::Study {
         // The study scores the first 30 states of a rollout, 29 steps.
         config.rollout.horizon = 29;
@@ -81,6 +83,7 @@ fn double_integrator(profile: Profile) -> Config {
     let mut config = common(profile, system, &plain.states(), &[0.6, 0.0], slice);
     config.deviation.radius = 0.02;
     config.growth.radius = 0.2;
+    config.train = Some(train::double_integrator());
     config
 }
 
@@ -135,6 +138,7 @@ fn common(
             heading: Vec::new(),
         },
         race: None,
+        train: None,
     }
 }
 

@@ -8,6 +8,7 @@ use crate::experiment::settings::RaceSettings;
 use crate::rollout::PairControl;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::system::Cone;
+use crate::train::settings::TrainSettings;
 
 /// Intervals by state name, in state order.
 pub type BoxSection = Named<[f64; 2]>;
@@ -46,6 +47,9 @@ pub struct Config {
     /// The race experiment; the drone race alone has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub race: Option<RaceSettings>,
+    /// Training; what a certificate or race stores of its configuration has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub train: Option<TrainSettings>,
 }
 
 /// Which defaults fill in what a file leaves out.
@@ -111,10 +115,10 @@ pub struct PolicySection {
 }
 
 impl PolicySection {
-    /// Refuses a section with neither a file nor a formula, or with both.
-    pub(super) fn check(&self) -> Result<()> {
+    /// Refuses a section with both a file and a formula, or with neither unless it is `optional`.
+    pub(super) fn check(&self, optional: bool) -> Result<()> {
         let problem = match (&self.file, &self.formula) {
-            (None, None) => "no policy; give `file`, a safetensors file, or `formula`",
+            (None, None) if !optional => "no policy; give `file`, a safetensors file, or `formula`",
             (Some(_), Some(_)) => "both `file` and `formula` are given; keep one of them",
             _ => return Ok(()),
         };

@@ -62,16 +62,11 @@ impl Config {
     }
 
     /// Lower and upper corner of the box.
-    fn corners<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<([f32; NX], [f32; NX])> {
-        let interval = |key: &str, [low, high]: [f64; 2]| {
-            let ends = [finite(key, low)?, finite(key, high)?];
-            if low > high {
-                let problem = format!("empty interval: its low end {low} is above {high}");
-                return Err(Error::invalid(key, problem));
-            }
-            Ok(ends)
-        };
-        let intervals = in_order("box", &self.bounds, axes, interval)?;
+    pub(super) fn corners<const NX: usize>(
+        &self,
+        axes: &[Axis; NX],
+    ) -> Result<([f32; NX], [f32; NX])> {
+        let intervals = in_order("box", &self.bounds, axes, finite_interval)?;
         let (low, high) = (intervals.map(|[low, _]| low), intervals.map(|[_, high]| high));
         if low == high {
             let problem = "empty: no interval has any length, so there is nothing to draw from";
@@ -187,8 +182,18 @@ fn slice_axis(place: &str, section: &SliceAxisSection, axes: &[Axis]) -> Result<
     Ok(SliceAxis { state, values })
 }
 
+/// Both ends of an interval, the low one not above the other.
+pub(super) fn finite_interval(key: &str, [low, high]: [f64; 2]) -> Result<[f32; 2]> {
+    let ends = [finite(key, low)?, finite(key, high)?];
+    if low > high {
+        let problem = format!("empty interval: its low end {low} is above {high}");
+        return Err(Error::invalid(key, problem));
+    }
+    Ok(ends)
+}
+
 /// Index of the state `name`.
-fn state_index(place: &str, name: &str, axes: &[Axis]) -> Result<usize> {
+pub(super) fn state_index(place: &str, name: &str, axes: &[Axis]) -> Result<usize> {
     let names: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
     names.iter().position(|known| known == name).ok_or_else(|| {
         let problem = format!(

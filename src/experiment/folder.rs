@@ -1,43 +1,14 @@
-//! The folder of an experiment: whose it is, and the races that are stored in it.
+//! The races that are stored in the folder of an experiment.
 
 use std::path::Path;
 
 use super::controller::Name;
 use super::log::{RaceLog, arrays, damaged, is_sealed, races, sealed};
 use crate::error::{Error, Result};
-use crate::files::{Staged, check_room, npz_bytes, read_npz};
+use crate::files::{Staged, npz_bytes, read_npz};
 
 /// Folder of the stored races.
 pub(super) const RACES: &str = "races";
-/// Name of the file that says which experiment a folder holds.
-const MANIFEST: &str = "experiment.json";
-/// Name of the page that every command with results writes.
-const REPORT: &str = "report.html";
-
-/// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and has room
-/// for `need` bytes more, and says so in it.
-pub(super) fn claim_folder(folder: &Path, manifest: &str, need: u64) -> Result<()> {
-    let mut staged = Staged::new(folder)?;
-    let path = folder.join(MANIFEST);
-    match std::fs::read_to_string(&path) {
-        Ok(text) if text == manifest => return check_room(folder, need),
-        Ok(_) => {
-            let problem = "another experiment is stored here (other configuration, starts, \
-                           parameters, networks, backend or program); give another --out, or \
-                           remove this folder";
-            return Err(Error::file(&path, problem));
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(Error::file(&path, error)),
-    }
-    if folder.join(REPORT).exists() {
-        let problem = "a report of something else is here; give another --out, or remove it";
-        return Err(Error::file(&folder.join(REPORT), problem));
-    }
-    check_room(folder, need)?;
-    staged.add(MANIFEST, manifest.as_bytes())?;
-    staged.publish().map(drop)
-}
 
 /// Name of the file of a batch of races.
 pub(super) fn batch_file(name: Name, noise_seed: u64, first: usize) -> String {

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use serde::Serialize;
 
 use super::controller::{Name, World};
-use super::folder::{RACES, batch_file, claim_folder, store, stored};
+use super::folder::{RACES, batch_file, store, stored};
 use super::judge::{Judge, safe_at_start};
 use super::log::{RaceLog, arrays};
 use super::picture::picture;
@@ -22,7 +22,7 @@ use super::summary::Summary;
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::Staged;
+use crate::files::{Staged, claim_folder};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;

@@ -2,6 +2,7 @@
 
 mod archive;
 mod array;
+mod claim;
 mod disk;
 mod npz;
 mod states;
@@ -10,6 +11,7 @@ mod temporary;
 
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
+pub(crate) use claim::claim_folder;
 pub use disk::check_room;
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
 pub use states::StateReader;

@@ -1,5 +1,5 @@
-//! The reports: one self-contained HTML page made from the record of a certificate, a race study or a
-//! sweep.
+//! The reports: one self-contained HTML page made from the record of a certificate, a race study, a
+//! sweep or a run of training.
 //!
 //! Figures are written as SVG here rather than with a plot library: `plotters` writes each colour
 //! and text size as a fixed value and its legend into the plot, so that the page could follow
@@ -22,9 +22,11 @@ mod span;
 mod sweep;
 mod table;
 mod text;
+mod train;
 mod verdicts;
 mod words;
 
 pub use html::html;
 pub use race::race_html;
 pub use sweep::sweep_html;
+pub use train::train_html;

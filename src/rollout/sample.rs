@@ -43,6 +43,16 @@ pub enum Purpose {
     RaceStart,
     /// Weights and starts of benchmarks.
     Bench,
+    /// Weights of networks before training.
+    TrainWeight,
+    /// Starts, and states, to train on.
+    TrainStart,
+    /// Which of the states to train on a batch takes.
+    TrainChoice,
+    /// First controls to train on.
+    TrainControl,
+    /// Starts that training is scored on and never sees.
+    HeldOut,
 }
 
 /// A sequence of random samples, addressed by index.

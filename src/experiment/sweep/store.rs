@@ -9,8 +9,7 @@ use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::experiment::folder::claim_folder;
-use crate::files::{Staged, json};
+use crate::files::{Staged, claim_folder, json};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);

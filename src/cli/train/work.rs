@@ -1,0 +1,213 @@
+//! Training in a program that was built with it.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::backend::Backend;
+use crate::cli::args::Global;
+use crate::cli::progress::Progress;
+use crate::cli::{Outcome, devices, report};
+use crate::config::{Config, Job, SystemJob};
+use crate::error::Result;
+use crate::files::{Staged, json};
+use crate::policy::{Activation, OutputActivation, Policy};
+use crate::report::train_html;
+use crate::rollout::{Plant, Purpose, Stream};
+use crate::scenario::{Context, provenance, tightened};
+use crate::system::System;
+use crate::train::analytic::{Analytic, LAST, Task};
+use crate::train::network::{Network, Shape};
+use crate::train::record::{Origin, TrainRecord};
+use crate::train::run::{Learner, Run, Trained};
+use crate::train::samples::Source;
+use crate::train::settings::{Method, TrainSettings};
+use crate::train::value::{Lesson, Value};
+
+/// Where the results go unless `--out` says otherwise.
+const DEFAULT_OUT: &str = "reachcast-train";
+
+/// Bytes that a training frees and takes at every iteration, and no more than glibc heeds.
+const KEPT: usize = 24 << 20;
+
+/// Trains, stores and reports; `folder` is that of the configuration.
+pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Outcome> {
+    let begun = Instant::now();
+    keep_memory();
+    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let (backend, progress) = (devices::cpu(global)?, Progress::new(global));
+    let settings = config.train_settings()?;
+    let training = Training { config, settings, backend: &backend, watch: &progress, out: &out };
+    let trained = match settings.method {
+        Method::Analytic => config.with_system(training)?,
+        Method::Value | Method::ActionValue => {
+            config.with_plant(&config.policy_source(folder)?, training)?
+        }
+    };
+    progress.finish();
+    let files = write(&out, &trained)?;
+    let seconds = begun.elapsed().as_secs_f64();
+    report(global, &trained.record, || text(&trained.record, &files, seconds))?;
+    Ok(Outcome::Done)
+}
+
+/// Keeps the C library from handing memory back to the system after each iteration, only to ask for
+/// it again: glibc keeps about twice the largest block that it has freed. A fifth of the time.
+fn keep_memory() {
+    std::hint::black_box(Vec::<u8>::with_capacity(KEPT));
+}
+
+/// What training works with.
+struct Training<'a> {
+    config: &'a Config,
+    settings: &'a TrainSettings,
+    backend: &'a Backend,
+    watch: &'a Progress,
+    out: &'a Path,
+}
+
+impl Training<'_> {
+    /// A random network, its last layer `last` times as large as the others.
+    fn network(
+        &self,
+        inputs: Vec<[f32; 2]>,
+        outputs: usize,
+        output: OutputActivation,
+        last: f32,
+    ) -> Network {
+        let hidden = self.settings.hidden.clone();
+        let shape = Shape { inputs, hidden, outputs, activation: Activation::Relu, output };
+        Network::random(shape, Stream::new(self.config.seed, Purpose::TrainWeight, 0), last)
+    }
+
+    /// Trains `learner`, on `plant` or from its policy on, for `total` iterations.
+    fn train<S, P, const NX: usize, const NU: usize>(
+        &self,
+        learner: &mut dyn Learner,
+        total: u64,
+        plant: Plant<'_, S, P>,
+    ) -> Result<Trained>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let config = self.config.to_train_json()?;
+        let provenance = provenance(self.backend, plant, self.config.seed, config);
+        let origin = Origin { method: self.settings.method, provenance };
+        let TrainSettings { interval, patience, .. } = *self.settings;
+        Run { folder: self.out, origin, total, interval, patience }.train(learner, self.watch)
+    }
+}
+
+impl SystemJob for Training<'_> {
+    type Output = Trained;
+
+    fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Trained>
+    where
+        S: System<NX, NU>,
+    {
+        let Self { config, settings, backend, watch, .. } = self;
+        let axes = system.states();
+        let checked = config.settings(&axes)?;
+        let inputs = (0..NX).map(|i| [checked.low[i], checked.high[i]]).collect();
+        let network = self.network(inputs, NU, OutputActivation::Tanh, LAST);
+        // On a plant that is linear in the state, replayed controls deviate by the same under any
+        // policy; on others this is the deviation under the untrained one.
+        let policy = &network.export(axes.each_ref().map(|axis| axis.name.clone()).to_vec())?;
+        let plant = Plant { system, policy };
+        let context = Context { backend, plant, watch };
+        let losses = match settings.analytic.certified > 0.0 {
+            true => Some(tightened(context, &checked)?.losses),
+            false => None,
+        };
+        let task = Task {
+            system,
+            backend,
+            spec: checked.spec,
+            losses,
+            mixture: config.mixture(&axes)?,
+            held_out: settings.held_out,
+            seed: config.seed,
+        };
+        let mut learner = Analytic::new(task, network, settings.analytic);
+        self.train(&mut learner, settings.analytic.iterations, plant)
+    }
+}
+
+impl Job for Training<'_> {
+    type Output = Trained;
+
+    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Trained>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let Self { config, settings, backend, .. } = self;
+        let (axes, controls) = (plant.system.states(), plant.system.controls());
+        let checked = config.settings(&axes)?;
+        let source = Source {
+            plant,
+            backend,
+            spec: checked.spec,
+            mixture: config.mixture(&axes)?,
+            visited: settings.value.visited,
+            seed: config.seed,
+        };
+        let mut inputs: Vec<_> = (0..NX).map(|i| [checked.low[i], checked.high[i]]).collect();
+        let mut order = axes.map(|axis| axis.name).to_vec();
+        let acts = settings.method == Method::ActionValue;
+        if acts {
+            inputs.extend(controls.each_ref().map(|axis| [axis.low, axis.high]));
+            order.extend(controls.map(|axis| axis.name));
+        }
+        let samples = |purpose: Purpose, count: u64| match acts {
+            true => source.action_values::<NU>(purpose, count as usize),
+            false => source.values::<NU>(purpose, count as usize),
+        };
+        let lesson = Lesson {
+            name: if acts { "action_value" } else { "value" },
+            order,
+            samples: samples(Purpose::TrainStart, settings.value.states)?,
+            held_out: samples(Purpose::HeldOut, settings.held_out)?,
+            seed: config.seed,
+        };
+        let network = self.network(inputs, 1, OutputActivation::Identity, 1.0);
+        let mut learner = Value::new(lesson, network, settings.value)?;
+        self.train(&mut learner, settings.value.iterations, plant)
+    }
+}
+
+/// Writes the results.
+fn write(out: &Path, trained: &Trained) -> Result<Vec<PathBuf>> {
+    let mut staged = Staged::new(out)?;
+    for (name, bytes) in &trained.files {
+        staged.add(name, bytes)?;
+    }
+    staged.add("curve.csv", &trained.record.table().csv()?)?;
+    staged.add("report.html", train_html(&trained.record).as_bytes())?;
+    staged.add("train.json", json("train.json", &trained.record)?.as_bytes())?;
+    staged.publish()
+}
+
+/// The result as a page of text.
+fn text(record: &TrainRecord, files: &[PathBuf], seconds: f64) -> String {
+    let mut text = String::new();
+    let mut line = |parts: std::fmt::Arguments<'_>| {
+        // A String takes whatever is written to it.
+        let _ = writeln!(text, "{parts}");
+    };
+    let best = record.curve.iter().find(|point| point.iteration == record.best);
+    for (name, score) in record.scores.iter().zip(best.iter().flat_map(|best| &best.scores)) {
+        line(format_args!("{name}: {score:.4}"));
+    }
+    let early = if record.stopped_early { ", ended early" } else { "" };
+    line(format_args!("best after {} of {} iterations{early}", record.best, record.total));
+    for network in &record.networks {
+        line(format_args!("{} {}", network.file, network.sha256));
+    }
+    line(format_args!("{seconds:.1} s"));
+    for file in files {
+        line(format_args!("{}", file.display()));
+    }
+    text
+}

@@ -1,0 +1,116 @@
+//! Defaults of training for each system, and its starts as checked boxes.
+
+use std::collections::BTreeMap;
+
+use super::section::Config;
+use super::settings::{finite_interval, state_index};
+use crate::error::{Error, Result};
+use crate::rollout::Region;
+use crate::system::Axis;
+use crate::train::adam::Optimiser;
+use crate::train::settings::{
+    AnalyticSettings, Method, StartsSection, TrainSettings, ValueSettings,
+};
+use crate::train::starts::Mixture;
+
+/// Training for the race: half of the starts from the whole box, a quarter from where races
+/// start, a quarter from a wider box around that.
+pub(super) fn race() -> TrainSettings {
+    let slow = part(0.5, &[("opp_vy", [0.1, 0.45])]);
+    let start = drones(0.25, [0.8, 0.0, 0.1, 0.1], [-2.5, -1.0], [[0.5, 0.7], [0.3, 0.5]]);
+    let wide = drones(0.25, [0.95, 0.5, 0.3, 0.3], [-2.8, -0.2], [[0.1, 1.0], [0.2, 0.55]]);
+    TrainSettings { starts: vec![slow, start, wide], ..common(vec![64; 3]) }
+}
+
+/// Training for the double integrator.
+pub(super) fn double_integrator() -> TrainSettings {
+    let mut settings = common(vec![32; 2]);
+    settings.analytic.iterations = 1000;
+    settings.analytic.certified = 0.0;
+    settings.value.states = 50_000;
+    settings
+}
+
+/// What all systems share.
+fn common(hidden: Vec<usize>) -> TrainSettings {
+    let optimiser =
+        Optimiser { rate: 4e-3, warmup: 20, last: 0.02, clip: 1.0, decays: [0.9, 0.99] };
+    TrainSettings {
+        method: Method::Analytic,
+        hidden,
+        starts: vec![part(1.0, &[])],
+        held_out: 4096,
+        interval: 100,
+        patience: 20,
+        analytic: AnalyticSettings {
+            iterations: 4500,
+            batch: 256,
+            temperature: [1.0, 0.1],
+            scale: 2.0,
+            slope: 0.05,
+            certified: 0.5,
+            optimiser,
+        },
+        value: ValueSettings {
+            iterations: 12_000,
+            batch: 1024,
+            states: 200_000,
+            visited: 0.3,
+            optimiser: Optimiser { rate: 3e-3, decays: [0.9, 0.999], ..optimiser },
+        },
+    }
+}
+
+/// Both drones in boxes that differ in their speed toward the gate alone: `around` bounds position
+/// and velocity across, then height and climb.
+fn drones(share: f64, around: [f64; 4], along: [f64; 2], speeds: [[f64; 2]; 2]) -> StartsSection {
+    let mut bounds = BTreeMap::new();
+    for (drone, speed) in ["ego", "opp"].into_iter().zip(speeds) {
+        let mut insert =
+            |state: &str, interval| bounds.insert(format!("{drone}_{state}"), interval);
+        for (state, reach) in ["x", "vx", "z", "vz"].into_iter().zip(around) {
+            insert(state, [-reach, reach]);
+        }
+        insert("y", along);
+        insert("vy", speed);
+    }
+    StartsSection { share, bounds }
+}
+
+/// The whole box but for these intervals.
+fn part(share: f64, bounds: &[(&str, [f64; 2])]) -> StartsSection {
+    let bounds = bounds.iter().map(|(name, interval)| ((*name).to_owned(), *interval));
+    StartsSection { share, bounds: bounds.collect() }
+}
+
+impl Config {
+    /// The settings of training, checked.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key whose value is out of range.
+    pub fn train_settings(&self) -> Result<&TrainSettings> {
+        let settings = self.train.as_ref();
+        let settings = settings.ok_or_else(|| Error::invalid("train", "no such section"))?;
+        settings.check()?;
+        Ok(settings)
+    }
+
+    /// Where training draws its starts from.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key whose interval is empty, not finite or of no state.
+    pub fn mixture<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Mixture<NX>> {
+        let (low, high) = self.corners(axes)?;
+        let part = |(number, part): (usize, &StartsSection)| {
+            let (mut low, mut high) = (low, high);
+            let place = format!("train.starts[{number}].box");
+            for (name, interval) in &part.bounds {
+                let i = state_index(&place, name, axes)?;
+                [low[i], high[i]] = finite_interval(&format!("{place}.{name}"), *interval)?;
+            }
+            Ok((part.share, Region::new_box(low, high)?))
+        };
+        let parts = self.train_settings()?.starts.iter().enumerate().map(part);
+        Ok(Mixture { parts: parts.collect::<Result<_>>()? })
+    }
+}

@@ -1,0 +1,21 @@
+//! Training: policies and values by gradient descent, with the physics that the engine runs.
+
+pub mod adam;
+#[cfg(feature = "train")]
+pub mod analytic;
+pub mod checkpoint;
+#[cfg(feature = "train")]
+pub mod layer;
+#[cfg(feature = "train")]
+pub mod network;
+#[cfg(feature = "train")]
+pub mod physics;
+pub mod record;
+pub mod run;
+pub mod samples;
+pub mod settings;
+pub mod soft;
+pub mod starts;
+pub mod tape;
+#[cfg(feature = "train")]
+pub mod value;

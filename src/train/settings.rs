@@ -1,0 +1,194 @@
+//! The settings of training: the `[train]` section of a configuration.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::adam::Optimiser;
+use crate::error::{Error, Result};
+
+/// Most rows of a batch, neurons of a layer and layers: more is a slip.
+const MOST: u64 = 1 << 16;
+
+/// How networks are trained.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainSettings {
+    /// What is trained, and how.
+    pub method: Method,
+    /// Neurons of each hidden layer.
+    pub hidden: Vec<usize>,
+    /// Where starts are drawn from.
+    pub starts: Vec<StartsSection>,
+    /// Starts that the network is scored on and never trained on.
+    pub held_out: u64,
+    /// Iterations between two scores.
+    pub interval: u64,
+    /// Scores without a better one after which training ends early; 0 for never.
+    pub patience: u64,
+    /// A policy through the known dynamics.
+    pub analytic: AnalyticSettings,
+    /// Networks that tell the measure.
+    pub value: ValueSettings,
+}
+
+/// What is trained, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+#[value(rename_all = "kebab-case")]
+pub enum Method {
+    /// A policy, by back-propagation of the softened measure through the known dynamics
+    Analytic,
+    /// V(x), the measure of the policy's rollout from a state
+    Value,
+    /// Q(x, u), the measure after a first control
+    ActionValue,
+}
+
+impl Method {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Analytic => "analytic",
+            Self::Value => "value",
+            Self::ActionValue => "action-value",
+        }
+    }
+}
+
+/// A box that starts are drawn from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartsSection {
+    /// Its part of all starts, relative to those of the other boxes.
+    pub share: f64,
+    /// Intervals by state name; other states have those of the configuration's `box`.
+    #[serde(rename = "box", default)]
+    pub bounds: BTreeMap<String, [f64; 2]>,
+}
+
+/// Back-propagation of the softened measure.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AnalyticSettings {
+    /// Updates of the network.
+    pub iterations: u64,
+    /// Starts of each update.
+    pub batch: usize,
+    /// Temperature of the softened measure at the beginning and at the end; geometric between.
+    pub temperature: [f64; 2],
+    /// Measure at which a rollout is as good as decided: its gain is `tanh(g / scale)`.
+    pub scale: f64,
+    /// What a further unit of the scaled measure is worth, so that hopeless starts still pull.
+    pub slope: f64,
+    /// Weight of the certified measure `V_check` beside G.
+    pub certified: f64,
+    /// How the parameters follow their gradients.
+    pub optimiser: Optimiser,
+}
+
+/// Regression on measures of rollouts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ValueSettings {
+    /// Updates of the network.
+    pub iterations: u64,
+    /// States of each update.
+    pub batch: usize,
+    /// States with their measures.
+    pub states: u64,
+    /// Share of them that the policy meets on its way, in place of starts.
+    pub visited: f64,
+    /// How the parameters follow their gradients.
+    pub optimiser: Optimiser,
+}
+
+impl TrainSettings {
+    /// Refuses numbers out of range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key.
+    pub fn check(&self) -> Result<()> {
+        count("train.interval", self.interval, u64::MAX)?;
+        count("train.held_out", self.held_out, 1 << 32)?;
+        count("train.hidden", self.hidden.len() as u64, 64)?;
+        for &width in &self.hidden {
+            count("train.hidden", width as u64, MOST)?;
+        }
+        for part in &self.starts {
+            positive("train.starts.share", part.share)?;
+        }
+        if self.starts.is_empty() {
+            return Err(Error::invalid("train.starts", "empty; give one box or more"));
+        }
+        self.analytic.check()?;
+        self.value.check()
+    }
+}
+
+impl AnalyticSettings {
+    fn check(&self) -> Result<()> {
+        count("train.analytic.iterations", self.iterations, u64::MAX)?;
+        count("train.analytic.batch", self.batch as u64, MOST)?;
+        for temperature in self.temperature {
+            positive("train.analytic.temperature", temperature)?;
+        }
+        positive("train.analytic.scale", self.scale)?;
+        not_negative("train.analytic.slope", self.slope)?;
+        not_negative("train.analytic.certified", self.certified)?;
+        optimiser("train.analytic.optimiser", &self.optimiser)
+    }
+}
+
+impl ValueSettings {
+    fn check(&self) -> Result<()> {
+        count("train.value.iterations", self.iterations, u64::MAX)?;
+        count("train.value.batch", self.batch as u64, MOST)?;
+        count("train.value.states", self.states, 1 << 32)?;
+        share("train.value.visited", self.visited)?;
+        optimiser("train.value.optimiser", &self.optimiser)
+    }
+}
+
+/// Refuses what an optimiser cannot work with.
+fn optimiser(place: &str, optimiser: &Optimiser) -> Result<()> {
+    positive(&format!("{place}.rate"), optimiser.rate)?;
+    positive(&format!("{place}.clip"), optimiser.clip)?;
+    share(&format!("{place}.last"), optimiser.last)?;
+    for decay in optimiser.decays {
+        let place = format!("{place}.decays");
+        share(&place, decay)?;
+        if decay == 1.0 {
+            return Err(Error::invalid(place, "1; a mean that never changes"));
+        }
+    }
+    Ok(())
+}
+
+fn count(place: &str, value: u64, most: u64) -> Result<()> {
+    match (1..=most).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::invalid(place, format!("{value} is not within 1..={most}"))),
+    }
+}
+
+fn positive(place: &str, value: f64) -> Result<()> {
+    match value.is_finite() && value > 0.0 {
+        true => Ok(()),
+        false => Err(Error::invalid(place, format!("{value} is not a positive number"))),
+    }
+}
+
+fn not_negative(place: &str, value: f64) -> Result<()> {
+    match value.is_finite() && value >= 0.0 {
+        true => Ok(()),
+        false => Err(Error::invalid(place, format!("{value} is not a number of 0 or more"))),
+    }
+}
+
+fn share(place: &str, value: f64) -> Result<()> {
+    match (0.0..=1.0).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::invalid(place, format!("{value} is not within 0 to 1"))),
+    }
+}

@@ -1,0 +1,48 @@
+//! A system as tapes: its step, and the softened measures of a whole rollout.
+
+use super::tape::Tape;
+use crate::real::Real;
+use crate::real::record::{Expr, record};
+use crate::rollout::{RolloutSpec, Tightening, reach_avoid};
+use crate::system::System;
+
+/// The step: states and controls `[NX + NU]` to the next states `[NX]`.
+pub fn step_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Tape {
+    Tape::hard(&record(NX + NU, |inputs| {
+        let x = std::array::from_fn(|i| inputs[i]);
+        let u = std::array::from_fn(|i| inputs[NX + i]);
+        system.step(x, u).to_vec()
+    }))
+}
+
+/// The measures of a rollout: its states `[T + 1, NX]` to the softened G and, where the margins are
+/// to lose something, the softened `V_check` (`docs/method.md`, sections 1 and 4).
+///
+/// Soft are the maximum and the minimum over time and the minima that the margins end in. At
+/// temperature 0 they would be the measures that the engine computes.
+pub fn measure_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(
+    system: &S,
+    spec: &RolloutSpec,
+    losses: Option<&Tightening>,
+) -> Tape {
+    let steps = spec.horizon as usize + 1;
+    Tape::soft(&record(NX * steps, |inputs| {
+        let margins: Vec<(Expr, Expr)> = inputs
+            .chunks_exact(NX)
+            .map(|state| {
+                let x: [Expr; NX] = std::array::from_fn(|i| state[i]);
+                (system.target(x), system.constraint(x))
+            })
+            .collect();
+        let gamma = Real::lit(spec.gamma);
+        let mut measures = vec![reach_avoid(margins.iter().copied(), gamma)];
+        measures.extend(losses.map(|losses| {
+            let tightened = margins.iter().enumerate().map(|(t, &(target, constraint))| {
+                let lost = |losses: &[f32]| Expr::lit(losses[t]);
+                (target - lost(&losses.target), constraint - lost(&losses.constraint))
+            });
+            reach_avoid(tightened, gamma)
+        }));
+        measures
+    }))
+}
