@@ -56,7 +56,7 @@ struct MppiNumbers {
 ///   and the improved plan.
 ///
 /// # Errors
-/// Those of the backend, and [`crate::Error::Write`].
+/// Those of the backend, [`crate::Error::Write`] and [`crate::Error::NoRoom`].
 pub fn export(backend: &Backend, seed: u64, folder: &Path) -> Result<Vec<PathBuf>> {
     let mut staged = Staged::new(folder)?;
     check_room(folder, EXPORT_BYTES)?;

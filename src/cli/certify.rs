@@ -18,10 +18,8 @@ use crate::system::System;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-out";
-/// Rollouts that a picture shows.
-const PICTURED: usize = 13;
-/// Starts that a picture shows.
-const KEPT: usize = 400;
+/// Rollouts whose states would take as many numbers as all that pictures show.
+const PICTURED: usize = 40;
 /// Name of the stored certificate.
 pub(super) const CERTIFICATE: &str = "certificate.json";
 /// Name of the copy of the network, which makes the folder self-contained.
@@ -75,8 +73,8 @@ impl Job for Certify<'_> {
 /// About what the files of the folder take, bytes: a number takes some 20 characters in a text.
 fn estimate<const NX: usize>(settings: &Settings<NX>) -> u64 {
     let [x, y] = settings.slice.each_ref().map(|axis| axis.values.len());
-    let states = PICTURED * (settings.spec.horizon as usize + 1) + KEPT;
-    (1 << 20) + 20 * (8 * x * y + 2 * NX * states) as u64
+    let states = PICTURED * (settings.spec.horizon as usize + 1);
+    (1 << 20) + 20 * (8 * x * y + NX * states) as u64
 }
 
 /// Writes all files of the folder, the certificate itself last.

@@ -75,7 +75,8 @@ impl Experiment<'_> {
     ///
     /// # Errors
     /// Those of [`RaceSettings::check`] and of the
-    /// controllers, before any race; [`Error::File`] if the folder holds another experiment or a
+    /// controllers, before any race; [`Error::Write`] or [`Error::NoRoom`] before any race if its
+    /// folder does not take the results; [`Error::File`] if the folder holds another experiment or a
     /// stored race is damaged; [`Error::Interrupted`].
     pub fn run(&self, watch: &dyn Watch) -> Result<(RaceRecord, Vec<TimingRecord>)> {
         let reason = |name: &Name| absent(*name, &self.world).map(|reason| (*name, reason));

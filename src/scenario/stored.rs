@@ -47,7 +47,7 @@ impl Record {
         }
         let sealed = document.get(DIGESTS).unwrap_or(&Value::Null);
         let sealed = BTreeMap::<String, String>::deserialize(sealed)
-            .map_err(|e| refused("damaged certificate: `digests`", &e))?;
+            .map_err(|e| refused("damaged certificate, certify again: `digests`", &e))?;
         unchanged(&sealed, &digests(&document))?;
         serde_json::from_str(text).map_err(|e| refused("damaged certificate", &e))
     }

@@ -45,7 +45,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::File`] if the folder holds another experiment, [`Error::Write`] if it cannot be
-    /// written to.
+    /// written to, [`Error::NoRoom`] if its disk is too full.
     pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
         let axes: Vec<&str> = record.axes.iter().map(|axis| axis.name.as_str()).collect();
         let manifest = serde_json::json!({ "axes": axes, "shared": identity });
