@@ -9,7 +9,7 @@ use crate::rollout::Region;
 use crate::system::Axis;
 use crate::train::adam::Optimiser;
 use crate::train::settings::{
-    AnalyticSettings, Method, StartsSection, TrainSettings, ValueSettings,
+    AnalyticSettings, DdpgSettings, Method, StartsSection, TrainSettings, ValueSettings,
 };
 use crate::train::starts::Mixture;
 
@@ -19,7 +19,9 @@ pub(super) fn race() -> TrainSettings {
     let slow = part(0.5, &[("opp_vy", [0.1, 0.45])]);
     let start = drones(0.25, [0.8, 0.0, 0.1, 0.1], [-2.5, -1.0], [[0.5, 0.7], [0.3, 0.5]]);
     let wide = drones(0.25, [0.95, 0.5, 0.3, 0.3], [-2.8, -0.2], [[0.1, 1.0], [0.2, 0.55]]);
-    TrainSettings { starts: vec![slow, start, wide], ..common(vec![64; 3]) }
+    let mut settings = common(vec![64; 3]);
+    settings.ddpg.disturbance = pushes(&[("opp_vx", 0.01), ("opp_vy", 0.01), ("opp_vz", 0.01)]);
+    TrainSettings { starts: vec![slow, start, wide], ..settings }
 }
 
 /// Training for the double integrator.
@@ -28,6 +30,7 @@ pub(super) fn double_integrator() -> TrainSettings {
     settings.analytic.iterations = 1000;
     settings.analytic.certified = 0.0;
     settings.value.states = 50_000;
+    settings.ddpg.disturbance = pushes(&[("velocity", 0.01)]);
     settings
 }
 
@@ -58,7 +61,30 @@ fn common(hidden: Vec<usize>) -> TrainSettings {
             visited: 0.3,
             optimiser: Optimiser { rate: 3e-3, decays: [0.9, 0.999], ..optimiser },
         },
+        ddpg: ddpg(),
     }
+}
+
+/// DDPG with the rates, the noise and the copies of the published line of work.
+fn ddpg() -> DdpgSettings {
+    let constant = |rate| Optimiser { rate, warmup: 0, last: 1.0, clip: 1.0, decays: [0.9, 0.999] };
+    DdpgSettings {
+        iterations: 100_000,
+        batch: 256,
+        environments: 16,
+        replay: 1 << 17,
+        noise: 0.1,
+        random: 0.5,
+        polyak: 0.005,
+        disturbance: BTreeMap::new(),
+        critic: constant(1e-3),
+        actor: constant(1e-4),
+    }
+}
+
+/// States with what a full disturbance adds to them at each step.
+fn pushes(pushes: &[(&str, f64)]) -> BTreeMap<String, f64> {
+    pushes.iter().map(|(name, scale)| ((*name).to_owned(), *scale)).collect()
 }
 
 /// Both drones in boxes that differ in their speed toward the gate alone: `around` bounds position
@@ -112,5 +138,19 @@ impl Config {
         };
         let parts = self.train_settings()?.starts.iter().enumerate().map(part);
         Ok(Mixture { parts: parts.collect::<Result<_>>()? })
+    }
+
+    /// The coordinates that a disturbance acts on in training, in order, with its scales.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key of no state, and those of [`Self::train_settings`].
+    pub fn disturbed<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Vec<(usize, f32)>> {
+        let place = "train.ddpg.disturbance";
+        let named = self.train_settings()?.ddpg.disturbance.iter();
+        let entry =
+            |(name, scale): (&String, &f64)| Ok((state_index(place, name, axes)?, *scale as f32));
+        let mut entries = named.map(entry).collect::<Result<Vec<_>>>()?;
+        entries.sort_by_key(|(i, _)| *i);
+        Ok(entries)
     }
 }

@@ -9,6 +9,8 @@ use crate::error::{Error, Result};
 
 /// Most rows of a batch, neurons of a layer and layers: more is a slip.
 const MOST: u64 = 1 << 16;
+/// Most steps that are remembered: every checkpoint holds them all.
+const MOST_REMEMBERED: u64 = 1 << 22;
 
 /// How networks are trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,6 +32,8 @@ pub struct TrainSettings {
     pub analytic: AnalyticSettings,
     /// Networks that tell the measure.
     pub value: ValueSettings,
+    /// A policy, a disturbance and their critic.
+    pub ddpg: DdpgSettings,
 }
 
 /// What is trained, and how.
@@ -43,6 +47,8 @@ pub enum Method {
     Value,
     /// Q(x, u), the measure after a first control
     ActionValue,
+    /// A policy against a disturbance, both by the critic of the reach-avoid backup
+    Ddpg,
 }
 
 impl Method {
@@ -52,6 +58,7 @@ impl Method {
             Self::Analytic => "analytic",
             Self::Value => "value",
             Self::ActionValue => "action-value",
+            Self::Ddpg => "ddpg",
         }
     }
 }
@@ -103,6 +110,32 @@ pub struct ValueSettings {
     pub optimiser: Optimiser,
 }
 
+/// Min-max DDPG.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DdpgSettings {
+    /// Updates of each network.
+    pub iterations: u64,
+    /// Remembered steps of each update.
+    pub batch: usize,
+    /// Plants that make one step before each update.
+    pub environments: usize,
+    /// Steps that are remembered.
+    pub replay: usize,
+    /// Standard deviation of the noise on what both players do.
+    pub noise: f64,
+    /// Share of the plants whose players do anything, uniformly, in place of that.
+    pub random: f64,
+    /// Share by which the slow copies follow at each update.
+    pub polyak: f64,
+    /// What a full disturbance adds to a state at each step, by state name.
+    pub disturbance: BTreeMap<String, f64>,
+    /// How the critic's parameters follow their gradients.
+    pub critic: Optimiser,
+    /// The same for control and disturbance.
+    pub actor: Optimiser,
+}
+
 impl TrainSettings {
     /// Refuses numbers out of range.
     ///
@@ -122,7 +155,8 @@ impl TrainSettings {
             return Err(Error::invalid("train.starts", "empty; give one box or more"));
         }
         self.analytic.check()?;
-        self.value.check()
+        self.value.check()?;
+        self.ddpg.check()
     }
 }
 
@@ -147,6 +181,27 @@ impl ValueSettings {
         count("train.value.states", self.states, 1 << 32)?;
         share("train.value.visited", self.visited)?;
         optimiser("train.value.optimiser", &self.optimiser)
+    }
+}
+
+impl DdpgSettings {
+    fn check(&self) -> Result<()> {
+        count("train.ddpg.iterations", self.iterations, u64::MAX)?;
+        count("train.ddpg.batch", self.batch as u64, MOST)?;
+        count("train.ddpg.environments", self.environments as u64, MOST)?;
+        count("train.ddpg.replay", self.replay as u64, MOST_REMEMBERED)?;
+        not_negative("train.ddpg.noise", self.noise)?;
+        share("train.ddpg.random", self.random)?;
+        share("train.ddpg.polyak", self.polyak)?;
+        if self.disturbance.is_empty() {
+            let problem = "empty; name a state, with 0 for a disturbance that does nothing";
+            return Err(Error::invalid("train.ddpg.disturbance", problem));
+        }
+        for (state, &scale) in &self.disturbance {
+            not_negative(&format!("train.ddpg.disturbance.{state}"), scale)?;
+        }
+        optimiser("train.ddpg.critic", &self.critic)?;
+        optimiser("train.ddpg.actor", &self.actor)
     }
 }
 

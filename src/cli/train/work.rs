@@ -1,5 +1,7 @@
 //! Training in a program that was built with it.
 
+mod reinforced;
+
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -35,7 +37,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
     let settings = config.train_settings()?;
     let training = Training { config, settings, backend: &backend, watch: &progress, out: &out };
     let trained = match settings.method {
-        Method::Analytic => config.with_system(training)?,
+        Method::Analytic | Method::Ddpg => config.with_system(training)?,
         Method::Value | Method::ActionValue => {
             config.with_plant(&config.policy_source(folder)?, training)?
         }
@@ -96,6 +98,9 @@ impl SystemJob for Training<'_> {
     where
         S: System<NX, NU>,
     {
+        if self.settings.method == Method::Ddpg {
+            return self.ddpg(system);
+        }
         let Self { config, settings, backend, watch, .. } = self;
         let axes = system.states();
         let checked = config.settings(&axes)?;
