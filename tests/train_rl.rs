@@ -21,8 +21,11 @@ use reachcast::train::backup::Margins;
 use reachcast::train::ddpg::{Ddpg, Game};
 use reachcast::train::disturbed::{Disturbed, pushed};
 use reachcast::train::environments::Environments;
+use reachcast::train::gae::{Step, advantages};
+use reachcast::train::ppo::{Lesson, Ppo};
 use reachcast::train::record::{Origin, TrainRecord};
 use reachcast::train::replay::Replay;
+use reachcast::train::reward::Reward;
 use reachcast::train::run::{Learner, Run};
 use reachcast::train::score::{share, successes};
 use reachcast::train::settings::TrainSettings;
@@ -74,6 +77,19 @@ fn players<'a>(
         hidden: settings(config).hidden.clone(),
     };
     Ddpg::new(task(system, backend, config), game, settings(config).ddpg.clone())
+}
+
+/// The policy of the double integrator on its ordinary reward.
+fn pupil<'a>(
+    system: &'a DoubleIntegrator,
+    backend: &'a Backend,
+    config: &Config,
+) -> Ppo<'a, DoubleIntegrator, 2, 1> {
+    let TrainSettings { ppo, hidden, .. } = settings(config);
+    let goal = config.goal(&system.states()).unwrap();
+    let reward = Reward { goal, weights: ppo.reward.clone() };
+    let lesson = Lesson { reward, states: intervals(), hidden: hidden.clone() };
+    Ppo::new(task(system, backend, config), lesson, ppo.clone())
 }
 
 /// Stops the work after so many updates.
@@ -257,14 +273,14 @@ fn a_game_that_was_interrupted_comes_to_the_same() {
         let interrupted = run(&parts, threads, &Patience(Cell::new(updates)));
         assert!(matches!(interrupted, Err(Error::Interrupted)));
     }
-    assert_eq!(run(&parts, 2, &Unwatched).unwrap(), whole);
+    assert!(run(&parts, 2, &Unwatched).unwrap() == whole);
     let names: Vec<&str> = whole.1.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["critic.safetensors", "disturbance.safetensors", "policy.safetensors"]);
     let other = self::config("double-integrator", &[&set[..], &["seed=6"]].concat());
     let backend = cpu(1);
     let mut learner = players(&system, &backend, &other);
     let others = trained(&mut learner, &folder.path().join("other"), &other, 60, &Unwatched);
-    assert_ne!(others.unwrap().1, whole.1);
+    assert!(others.unwrap().1 != whole.1);
 }
 
 /// A ring gives back the rows that were written last, and no other.
@@ -319,6 +335,107 @@ fn a_disturbed_system_is_pushed_after_its_step() {
     }
 }
 
+/// Advantages are the sums that define them, episode by episode; with no weight on later steps they
+/// are temporal differences, with all of it what was earned less what was expected.
+#[test]
+fn advantages_are_their_sums() {
+    let wave = |i: usize, rate: f32| (rate * i as f32 + 0.4).sin();
+    let ends = [6, 7, 15, 19];
+    let steps: Vec<Step> = (0..20)
+        .map(|i| {
+            let next_value = if i == 7 { 0.0 } else { wave(i + 1, 1.1) };
+            Step { reward: wave(i, 0.7), value: wave(i, 1.1), next_value, last: ends.contains(&i) }
+        })
+        .collect();
+    let gamma = 0.95_f64;
+    let delta = |i: usize| {
+        let Step { reward, value, next_value, .. } = steps[i];
+        f64::from(reward) + gamma * f64::from(next_value) - f64::from(value)
+    };
+    for lambda in [0.0, 0.9, 1.0] {
+        let found = advantages(&steps, gamma as f32, lambda as f32);
+        for (i, found) in found.iter().enumerate() {
+            let end = *ends.iter().find(|end| **end >= i).unwrap();
+            let term = |k: usize| (gamma * lambda).powi((k - i) as i32) * delta(k);
+            let expected: f64 = (i..=end).map(term).sum();
+            assert!((f64::from(*found) - expected).abs() < 1e-5, "{i}: {found} {expected}");
+            if lambda == 1.0 {
+                let earned = |k: usize| gamma.powi((k - i) as i32) * f64::from(steps[k].reward);
+                let rest = gamma.powi((end + 1 - i) as i32) * f64::from(steps[end].next_value);
+                let whole = (i..=end).map(earned).sum::<f64>() + rest - f64::from(steps[i].value);
+                assert!((whole - expected).abs() < 1e-5, "{i}: {whole} {expected}");
+            }
+        }
+    }
+}
+
+/// Progress, the target and a violation are worth what they should, and a flight out of the target
+/// through the gate costs what leaving the target does.
+#[test]
+fn a_step_earns_progress_and_the_target() {
+    let config = config("drone-race", &[]);
+    let system = DroneRace::default();
+    let weights = settings(&config).ppo.reward.clone();
+    let (target, violation) = (weights.target as f32, weights.violation as f32);
+    let reward = Reward { goal: config.goal(&system.states()).unwrap(), weights };
+    let at = |x: f32, y: f32, vy: f32| [x, 0.0, y, vy, 0.0, 0.0, 0.0, 0.0, -1.0, 0.4, 0.0, 0.0];
+    let near = |found: f32, expected: f32| assert!((found - expected).abs() < 1e-5, "{found}");
+    // Ahead on the centre line, but slower: half a metre nearer and nothing else.
+    near(reward.of(&system, at(0.0, -0.6, 0.2), at(0.0, -0.1, 0.2)), 0.5);
+    // And now faster: in the target.
+    near(reward.of(&system, at(0.0, -0.6, 0.2), at(0.0, -0.1, 0.6)), 0.5 + target);
+    near(reward.of(&system, at(0.0, -0.6, 0.6), at(0.0, -0.1, 0.2)), 0.5 - target);
+    // Through the gate from within the target; past it from without.
+    near(reward.of(&system, at(0.0, -0.05, 0.6), at(0.0, 0.1, 0.6)), 0.15);
+    near(reward.of(&system, at(0.0, -0.05, 0.2), at(0.0, 0.1, 0.2)), 0.15 - violation);
+    // Aside of the gate, behind its plane.
+    let aside = at(0.6, 0.7, 0.2);
+    let nearer = 0.6_f32.hypot(0.7) - 0.6_f32.hypot(0.2);
+    near(reward.of(&system, at(0.6, -0.2, 0.2), aside), nearer - violation);
+}
+
+/// On the double integrator the ordinary reward leads to the target: PPO finds most of what there
+/// is to reach in a few seconds.
+#[test]
+fn ppo_learns_to_reach() {
+    let set = ["train.ppo.iterations=60", "train.held_out=2048"];
+    let config = config("double-integrator", &set);
+    let (system, backend) = (DoubleIntegrator::default(), cpu(2));
+    let mut learner = pupil(&system, &backend, &config);
+    let before = learner.scores().unwrap()[0];
+    for iteration in 0..60 {
+        learner.update(iteration).unwrap();
+    }
+    let after = learner.scores().unwrap()[0];
+    let starts = config.mixture(&system.states()).unwrap().draw(5, Purpose::HeldOut, 0, 2048);
+    let best = Plant { system: &system, policy: &BangBang { acceleration: 1.0 } };
+    let found = successes(&backend, best, config.spec().unwrap(), &starts).unwrap();
+    let ceiling = share(found.into_iter());
+    println!("{before:.3} to {after:.3} of {ceiling:.3}");
+    assert!(after > before + 0.1 && after > 0.9 * ceiling && after <= ceiling);
+}
+
+/// The same for PPO: interrupted anywhere and resumed, the same record and policy.
+#[test]
+fn ppo_that_was_interrupted_comes_to_the_same() {
+    let set = ["train.method=ppo", "train.ppo.environments=8", "train.ppo.batch=50"];
+    let more = ["train.ppo.iterations=8", "train.interval=3", "train.held_out=256"];
+    let config = config("double-integrator", &[&set[..], &more].concat());
+    let system = DoubleIntegrator::default();
+    let run = |folder: &Path, threads: usize, watch: &dyn Watch| {
+        let backend = cpu(threads);
+        trained(&mut pupil(&system, &backend, &config), folder, &config, 8, watch)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let whole = run(&folder.path().join("whole"), 1, &Unwatched).unwrap();
+    let parts = folder.path().join("parts");
+    for (updates, threads) in [(2, 1), (4, 2)] {
+        let interrupted = run(&parts, threads, &Patience(Cell::new(updates)));
+        assert!(matches!(interrupted, Err(Error::Interrupted)));
+    }
+    assert!(run(&parts, 2, &Unwatched).unwrap() == whole);
+}
+
 /// Numbers out of range are refused by key.
 #[test]
 fn wrong_settings_name_their_key() {
@@ -331,6 +448,11 @@ fn wrong_settings_name_their_key() {
         ("train.ddpg.polyak=2", "train.ddpg.polyak: 2 is not within 0 to 1"),
         ("train.ddpg.disturbance.velocity=-1", "train.ddpg.disturbance.velocity: -1"),
         ("train.ddpg.critic.rate=0", "train.ddpg.critic.rate: 0"),
+        ("train.ppo.steps=0", "train.ppo.steps: 0 is not within"),
+        ("train.ppo.clip=2", "train.ppo.clip: 2 is not within 0 to 1"),
+        ("train.ppo.spread=0", "train.ppo.spread: 0 is not a positive"),
+        ("train.ppo.reward.violation=-1", "train.ppo.reward.violation: -1"),
+        ("train.ppo.optimiser.rate=0", "train.ppo.optimiser.rate: 0"),
     ] {
         let config = config("double-integrator", &[set]);
         let refused = config.train_settings().map(|_| ()).unwrap_err();

@@ -18,8 +18,12 @@ use super::score::{share, successes};
 use super::settings::DdpgSettings;
 use crate::error::Result;
 use crate::policy::{Activation, Mlp, OutputActivation};
-use crate::rollout::{Plant, Purpose, Stream};
+use crate::rollout::{Plant, Purpose, RolloutSpec, Stream};
 use crate::system::System;
+
+/// The backup knows no horizon: what the critic tells is compared with rollouts so many times as
+/// long as those that are scored.
+const LONGER: u32 = 4;
 
 /// Where the disturbance acts and how far it moves a state per step, and what the networks see.
 #[derive(Clone, Debug)]
@@ -237,7 +241,7 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ddpg<'_, S
         vec![
             "share of held-out starts with G > 0".to_owned(),
             "the same under the disturbance".to_owned(),
-            "share of signs under the disturbance that the critic tells".to_owned(),
+            "share of signs of longer disturbed rollouts that the critic tells".to_owned(),
         ]
     }
 
@@ -246,16 +250,19 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ddpg<'_, S
         let [policy, disturbance, _] = &self.exported()?;
         let calm = successes(backend, Plant { system, policy }, spec, &self.held_out)?;
         let system = &Disturbed::new(system, disturbance, &self.entries);
-        let pushed = successes(backend, Plant { system, policy }, spec, &self.held_out)?;
+        let plant = Plant { system, policy };
+        let pushed = successes(backend, plant, spec, &self.held_out)?;
+        let longer = RolloutSpec::new(LONGER * spec.horizon, spec.gamma)?;
+        let ever = successes(backend, plant, longer, &self.held_out)?;
         let networks = [&self.control, &self.disturbance, &self.critic].map(|agent| &agent.network);
         let told = self.told(networks, &self.held_out);
-        let right = told.iter().zip(&pushed).map(|(told, success)| (*told > 0.0) == *success);
-        Ok(vec![share(calm.into_iter()), share(pushed.iter().copied()), share(right)])
+        let right = told.iter().zip(ever).map(|(told, success)| (*told > 0.0) == success);
+        Ok(vec![share(calm.into_iter()), share(pushed.into_iter()), share(right)])
     }
 
     fn networks(&self) -> Result<Vec<(&'static str, Mlp)>> {
         let [policy, disturbance, critic] = self.exported()?;
-        Ok(vec![("policy", policy), ("disturbance", disturbance), ("critic", critic)])
+        Ok(vec![("critic", critic), ("disturbance", disturbance), ("policy", policy)])
     }
 
     fn arrays(&mut self) -> Vec<(&'static str, &mut Vec<f32>)> {

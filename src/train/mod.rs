@@ -11,12 +11,16 @@ pub mod checkpoint;
 pub mod ddpg;
 pub mod disturbed;
 pub mod environments;
+pub mod gae;
 #[cfg(feature = "train")]
 pub mod network;
 #[cfg(feature = "train")]
 pub mod physics;
+#[cfg(feature = "train")]
+pub mod ppo;
 pub mod record;
 pub mod replay;
+pub mod reward;
 pub mod run;
 pub mod samples;
 pub mod score;

@@ -34,6 +34,8 @@ pub struct TrainSettings {
     pub value: ValueSettings,
     /// A policy, a disturbance and their critic.
     pub ddpg: DdpgSettings,
+    /// A policy on the ordinary reward.
+    pub ppo: PpoSettings,
 }
 
 /// What is trained, and how.
@@ -49,6 +51,8 @@ pub enum Method {
     ActionValue,
     /// A policy against a disturbance, both by the critic of the reach-avoid backup
     Ddpg,
+    /// A policy, by proximal policy optimisation on an ordinary reward
+    Ppo,
 }
 
 impl Method {
@@ -59,6 +63,7 @@ impl Method {
             Self::Value => "value",
             Self::ActionValue => "action-value",
             Self::Ddpg => "ddpg",
+            Self::Ppo => "ppo",
         }
     }
 }
@@ -136,6 +141,48 @@ pub struct DdpgSettings {
     pub actor: Optimiser,
 }
 
+/// Proximal policy optimisation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PpoSettings {
+    /// Flights of all plants, each followed by updates.
+    pub iterations: u64,
+    /// Plants.
+    pub environments: usize,
+    /// Steps that each makes in an iteration.
+    pub steps: usize,
+    /// Times that the steps of an iteration are learned from.
+    pub epochs: u64,
+    /// Steps of each update.
+    pub batch: usize,
+    /// Change of a probability beyond which there is nothing to gain.
+    pub clip: f64,
+    /// Weight of later temporal differences in an advantage.
+    pub lambda: f64,
+    /// Weight of the policy's entropy.
+    pub entropy: f64,
+    /// Standard deviation of each control at first.
+    pub spread: f64,
+    /// What is rewarded.
+    pub reward: RewardSettings,
+    /// How parameters follow their gradients.
+    pub optimiser: Optimiser,
+}
+
+/// The ordinary reward.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RewardSettings {
+    /// Where to go, by state name.
+    pub goal: BTreeMap<String, f64>,
+    /// What a unit of distance toward the goal is worth.
+    pub progress: f64,
+    /// What entering the target is worth; leaving it costs as much.
+    pub target: f64,
+    /// What a violation outside of the target costs.
+    pub violation: f64,
+}
+
 impl TrainSettings {
     /// Refuses numbers out of range.
     ///
@@ -156,7 +203,8 @@ impl TrainSettings {
         }
         self.analytic.check()?;
         self.value.check()?;
-        self.ddpg.check()
+        self.ddpg.check()?;
+        self.ppo.check()
     }
 }
 
@@ -202,6 +250,27 @@ impl DdpgSettings {
         }
         optimiser("train.ddpg.critic", &self.critic)?;
         optimiser("train.ddpg.actor", &self.actor)
+    }
+}
+
+impl PpoSettings {
+    fn check(&self) -> Result<()> {
+        count("train.ppo.iterations", self.iterations, u64::MAX)?;
+        count("train.ppo.environments", self.environments as u64, MOST)?;
+        count("train.ppo.steps", self.steps as u64, MOST)?;
+        count("train.ppo.epochs", self.epochs, MOST)?;
+        count("train.ppo.batch", self.batch as u64, MOST)?;
+        share("train.ppo.clip", self.clip)?;
+        share("train.ppo.lambda", self.lambda)?;
+        not_negative("train.ppo.entropy", self.entropy)?;
+        positive("train.ppo.spread", self.spread)?;
+        not_negative("train.ppo.reward.progress", self.reward.progress)?;
+        not_negative("train.ppo.reward.target", self.reward.target)?;
+        not_negative("train.ppo.reward.violation", self.reward.violation)?;
+        if self.reward.goal.is_empty() {
+            return Err(Error::invalid("train.ppo.reward.goal", "empty; name a state"));
+        }
+        optimiser("train.ppo.optimiser", &self.optimiser)
     }
 }
 

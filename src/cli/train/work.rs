@@ -37,7 +37,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
     let settings = config.train_settings()?;
     let training = Training { config, settings, backend: &backend, watch: &progress, out: &out };
     let trained = match settings.method {
-        Method::Analytic | Method::Ddpg => config.with_system(training)?,
+        Method::Analytic | Method::Ddpg | Method::Ppo => config.with_system(training)?,
         Method::Value | Method::ActionValue => {
             config.with_plant(&config.policy_source(folder)?, training)?
         }
@@ -98,8 +98,10 @@ impl SystemJob for Training<'_> {
     where
         S: System<NX, NU>,
     {
-        if self.settings.method == Method::Ddpg {
-            return self.ddpg(system);
+        match self.settings.method {
+            Method::Ddpg => return self.ddpg(system),
+            Method::Ppo => return self.ppo(system),
+            _ => {}
         }
         let Self { config, settings, backend, watch, .. } = self;
         let axes = system.states();

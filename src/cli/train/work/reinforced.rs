@@ -6,6 +6,8 @@ use crate::rollout::Plant;
 use crate::system::System;
 use crate::train::analytic::Task;
 use crate::train::ddpg::{Ddpg, Game};
+use crate::train::ppo::{Lesson, Ppo};
+use crate::train::reward::Reward;
 use crate::train::run::Trained;
 
 impl Training<'_> {
@@ -22,6 +24,23 @@ impl Training<'_> {
         let settings = &self.settings.ddpg;
         let mut learner = Ddpg::new(self.task(system)?, game, settings.clone());
         let [policy, ..] = &learner.exported()?;
+        self.train(&mut learner, settings.iterations, Plant { system, policy })
+    }
+
+    /// A policy of `system` on its ordinary reward.
+    pub(super) fn ppo<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Trained>
+    where
+        S: System<NX, NU>,
+    {
+        let settings = &self.settings.ppo;
+        let goal = self.config.goal(&system.states())?;
+        let lesson = Lesson {
+            reward: Reward { goal, weights: settings.reward.clone() },
+            states: self.intervals(system)?,
+            hidden: self.settings.hidden.clone(),
+        };
+        let mut learner = Ppo::new(self.task(system)?, lesson, settings.clone());
+        let policy = &learner.exported()?;
         self.train(&mut learner, settings.iterations, Plant { system, policy })
     }
 
