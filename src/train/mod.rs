@@ -13,6 +13,8 @@ pub mod disturbed;
 pub mod environments;
 pub mod gae;
 #[cfg(feature = "train")]
+pub mod layer;
+#[cfg(feature = "train")]
 pub mod network;
 #[cfg(feature = "train")]
 pub mod physics;

@@ -3,8 +3,9 @@
 use burn_autodiff::Autodiff;
 use burn_autodiff::grads::Gradients;
 use burn_ndarray::{NdArray, NdArrayDevice};
-use burn_tensor::{Tensor, activation};
+use burn_tensor::Tensor;
 
+use super::layer::{Curve, layer};
 use super::physics::{floats, tensor};
 use crate::error::Result;
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
@@ -155,14 +156,11 @@ impl Bound {
     pub fn forward(&self, inputs: Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2> {
         let mut x = inputs;
         for (i, [weight, bias]) in self.layers.iter().enumerate() {
-            x = x.matmul(weight.clone()) + bias.clone();
-            let last = i + 1 == self.layers.len();
-            x = match (last, self.activation, self.output) {
-                (true, _, OutputActivation::Identity) => x,
-                (true, _, OutputActivation::Tanh) | (false, Activation::Tanh, _) => x.tanh(),
-                (false, Activation::Relu, _) => activation::relu(x),
-                (false, Activation::Silu, _) => activation::silu(x),
+            let curve = match i + 1 == self.layers.len() {
+                true => Curve::Last(self.output),
+                false => Curve::Hidden(self.activation),
             };
+            x = layer(x, weight.clone(), bias.clone(), curve);
         }
         x
     }

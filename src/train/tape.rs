@@ -90,6 +90,7 @@ impl Tape {
     #[inline(always)]
     pub fn forward<R: Real>(&self, inputs: &[R], temperature: f32, values: &mut Vec<R>) {
         values.clear();
+        values.reserve(self.ops.len());
         for op in &self.ops {
             let at = |i: u32| values[i as usize];
             let value = match *op {
