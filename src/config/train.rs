@@ -9,7 +9,8 @@ use crate::rollout::Region;
 use crate::system::Axis;
 use crate::train::adam::Optimiser;
 use crate::train::settings::{
-    AnalyticSettings, Method, StartsSection, TrainSettings, ValueSettings,
+    AnalyticSettings, DdpgSettings, Method, PpoSettings, RewardSettings, StartsSection,
+    TrainSettings, ValueSettings,
 };
 use crate::train::starts::Mixture;
 
@@ -19,7 +20,11 @@ pub(super) fn race() -> TrainSettings {
     let slow = part(0.5, &[("opp_vy", [0.1, 0.45])]);
     let start = drones(0.25, [0.8, 0.0, 0.1, 0.1], [-2.5, -1.0], [[0.5, 0.7], [0.3, 0.5]]);
     let wide = drones(0.25, [0.95, 0.5, 0.3, 0.3], [-2.8, -0.2], [[0.1, 1.0], [0.2, 0.55]]);
-    TrainSettings { starts: vec![slow, start, wide], ..common(vec![64; 3]) }
+    let mut settings = common(vec![64; 3]);
+    settings.ddpg.disturbance = named(&[("opp_vx", 0.01), ("opp_vy", 0.01), ("opp_vz", 0.01)]);
+    // Beyond the gate, so that the way there leads through it.
+    settings.ppo.reward.goal = named(&[("ego_x", 0.0), ("ego_y", 0.5), ("ego_z", 0.0)]);
+    TrainSettings { starts: vec![slow, start, wide], ..settings }
 }
 
 /// Training for the double integrator.
@@ -28,6 +33,8 @@ pub(super) fn double_integrator() -> TrainSettings {
     settings.analytic.iterations = 1000;
     settings.analytic.certified = 0.0;
     settings.value.states = 50_000;
+    settings.ddpg.disturbance = named(&[("velocity", 0.01)]);
+    settings.ppo.reward.goal = named(&[("position", 0.0)]);
     settings
 }
 
@@ -58,7 +65,57 @@ fn common(hidden: Vec<usize>) -> TrainSettings {
             visited: 0.3,
             optimiser: Optimiser { rate: 3e-3, decays: [0.9, 0.999], ..optimiser },
         },
+        ddpg: ddpg(),
+        ppo: ppo(),
     }
+}
+
+/// DDPG with the rates, the noise and the copies of the published line of work.
+fn ddpg() -> DdpgSettings {
+    DdpgSettings {
+        iterations: 100_000,
+        batch: 256,
+        environments: 16,
+        replay: 1 << 17,
+        noise: 0.1,
+        random: 0.5,
+        polyak: 0.005,
+        disturbance: BTreeMap::new(),
+        critic: constant(1e-3, 1.0),
+        actor: constant(1e-4, 1.0),
+    }
+}
+
+/// PPO with the clip, the weights and the entropy of the published baseline.
+fn ppo() -> PpoSettings {
+    PpoSettings {
+        iterations: 600,
+        environments: 64,
+        steps: 32,
+        epochs: 4,
+        batch: 256,
+        clip: 0.2,
+        lambda: 0.95,
+        entropy: 0.004,
+        spread: 0.5,
+        reward: RewardSettings {
+            goal: BTreeMap::new(),
+            progress: 1.0,
+            target: 1.0,
+            violation: 2.0,
+        },
+        optimiser: constant(1e-3, 0.5),
+    }
+}
+
+/// A rate that stays as it is.
+fn constant(rate: f64, clip: f64) -> Optimiser {
+    Optimiser { rate, warmup: 0, last: 1.0, clip, decays: [0.9, 0.999] }
+}
+
+/// Numbers by state name.
+fn named(numbers: &[(&str, f64)]) -> BTreeMap<String, f64> {
+    numbers.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect()
 }
 
 /// Both drones in boxes that differ in their speed toward the gate alone: `around` bounds position
@@ -113,4 +170,33 @@ impl Config {
         let parts = self.train_settings()?.starts.iter().enumerate().map(part);
         Ok(Mixture { parts: parts.collect::<Result<_>>()? })
     }
+
+    /// The coordinates that a disturbance acts on in training, in order, with its scales.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key of no state, and those of [`Self::train_settings`].
+    pub fn disturbed<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Vec<(usize, f32)>> {
+        coordinates("train.ddpg.disturbance", &self.train_settings()?.ddpg.disturbance, axes)
+    }
+
+    /// The goal of the ordinary reward: coordinates, in order, with its place.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the key of no state, and those of [`Self::train_settings`].
+    pub fn goal<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Vec<(usize, f32)>> {
+        coordinates("train.ppo.reward.goal", &self.train_settings()?.ppo.reward.goal, axes)
+    }
+}
+
+/// The numbers of states by their coordinates, in order.
+fn coordinates(
+    place: &str,
+    named: &BTreeMap<String, f64>,
+    axes: &[Axis],
+) -> Result<Vec<(usize, f32)>> {
+    let entry =
+        |(name, number): (&String, &f64)| Ok((state_index(place, name, axes)?, *number as f32));
+    let mut entries = named.iter().map(entry).collect::<Result<Vec<_>>>()?;
+    entries.sort_by_key(|(i, _)| *i);
+    Ok(entries)
 }

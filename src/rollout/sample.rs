@@ -53,6 +53,8 @@ pub enum Purpose {
     TrainControl,
     /// Starts that training is scored on and never sees.
     HeldOut,
+    /// Noise on the controls that reinforcement learning tries.
+    TrainNoise,
 }
 
 /// A sequence of random samples, addressed by index.
@@ -110,6 +112,16 @@ impl Stream {
             Lanes::lit(low[i]) + unit(words[i % 4]) * Lanes::lit(high[i] - low[i])
         };
         (0..low.len()).map(coordinate).collect()
+    }
+
+    /// `count` independent standard normal numbers of the sample `index`.
+    pub fn normals(&self, index: u64, count: usize) -> Vec<f32> {
+        let pair = |pair: usize| {
+            let words = self.words::<1>(index, (pair / 2) as u32);
+            let [magnitude, turn] = [0, 1].map(|i| unit(words[2 * (pair % 2) + i]));
+            normal_pair(Lanes::lit(1.0) - magnitude, turn).map(|lane| lane.0[0])
+        };
+        (0..count.div_ceil(2)).flat_map(pair).take(count).collect()
     }
 
     /// Number `word` of the uniform draws in `[0, 1)` of each sample `first..first + N`.

@@ -103,7 +103,7 @@ impl Checkpoint {
                 Some(name) => checkpoint.best.push((name.to_owned(), view.data().to_vec())),
                 None => {
                     let values = view.data().chunks_exact(4);
-                    let values = values.map(|word| bytemuck::pod_read_unaligned(word)).collect();
+                    let values = values.map(bytemuck::pod_read_unaligned).collect();
                     checkpoint.arrays.push((name.to_owned(), values));
                 }
             }

@@ -85,12 +85,25 @@ impl Network {
 
     /// The network as tensors whose derivatives are wanted.
     pub fn bind(&self) -> Bound {
+        self.bound(Tensor::require_grad)
+    }
+
+    /// The network as tensors that nothing is derived by; its inputs may be.
+    pub fn fixed(&self) -> Bound {
+        self.bound(|leaf| leaf)
+    }
+
+    /// The network as tensors, each leaf as `mark` makes it.
+    fn bound(
+        &self,
+        mark: impl Fn(Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2>,
+    ) -> Bound {
         let mut rest = self.parameters.as_slice();
         let mut leaves = Vec::new();
         for [inputs, outputs] in self.shape.layers() {
             for rows in [inputs, 1] {
                 let (values, after) = rest.split_at(rows * outputs);
-                leaves.push(tensor(values.to_vec(), [rows, outputs]).require_grad());
+                leaves.push(mark(tensor(values.to_vec(), [rows, outputs])));
                 rest = after;
             }
         }

@@ -32,7 +32,7 @@ pub trait Learner {
     /// Those of the device.
     fn scores(&self) -> Result<Vec<f64>>;
 
-    /// The networks, each with the name of its file without ending.
+    /// The networks, each with the name of its file without ending, in the order of the names.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a parameter is not finite.

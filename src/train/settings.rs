@@ -9,6 +9,8 @@ use crate::error::{Error, Result};
 
 /// Most rows of a batch, neurons of a layer and layers: more is a slip.
 const MOST: u64 = 1 << 16;
+/// Most steps that are remembered: every checkpoint holds them all.
+const MOST_REMEMBERED: u64 = 1 << 22;
 
 /// How networks are trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,6 +32,10 @@ pub struct TrainSettings {
     pub analytic: AnalyticSettings,
     /// Networks that tell the measure.
     pub value: ValueSettings,
+    /// A policy, a disturbance and their critic.
+    pub ddpg: DdpgSettings,
+    /// A policy on the ordinary reward.
+    pub ppo: PpoSettings,
 }
 
 /// What is trained, and how.
@@ -43,6 +49,10 @@ pub enum Method {
     Value,
     /// Q(x, u), the measure after a first control
     ActionValue,
+    /// A policy against a disturbance, both by the critic of the reach-avoid backup
+    Ddpg,
+    /// A policy, by proximal policy optimisation on an ordinary reward
+    Ppo,
 }
 
 impl Method {
@@ -52,6 +62,8 @@ impl Method {
             Self::Analytic => "analytic",
             Self::Value => "value",
             Self::ActionValue => "action-value",
+            Self::Ddpg => "ddpg",
+            Self::Ppo => "ppo",
         }
     }
 }
@@ -103,6 +115,74 @@ pub struct ValueSettings {
     pub optimiser: Optimiser,
 }
 
+/// Min-max DDPG.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DdpgSettings {
+    /// Updates of each network.
+    pub iterations: u64,
+    /// Remembered steps of each update.
+    pub batch: usize,
+    /// Plants that make one step before each update.
+    pub environments: usize,
+    /// Steps that are remembered.
+    pub replay: usize,
+    /// Standard deviation of the noise on what both players do.
+    pub noise: f64,
+    /// Share of the plants whose players do anything, uniformly, in place of that.
+    pub random: f64,
+    /// Share by which the slow copies follow at each update.
+    pub polyak: f64,
+    /// What a full disturbance adds to a state at each step, by state name.
+    pub disturbance: BTreeMap<String, f64>,
+    /// How the critic's parameters follow their gradients.
+    pub critic: Optimiser,
+    /// The same for control and disturbance.
+    pub actor: Optimiser,
+}
+
+/// Proximal policy optimisation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PpoSettings {
+    /// Flights of all plants, each followed by updates.
+    pub iterations: u64,
+    /// Plants.
+    pub environments: usize,
+    /// Steps that each makes in an iteration.
+    pub steps: usize,
+    /// Times that the steps of an iteration are learned from.
+    pub epochs: u64,
+    /// Steps of each update.
+    pub batch: usize,
+    /// Change of a probability beyond which there is nothing to gain.
+    pub clip: f64,
+    /// Weight of later temporal differences in an advantage.
+    pub lambda: f64,
+    /// Weight of the policy's entropy.
+    pub entropy: f64,
+    /// Standard deviation of each control at first.
+    pub spread: f64,
+    /// What is rewarded.
+    pub reward: RewardSettings,
+    /// How parameters follow their gradients.
+    pub optimiser: Optimiser,
+}
+
+/// The ordinary reward.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RewardSettings {
+    /// Where to go, by state name.
+    pub goal: BTreeMap<String, f64>,
+    /// What a unit of distance toward the goal is worth.
+    pub progress: f64,
+    /// What entering the target is worth; leaving it costs as much.
+    pub target: f64,
+    /// What a violation outside of the target costs.
+    pub violation: f64,
+}
+
 impl TrainSettings {
     /// Refuses numbers out of range.
     ///
@@ -122,7 +202,9 @@ impl TrainSettings {
             return Err(Error::invalid("train.starts", "empty; give one box or more"));
         }
         self.analytic.check()?;
-        self.value.check()
+        self.value.check()?;
+        self.ddpg.check()?;
+        self.ppo.check()
     }
 }
 
@@ -147,6 +229,48 @@ impl ValueSettings {
         count("train.value.states", self.states, 1 << 32)?;
         share("train.value.visited", self.visited)?;
         optimiser("train.value.optimiser", &self.optimiser)
+    }
+}
+
+impl DdpgSettings {
+    fn check(&self) -> Result<()> {
+        count("train.ddpg.iterations", self.iterations, u64::MAX)?;
+        count("train.ddpg.batch", self.batch as u64, MOST)?;
+        count("train.ddpg.environments", self.environments as u64, MOST)?;
+        count("train.ddpg.replay", self.replay as u64, MOST_REMEMBERED)?;
+        not_negative("train.ddpg.noise", self.noise)?;
+        share("train.ddpg.random", self.random)?;
+        share("train.ddpg.polyak", self.polyak)?;
+        if self.disturbance.is_empty() {
+            let problem = "empty; name a state, with 0 for a disturbance that does nothing";
+            return Err(Error::invalid("train.ddpg.disturbance", problem));
+        }
+        for (state, &scale) in &self.disturbance {
+            not_negative(&format!("train.ddpg.disturbance.{state}"), scale)?;
+        }
+        optimiser("train.ddpg.critic", &self.critic)?;
+        optimiser("train.ddpg.actor", &self.actor)
+    }
+}
+
+impl PpoSettings {
+    fn check(&self) -> Result<()> {
+        count("train.ppo.iterations", self.iterations, u64::MAX)?;
+        count("train.ppo.environments", self.environments as u64, MOST)?;
+        count("train.ppo.steps", self.steps as u64, MOST)?;
+        count("train.ppo.epochs", self.epochs, MOST)?;
+        count("train.ppo.batch", self.batch as u64, MOST)?;
+        share("train.ppo.clip", self.clip)?;
+        share("train.ppo.lambda", self.lambda)?;
+        not_negative("train.ppo.entropy", self.entropy)?;
+        positive("train.ppo.spread", self.spread)?;
+        not_negative("train.ppo.reward.progress", self.reward.progress)?;
+        not_negative("train.ppo.reward.target", self.reward.target)?;
+        not_negative("train.ppo.reward.violation", self.reward.violation)?;
+        if self.reward.goal.is_empty() {
+            return Err(Error::invalid("train.ppo.reward.goal", "empty; name a state"));
+        }
+        optimiser("train.ppo.optimiser", &self.optimiser)
     }
 }
 

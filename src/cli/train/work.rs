@@ -1,5 +1,7 @@
 //! Training in a program that was built with it.
 
+mod reinforced;
+
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -39,7 +41,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
     let settings = config.train_settings()?;
     let training = Training { config, settings, backend: &backend, watch: &progress, out: &out };
     let trained = match settings.method {
-        Method::Analytic => config.with_system(training)?,
+        Method::Analytic | Method::Ddpg | Method::Ppo => config.with_system(training)?,
         Method::Value | Method::ActionValue => {
             config.with_plant(&config.policy_source(folder)?, training)?
         }
@@ -106,6 +108,11 @@ impl SystemJob for Training<'_> {
     where
         S: System<NX, NU>,
     {
+        match self.settings.method {
+            Method::Ddpg => return self.ddpg(system),
+            Method::Ppo => return self.ppo(system),
+            _ => {}
+        }
         let Self { config, settings, backend, watch, .. } = self;
         let axes = system.states();
         let checked = config.settings(&axes)?;

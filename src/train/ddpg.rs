@@ -1,0 +1,286 @@
+//! Min-max DDPG: a critic of the reach-avoid backup, a control that ascends it, and a disturbance
+//! that descends it.
+
+use std::array::from_fn;
+
+use burn_tensor::Tensor;
+
+use super::agent::Agent;
+use super::analytic::{LAST, Task};
+use super::backup::Margins;
+use super::disturbed::{Disturbed, pushed};
+use super::environments::Environments;
+use super::network::{Differentiable, Network, Shape};
+use super::physics::{floats, tensor};
+use super::replay::Replay;
+use super::run::Learner;
+use super::score::{share, successes};
+use super::settings::DdpgSettings;
+use crate::error::Result;
+use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::rollout::{Plant, Purpose, RolloutSpec, Stream};
+use crate::system::System;
+
+/// The backup knows no horizon: what the critic tells is compared with rollouts so many times as
+/// long as those that are scored.
+const LONGER: u32 = 4;
+
+/// Where the disturbance acts and how far it moves a state per step, and what the networks see.
+#[derive(Clone, Debug)]
+pub struct Game {
+    /// Coordinate and scale of each output of the disturbance.
+    pub entries: Vec<(usize, f32)>,
+    /// Interval of each state.
+    pub states: Vec<[f32; 2]>,
+    /// Neurons of each hidden layer.
+    pub hidden: Vec<usize>,
+}
+
+/// Control, disturbance and critic under training.
+#[derive(Debug)]
+pub struct Ddpg<'a, S, const NX: usize, const NU: usize> {
+    task: Task<'a, S, NX>,
+    entries: Vec<(usize, f32)>,
+    settings: DdpgSettings,
+    environments: Environments<NX>,
+    /// Rows of state, control and disturbance: all else follows from them.
+    replay: Replay,
+    control: Agent,
+    disturbance: Agent,
+    critic: Agent,
+    held_out: Vec<[f32; NX]>,
+}
+
+impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU> {
+    /// Random networks, and plants at their starts.
+    pub fn new(task: Task<'a, S, NX>, game: Game, settings: DdpgSettings) -> Self {
+        let Game { entries, states, hidden } = game;
+        let random = |number: u32, inputs: Vec<[f32; 2]>, outputs, output, last| {
+            let (hidden, activation) = (hidden.clone(), Activation::Relu);
+            let shape = Shape { inputs, hidden, outputs, activation, output };
+            let stream = Stream::new(task.seed, Purpose::TrainWeight, number);
+            Agent::new(Network::random(shape, stream, last))
+        };
+        let actor =
+            |number, outputs| random(number, states.clone(), outputs, OutputActivation::Tanh, LAST);
+        let acts = vec![[-1.0, 1.0]; NU + entries.len()];
+        let joint = [states.clone(), acts].concat();
+        let horizon = task.spec.horizon;
+        Self {
+            control: actor(0, NU),
+            disturbance: actor(1, entries.len()),
+            replay: Replay::new(settings.replay, joint.len()),
+            critic: random(2, joint, 1, OutputActivation::Identity, 1.0),
+            environments: Environments::new(
+                task.mixture.clone(),
+                task.seed,
+                horizon,
+                settings.environments,
+            ),
+            held_out: task.mixture.draw(task.seed, Purpose::HeldOut, 0, task.held_out as usize),
+            entries,
+            settings,
+            task,
+        }
+    }
+
+    /// The state after `x` under the acts `[NU + disturbances]`.
+    fn next(&self, x: [f32; NX], acts: &[f32]) -> [f32; NX] {
+        let (u, d) = acts.split_at(NU);
+        pushed(self.task.system.step(x, from_fn(|i| u[i])), &self.entries, d)
+    }
+
+    /// One step of every plant, remembered.
+    fn explore(&mut self, iteration: u64) {
+        let count = self.environments.len();
+        let first = iteration * count as u64;
+        let states = self.environments.each();
+        let acts = self.tried(first, &states);
+        let mut next = Vec::with_capacity(count);
+        for (i, (x, acts)) in states.iter().zip(&acts).enumerate() {
+            self.replay.write(first + i as u64, &[&x[..], acts].concat());
+            next.push(self.next(*x, acts));
+        }
+        let system = self.task.system;
+        // Where an episode ends says what is seen, not what it is worth: no state is terminal.
+        self.environments.advance(iteration, &next, |x| system.constraint(*x) <= 0.0);
+    }
+
+    /// What both players try at `states`, whose first is sample number `first`: their own acts
+    /// with noise, or for a share of the plants any act.
+    fn tried(&self, first: u64, states: &[[f32; NX]]) -> Vec<Vec<f32>> {
+        let size = NU + self.entries.len();
+        let rows = tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let [u, d] = [&self.control, &self.disturbance]
+            .map(|actor| actor.network.fixed().forward(rows.clone()));
+        let own = floats(Tensor::cat(vec![u, d], 1).inner());
+        let noise = Stream::new(self.task.seed, Purpose::TrainNoise, 0);
+        let uniform = Stream::new(self.task.seed, Purpose::TrainControl, 0);
+        let act = |(i, own): (usize, &[f32])| {
+            let (index, random) = (first + i as u64, self.settings.random);
+            // Spread over the parts of the mixture, which stand one after the other.
+            if ((i + 1) as f64 * random).floor() > (i as f64 * random).floor() {
+                let drawn = uniform.in_box::<1>(&vec![-1.0; size], &vec![1.0; size], index);
+                return drawn.into_iter().map(|lane| lane.0[0]).collect();
+            }
+            let noise = noise.normals(index, size);
+            let noisy =
+                |(act, z): (&f32, f32)| (act + self.settings.noise as f32 * z).clamp(-1.0, 1.0);
+            own.iter().zip(noise).map(noisy).collect()
+        };
+        own.chunks_exact(size).enumerate().map(act).collect()
+    }
+
+    /// Rows that were remembered, `[batch, NX + NU + disturbances]`.
+    fn remembered(&self, iteration: u64) -> Vec<f32> {
+        let batch = self.settings.batch;
+        let written = (iteration + 1) * self.environments.len() as u64;
+        let choice = Stream::new(self.task.seed, Purpose::TrainChoice, 0);
+        self.replay
+            .draw(written, choice, iteration * batch as u64, batch)
+            .flatten()
+            .copied()
+            .collect()
+    }
+
+    /// What the critic should tell for `rows`: the backup of what the slow copies tell of the next
+    /// states, held where the margins there say that it lies.
+    fn wanted(&self, rows: &[f32]) -> Vec<f32> {
+        let rows: Vec<([f32; NX], &[f32])> = rows
+            .chunks_exact(NX + NU + self.entries.len())
+            .map(|row| (from_fn(|i| row[i]), &row[NX..]))
+            .collect();
+        let next: Vec<[f32; NX]> = rows.iter().map(|(x, acts)| self.next(*x, acts)).collect();
+        let told =
+            self.told([&self.control.slow, &self.disturbance.slow, &self.critic.slow], &next);
+        let (system, gamma) = (self.task.system, self.task.spec.gamma);
+        let backup = |((told, next), (x, _)): ((f32, [f32; NX]), ([f32; NX], &[f32]))| {
+            let held = Margins::of(system, next).hold(told);
+            Margins::of(system, x).backup(gamma, held)
+        };
+        told.into_iter().zip(next).zip(rows).map(backup).collect()
+    }
+
+    /// What `critic` tells of `states` under the acts of both players.
+    fn told(
+        &self,
+        [control, disturbance, critic]: [&Network; 3],
+        states: &[[f32; NX]],
+    ) -> Vec<f32> {
+        let x = tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let joint = joint(&x, [control, disturbance].map(|actor| actor.fixed().forward(x.clone())));
+        floats(critic.fixed().forward(joint).inner())
+    }
+
+    /// One update of the critic on `rows`; returns its loss, `mean(td^2 |td|)`.
+    fn criticise(&mut self, rows: &[f32], progress: [u64; 2]) -> f64 {
+        let wanted = self.wanted(rows);
+        let (count, columns) = (wanted.len(), rows.len() / wanted.len());
+        let critic = self.critic.network.bind();
+        let told = critic.forward(tensor(rows.to_vec(), [count, columns]));
+        let apart = (told - tensor(wanted, [count, 1])).abs();
+        let loss = (apart.clone() * apart.clone() * apart).mean();
+        let gradient = critic.gradient(&loss.backward());
+        let DdpgSettings { critic, polyak, .. } = &self.settings;
+        self.critic.follow(&gradient, critic, progress, *polyak);
+        floats(loss.inner()).iter().map(|loss| f64::from(*loss)).sum()
+    }
+
+    /// One update of both players at the states of `rows`, from one reverse sweep.
+    fn play(&mut self, rows: &[f32], progress: [u64; 2]) {
+        let columns = NX + NU + self.entries.len();
+        let states = rows.chunks_exact(columns).flat_map(|row| &row[..NX]).copied().collect();
+        let x = tensor(states, [rows.len() / columns, NX]);
+        let [control, disturbance] = [&self.control, &self.disturbance].map(|a| a.network.bind());
+        let acts = [&control, &disturbance].map(|actor| actor.forward(x.clone()));
+        let worth = self.critic.network.fixed().forward(joint(&x, acts)).mean();
+        let slopes = worth.backward();
+        let rises: Vec<f32> = control.gradient(&slopes).into_iter().map(|slope| -slope).collect();
+        let falls = disturbance.gradient(&slopes);
+        let DdpgSettings { actor, polyak, .. } = &self.settings;
+        self.control.follow(&rises, actor, progress, *polyak);
+        self.disturbance.follow(&falls, actor, progress, *polyak);
+    }
+
+    /// Control, disturbance and critic as the engine takes them.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if a parameter is not finite.
+    pub fn exported(&self) -> Result<[Mlp; 3]> {
+        let order = self.task.system.states().map(|axis| axis.name).to_vec();
+        let controls = self.task.system.controls().map(|axis| axis.name);
+        let pushes = self.entries.iter().map(|(i, _)| format!("push_{}", order[*i]));
+        let joint = order.iter().cloned().chain(controls).chain(pushes).collect();
+        Ok([
+            self.control.network.export(order.clone())?,
+            self.disturbance.network.export(order)?,
+            self.critic.network.export(joint)?,
+        ])
+    }
+}
+
+/// States and acts side by side.
+fn joint(
+    x: &Tensor<Differentiable, 2>,
+    [u, d]: [Tensor<Differentiable, 2>; 2],
+) -> Tensor<Differentiable, 2> {
+    Tensor::cat(vec![x.clone(), u, d], 1)
+}
+
+impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ddpg<'_, S, NX, NU> {
+    fn update(&mut self, iteration: u64) -> Result<f64> {
+        self.explore(iteration);
+        let rows = self.remembered(iteration);
+        let progress = [iteration, self.settings.iterations];
+        let loss = self.criticise(&rows, progress);
+        self.play(&rows, progress);
+        Ok(loss)
+    }
+
+    fn score_names(&self) -> Vec<String> {
+        vec![
+            "share of held-out starts with G > 0".to_owned(),
+            "the same under the disturbance".to_owned(),
+            "share of signs of longer disturbed rollouts that the critic tells".to_owned(),
+        ]
+    }
+
+    fn scores(&self) -> Result<Vec<f64>> {
+        let Task { system, backend, spec, .. } = self.task;
+        let [policy, disturbance, _] = &self.exported()?;
+        let calm = successes(backend, Plant { system, policy }, spec, &self.held_out)?;
+        let system = &Disturbed::new(system, disturbance, &self.entries);
+        let plant = Plant { system, policy };
+        let pushed = successes(backend, plant, spec, &self.held_out)?;
+        let longer = RolloutSpec::new(LONGER * spec.horizon, spec.gamma)?;
+        let ever = successes(backend, plant, longer, &self.held_out)?;
+        let networks = [&self.control, &self.disturbance, &self.critic].map(|agent| &agent.network);
+        let told = self.told(networks, &self.held_out);
+        let right = told.iter().zip(ever).map(|(told, success)| (*told > 0.0) == success);
+        Ok(vec![share(calm.into_iter()), share(pushed.into_iter()), share(right)])
+    }
+
+    fn networks(&self) -> Result<Vec<(&'static str, Mlp)>> {
+        let [policy, disturbance, critic] = self.exported()?;
+        Ok(vec![("critic", critic), ("disturbance", disturbance), ("policy", policy)])
+    }
+
+    fn arrays(&mut self) -> Vec<(&'static str, &mut Vec<f32>)> {
+        let Self { environments, replay, control, disturbance, critic, .. } = self;
+        let networks = [
+            (control, ["control", "control.slow", "control.first", "control.second"]),
+            (
+                disturbance,
+                ["disturbance", "disturbance.slow", "disturbance.first", "disturbance.second"],
+            ),
+            (critic, ["critic", "critic.slow", "critic.first", "critic.second"]),
+        ];
+        let networks = networks.into_iter().flat_map(|(agent, names)| agent.arrays(names));
+        let plants = [
+            ("states", &mut environments.states),
+            ("ages", &mut environments.ages),
+            ("replay", &mut replay.rows),
+        ];
+        networks.chain(plants).collect()
+    }
+}
