@@ -23,4 +23,4 @@ pub mod rollout;
 pub mod scenario;
 pub mod system;
 
-pub use error::{Error, Result};
+pub use error::{Error, Fault, Result};

@@ -5,6 +5,7 @@
 mod cache;
 mod edges;
 mod failures;
+mod faults;
 mod measures;
 mod mppi;
 mod networks;
