@@ -34,6 +34,15 @@ pub enum Action {
     Cpu,
 }
 
+/// Adds to `all` those of `more` that are not in it yet.
+pub fn add_events(all: &mut Vec<Event>, more: impl IntoIterator<Item = Event>) {
+    for event in more {
+        if !all.contains(&event) {
+            all.push(event);
+        }
+    }
+}
+
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { fault, problem, work, index, action } = self;

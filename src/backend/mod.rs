@@ -17,7 +17,7 @@ use crate::system::System;
 use cpu::Cpu;
 use gpu::Gpu;
 
-pub use event::{Action, Event};
+pub use event::{Action, Event, add_events};
 pub use physics::physics;
 
 /// The native CPU, or a GPU through wgpu.

@@ -27,8 +27,10 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     let threads = global.threads.map(usize::from);
     let asked = Asked { quick: asked.quick, filter: asked.workload.clone(), seed, threads };
     let progress = Progress::new(global);
-    let record = benchmark::run(&asked, &devices::all(global)?, &progress)?;
+    let backends = devices::all(global)?;
+    let record = benchmark::run(&asked, &backends, &progress)?;
     progress.finish();
+    backends.iter().for_each(|backend| devices::note_events(global, backend));
     if let Some(folder) = &global.out {
         let mut staged = Staged::new(folder)?;
         staged.add("bench.json", json("bench.json", &record)?.as_bytes())?;

@@ -61,6 +61,7 @@ impl Job for Certify<'_> {
         let staged = Staged::new(self.out)?;
         let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
+        devices::note_events(self.global, &backend);
         progress.check()?;
         Ok((record, staged))
     }

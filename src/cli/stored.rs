@@ -92,7 +92,9 @@ impl Job for Ask<'_> {
         let names = plant.system.states().map(|axis| axis.name);
         let states = StateReader::<NX>::open(self.states, names)?.rest()?;
         let backend = devices::open(self.global)?;
-        scenario::query(&backend, plant, self.record, &states)
+        let rows = scenario::query(&backend, plant, self.record, &states)?;
+        devices::note_events(self.global, &backend);
+        Ok(rows)
     }
 }
 
@@ -154,7 +156,9 @@ impl Job for Verify<'_> {
         let settings = config.settings(&plant.system.states())?;
         let backend = devices::open(self.global)?;
         let progress = Progress::new(self.global);
-        scenario::check(&backend, plant, record, &settings, &progress)
+        let found = scenario::check(&backend, plant, record, &settings, &progress)?;
+        devices::note_events(self.global, &backend);
+        Ok(found)
     }
 }
 

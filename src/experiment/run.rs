@@ -18,10 +18,11 @@ use super::record::{
 use super::roster::{absent, certifies, controller, settings, values};
 use super::settings::RaceSettings;
 use super::summary::Summary;
+use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, npz_bytes, read_npz};
+use crate::files::{Staged, json, npz_bytes, read_npz};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
@@ -33,6 +34,8 @@ pub(super) const BATCH: usize = 512;
 const MOST_STREAMS: u64 = 1 << 24;
 /// Name of the file that says which experiment a folder holds.
 const MANIFEST: &str = "experiment.json";
+/// Folder of the stored races.
+const RACES: &str = "races";
 /// Name of the page that every command with results writes.
 const REPORT: &str = "report.html";
 
@@ -167,8 +170,8 @@ impl Experiment<'_> {
     ) -> Result<Vec<RaceLog>> {
         let starts = &self.starts[first..self.starts.len().min(first + BATCH)];
         let steps = world.race.steps;
-        let file = format!("{}-seed{noise_seed}-from{first}.npz", name.text());
-        let folder = self.folder.join("races");
+        let file = batch_file(name, noise_seed, first);
+        let folder = self.folder.join(RACES);
         let path = folder.join(&file);
         if path.exists() {
             watch.advance(starts.len() as u64 * u64::from(steps))?;
@@ -178,6 +181,10 @@ impl Experiment<'_> {
         let logs = flown(name, world, starts, &seeds, watch)?;
         let mut staged = Staged::new(&folder)?;
         staged.add(&file, &npz_bytes(&arrays(&logs, steps as usize))?)?;
+        let events = world.backend.events();
+        if !events.is_empty() {
+            staged.add(&events_of(&file), json(&file, &events)?.as_bytes())?;
+        }
         staged.publish()?;
         Ok(logs)
     }
@@ -226,7 +233,30 @@ impl Experiment<'_> {
             controllers: controllers.collect(),
             absent: absent.collect(),
             picture: shown,
+            events: self.events(&ran)?,
         })
+    }
+
+    /// What failed on the adapter, in this run and in those that stored races of `names` before it.
+    fn events(&self, names: &[Name]) -> Result<Vec<Event>> {
+        let mut all = Vec::new();
+        for name in names {
+            for &noise_seed in &self.noise_seeds {
+                for first in (0..self.starts.len()).step_by(BATCH) {
+                    let file = events_of(&batch_file(*name, noise_seed, first));
+                    let path = self.folder.join(RACES).join(file);
+                    if path.exists() {
+                        let text = std::fs::read_to_string(&path);
+                        let text = text.map_err(|error| Error::file(&path, error))?;
+                        let stored: Vec<Event> = serde_json::from_str(&text)
+                            .map_err(|error| Error::file(&path, error))?;
+                        add_events(&mut all, stored);
+                    }
+                }
+            }
+        }
+        add_events(&mut all, self.world.backend.events());
+        Ok(all)
     }
 
     /// What V_check is computed with.
@@ -304,6 +334,16 @@ impl Experiment<'_> {
             "ppo_sha256": digest(ppo),
         })
     }
+}
+
+/// Name of the file with the races of a batch.
+fn batch_file(name: Name, noise_seed: u64, first: usize) -> String {
+    format!("{}-seed{noise_seed}-from{first}.npz", name.text())
+}
+
+/// Name of the file with what failed on the adapter until the races of `file` were done.
+fn events_of(file: &str) -> String {
+    format!("{file}.events.json")
 }
 
 /// Makes sure that `folder` holds the experiment that `manifest` describes, or none, and says so in

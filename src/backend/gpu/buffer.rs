@@ -35,6 +35,7 @@ pub struct Params {
     pub layer_offset: u32,
     pub layer_inputs: u32,
     pub layer_outputs: u32,
+    pub layer_neurons: u32,
     pub segment_start: u32,
     pub iteration: u32,
     pub samples: u32,

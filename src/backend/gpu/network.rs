@@ -104,6 +104,7 @@ impl Network {
                 layer_offset: layer.offset,
                 layer_inputs: layer.inputs,
                 layer_outputs: layer.outputs,
+                layer_neurons: layer.neurons,
                 ..Params::default()
             };
             let across = columns.div_ceil(WORKGROUP);
