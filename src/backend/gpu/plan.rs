@@ -376,12 +376,17 @@ mod tests {
 
     #[test]
     fn a_submission_has_no_more_work_than_a_watchdog_allows() {
-        // 2^30 operations a step: 16 trajectories would do, and 64 are the fewest.
-        let wide = network(&[12, 1 << 14, 1 << 14, 3]);
+        let wide = network(&[12, 64, 64, 3]);
         let size = size(12, (Some(&wide), None), 1 << 20);
-        let plan = planned(&Adapter::made_up(1 << 31), Work::Measure, &size);
-        let plan = plan.expect("a plan");
-        assert_eq!((u64::from(plan.stride), plan.segment), (COLUMN_UNIT, 1));
+        let step = size.step_flops();
+        for (pieces, expected) in
+            [(1 << 20, (1 << 14, 64)), (1 << 15, (1 << 14, 2)), (100, (64, 1))]
+        {
+            let limit = Limit { flops: pieces * step, ..Limit::default() };
+            let plan = Plan::new(&Adapter::made_up(1 << 27), limit, Work::Measure, &size);
+            let plan = plan.expect("a plan");
+            assert_eq!((plan.stride, plan.segment), expected, "{pieces} trajectories and steps");
+        }
     }
 
     #[test]
@@ -431,7 +436,8 @@ mod tests {
         let fused = Fused::new(&deep);
         let adapter = Adapter::made_up(1 << 27);
         let size = size(12, (Some(&deep), Some(&fused)), 1000);
-        let plan = planned(&adapter, Work::Measure, &size);
+        let limit = Limit { flops: u64::MAX, ..Limit::default() };
+        let plan = Plan::new(&adapter, limit, Work::Measure, &size);
         // 3 vectors of inputs, then 60 times 32, and the 61 layers themselves.
         let trips = 1 + 3 + 60 * 32 + 61;
         assert_eq!(u64::from(plan.expect("a plan").steps), MAX_TRIPS / trips);
