@@ -332,12 +332,12 @@ fn certificates_count_what_is_not_finite() {
         assert!(rounds[0] > 0, "{rounds:?}");
         assert_eq!(non_finite(record), non_finite(&outside[0]));
     }
-    // Beyond 0.8: no bound holds, and nothing is certified.
+    // Beyond 0.8, in the box: the certificate does not hold.
     let inside = certificates(0.8);
     for record in &inside {
         let (pairs, perturbed, _) = non_finite(record);
         assert!(pairs > 0 && perturbed > 0);
-        assert!(!record.holds && record.global.accepted == 0);
+        assert!(!record.holds, "{:?}", record.statements);
         assert_eq!(non_finite(record), non_finite(&inside[0]));
         assert_eq!(record.deviation.claim.failures, inside[0].deviation.claim.failures);
         let page = html(record);
