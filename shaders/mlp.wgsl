@@ -23,7 +23,12 @@ fn mlp(
     if quad >= params.layer_outputs {
         return;
     }
-    let layer =
-        Layer(params.layer_offset, params.layer_inputs, params.layer_outputs, LAST_LAYER);
+    let layer = Layer(
+        params.layer_offset,
+        params.layer_inputs,
+        params.layer_outputs,
+        params.layer_neurons,
+        LAST_LAYER,
+    );
     put_tile(layer, quad, column, tile_of(layer, quad, column));
 }

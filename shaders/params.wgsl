@@ -24,6 +24,7 @@ struct Params {
     layer_offset: u32,
     layer_inputs: u32,
     layer_outputs: u32,
+    layer_neurons: u32,
     segment_start: u32,
     iteration: u32,
     samples: u32,

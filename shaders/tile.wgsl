@@ -14,6 +14,8 @@ struct Layer {
     // Vectors of 4; those of outputs are an even number.
     inputs: u32,
     outputs: u32,
+    // Of those outputs, which are padded to whole tiles.
+    neurons: u32,
     // Whether it is the last of its network, with an activation of its own.
     last: bool,
 }
@@ -107,12 +109,15 @@ fn activation(layer: Layer, sum: f32) -> f32 {
 }
 
 fn put_activated(layer: Layer, quad: u32, column: u32, sum: vec4<f32>) {
-    put(quad, column, vec4<f32>(
+    let activated = vec4<f32>(
         activation(layer, sum.x),
         activation(layer, sum.y),
         activation(layer, sum.z),
         activation(layer, sum.w),
-    ));
+    );
+    // Weights of 0 do not keep a padded neuron at 0 where an input is infinite.
+    let number = vec4<u32>(4u * quad) + vec4<u32>(0u, 1u, 2u, 3u);
+    put(quad, column, select(vec4<f32>(0.0), activated, number < vec4<u32>(layer.neurons)));
 }
 
 fn put_tile(layer: Layer, quad: u32, column: u32, tile: Tile) {

@@ -1,6 +1,9 @@
 //! The error type: what was wrong, where, and what to do about it.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 /// Result with the crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
@@ -70,8 +73,16 @@ pub enum Error {
     #[error("{0}")]
     Device(String),
     /// The device failed during the work.
-    #[error("device failure: {0}")]
-    DeviceFailed(String),
+    #[error(
+        "device failure ({fault}): {problem}; `--fallback` goes on on the CPU where an adapter \
+         fails, `--backend cpu` starts there"
+    )]
+    DeviceFailed {
+        /// How.
+        fault: Fault,
+        /// The adapter, and what it or its driver says.
+        problem: String,
+    },
     /// A stored certificate does not fit what it is used with.
     #[error("stored certificate refused: {0}")]
     Refused(String),
@@ -80,6 +91,37 @@ pub enum Error {
         "interrupted; no result was written (what `race`, `sweep` and `train` have done is kept)"
     )]
     Interrupted,
+}
+
+/// How an adapter failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fault {
+    /// It is gone: taken out, reset by the system, or its driver broke down.
+    Lost,
+    /// It has no memory left for a buffer or for the work.
+    OutOfMemory,
+    /// The driver refuses what it was given, or what it gave back is wrong.
+    Validation,
+    /// Work took longer than it may.
+    Timeout,
+    /// None was there to open.
+    Absent,
+    /// The work is larger than its limits.
+    Unfit,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Lost => "device lost",
+            Self::OutOfMemory => "out of memory",
+            Self::Validation => "validation error",
+            Self::Timeout => "timeout",
+            Self::Absent => "no adapter",
+            Self::Unfit => "beyond the adapter's limits",
+        })
+    }
 }
 
 impl Error {
@@ -103,7 +145,7 @@ impl Error {
             | Self::Refused(_) => 2,
             Self::Write { .. }
             | Self::NoRoom { .. }
-            | Self::DeviceFailed(_)
+            | Self::DeviceFailed { .. }
             | Self::Interrupted => 1,
         }
     }

@@ -24,4 +24,4 @@ pub mod scenario;
 pub mod system;
 pub mod train;
 
-pub use error::{Error, Result};
+pub use error::{Error, Fault, Result};

@@ -341,6 +341,7 @@ fn uniform_block_has_the_layout_of_params() {
         layer_offset,
         layer_inputs,
         layer_outputs,
+        layer_neurons,
         segment_start,
         iteration,
         samples,

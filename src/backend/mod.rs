@@ -1,6 +1,7 @@
 //! Backends: who runs a batch of rollouts.
 
 pub mod cpu;
+mod event;
 pub mod gpu;
 mod physics;
 mod softmin;
@@ -16,6 +17,7 @@ use crate::system::System;
 use cpu::Cpu;
 use gpu::Gpu;
 
+pub use event::{Action, Event, add_events};
 pub use physics::physics;
 
 /// The native CPU, or a GPU through wgpu.
@@ -49,6 +51,14 @@ impl Backend {
         match self {
             Self::Cpu(cpu) => cpu.device(),
             Self::Gpu(gpu) => gpu.device(),
+        }
+    }
+
+    /// What failed on an adapter so far and was worked around, in order.
+    pub fn events(&self) -> Vec<Event> {
+        match self {
+            Self::Cpu(cpu) => cpu.events(),
+            Self::Gpu(gpu) => gpu.events(),
         }
     }
 

@@ -155,6 +155,11 @@ impl BenchRecord {
         watch.begin(&workload.name, 1);
         let timing = measure(&self.protocol, || workload.call(backend))?;
         watch.advance(1)?;
+        // Before, between or after failures: these are not the adapter's times.
+        if let (Backend::Gpu(_), Some(event)) = (backend, backend.events().first()) {
+            self.leave_out(&workload.name, backend, event.to_string());
+            return Ok(());
+        }
         let units_per_second = workload.units as f64 / timing.median_seconds;
         self.workloads.push(WorkloadRecord {
             name: workload.name.clone(),

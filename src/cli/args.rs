@@ -40,6 +40,9 @@ Exit codes:
   2  wrong usage, configuration or input
   3  ran, but the claim asked for was not obtained";
 
+/// Most threads: beyond what any processor runs at once they only cost.
+const MOST_THREADS: i64 = 1024;
+
 /// Options of every command.
 #[derive(Args, Debug)]
 pub(super) struct Global {
@@ -49,8 +52,11 @@ pub(super) struct Global {
     /// The GPU adapter whose name contains this, as `devices` lists them
     #[arg(long, global = true, value_name = "NAME")]
     pub(super) device: Option<String>,
+    /// Go on on the CPU where no adapter opens, or where it fails for good; it is reported
+    #[arg(long, global = true)]
+    pub(super) fallback: bool,
     /// Threads of the CPU backend [default: as many as the processor runs at once]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
     pub(super) threads: Option<u16>,
     /// Seed of every random stream, instead of the configuration's
     #[arg(long, global = true, value_name = "N")]

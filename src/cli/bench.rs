@@ -32,8 +32,10 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     global.out.as_deref().map_or(Ok(()), |out| check_room(out, RECORD_BYTES))?;
-    let record = benchmark::run(&asked, &devices::all(global)?, &progress)?;
+    let backends = devices::all(global)?;
+    let record = benchmark::run(&asked, &backends, &progress)?;
     progress.finish();
+    backends.iter().for_each(|backend| devices::note_events(global, backend));
     if let Some(mut staged) = staged {
         staged.add("bench.json", json("bench.json", &record)?.as_bytes())?;
         staged.publish()?;

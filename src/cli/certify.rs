@@ -65,6 +65,7 @@ impl Job for Certify<'_> {
         check_room(self.out, estimate(&settings))?;
         let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
+        devices::note_events(self.global, &backend);
         progress.check()?;
         Ok((record.sealed()?, staged))
     }

@@ -1,5 +1,7 @@
 //! Who runs the work: listing the devices, and opening the one that was asked for.
 
+use std::io::Write;
+
 use serde::Serialize;
 
 use super::args::{BackendName, Global};
@@ -9,25 +11,47 @@ use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{Adapter, AdapterKind, Choice, Gpu, adapters};
 use crate::error::{Error, Result};
 
-/// Opens the backend that the flags ask for.
+/// Opens the backend that the flags ask for; with `--fallback`, the CPU where no adapter opens, and
+/// behind it where one does.
 ///
 /// # Errors
 /// [`Error::Device`] if there is none of that name or kind.
 pub(super) fn open(global: &Global) -> Result<Backend> {
+    let Some(choice) = choice(global)? else { return cpu(global).map(Backend::Cpu) };
+    match Gpu::open(&choice) {
+        Ok(gpu) if global.fallback => Ok(Backend::Gpu(gpu.with_fallback(cpu(global)?))),
+        Ok(gpu) => Ok(Backend::Gpu(gpu)),
+        Err(Error::Device(problem)) if global.fallback => {
+            Ok(Backend::Cpu(cpu(global)?.in_place_of_adapter(problem)))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// The adapter that the flags ask for; `None` for the CPU.
+fn choice(global: &Global) -> Result<Option<Choice>> {
     if let Some(name) = &global.device {
         if global.backend == BackendName::Cpu {
             let problem = "names a GPU adapter; leave it out, or leave out --backend cpu";
             return Err(Error::invalid(format!("--device {name}"), problem));
         }
-        return Gpu::open(&Choice::Named(name.clone())).map(Backend::Gpu);
+        return Ok(Some(Choice::Named(name.clone())));
     }
-    match global.backend {
-        BackendName::Cpu => cpu(global),
-        BackendName::Gpu => Gpu::open(&Choice::Any).map(Backend::Gpu),
-        BackendName::Auto if adapters().iter().any(is_hardware) => {
-            Gpu::open(&Choice::Hardware).map(Backend::Gpu)
-        }
-        BackendName::Auto => cpu(global),
+    Ok(match global.backend {
+        BackendName::Gpu => Some(Choice::Any),
+        BackendName::Auto if adapters().iter().any(is_hardware) => Some(Choice::Hardware),
+        BackendName::Auto | BackendName::Cpu => None,
+    })
+}
+
+/// Says on standard error what failed on the adapter and was worked around.
+pub(super) fn note_events(global: &Global, backend: &Backend) {
+    if global.quiet {
+        return;
+    }
+    for event in backend.events() {
+        // Nobody reads what a closed pipe does not take.
+        let _ = writeln!(std::io::stderr(), "note: {event}");
     }
 }
 
@@ -40,7 +64,7 @@ pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
     if global.backend != BackendName::Auto || global.device.is_some() {
         return Ok(vec![open(global)?]);
     }
-    let mut all = vec![cpu(global)?];
+    let mut all = vec![cpu(global).map(Backend::Cpu)?];
     if let found @ Backend::Gpu(_) = open(global)? {
         all.push(found);
     }
@@ -48,8 +72,8 @@ pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
 }
 
 /// The CPU with the threads asked for.
-pub(super) fn cpu(global: &Global) -> Result<Backend> {
-    Cpu::new(global.threads.map(usize::from)).map(Backend::Cpu)
+pub(super) fn cpu(global: &Global) -> Result<Cpu> {
+    Cpu::new(global.threads.map(usize::from))
 }
 
 /// Threads that run the rollouts of `backend`, or that feed it.

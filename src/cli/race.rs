@@ -48,6 +48,7 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     };
     let (record, controllers) = experiment.run(&progress)?;
     progress.finish();
+    devices::note_events(global, &backend);
     let wall_seconds = begun.elapsed().as_secs_f64();
     let timing = Timing { wall_seconds, threads: devices::threads(global), controllers };
     let files = write(&out, &record, &timing)?;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::args::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
-use crate::backend::Backend;
+use crate::backend::{Backend, Event};
 use crate::config::{Config, Job};
 use crate::error::Result;
 use crate::files::{MeasureWriter, StateReader, check_room};
@@ -38,6 +38,7 @@ struct Summary {
     measures: String,
     backend: String,
     device: String,
+    events: Vec<Event>,
     wall_seconds: f64,
 }
 
@@ -95,6 +96,7 @@ impl Job for Rollout<'_> {
             })?;
         }
         writer.publish()?;
+        devices::note_events(self.global, &backend);
         let (low, high) = interval(count.successes, count.starts, BETA);
         Ok(Summary {
             starts: count.starts,
@@ -106,6 +108,7 @@ impl Job for Rollout<'_> {
             measures: self.measures.display().to_string(),
             backend: backend.name().to_owned(),
             device: backend.device(),
+            events: backend.events(),
             wall_seconds: begun.elapsed().as_secs_f64(),
         })
     }

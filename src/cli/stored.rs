@@ -89,7 +89,9 @@ impl Job for Ask<'_> {
         let Stored { record, config, .. } = self.stored;
         let settings = config.settings(&plant.system.states())?;
         let backend = devices::open(self.global)?;
-        scenario::query(&backend, plant, record, &settings, &states)
+        let rows = scenario::query(&backend, plant, record, &settings, &states)?;
+        devices::note_events(self.global, &backend);
+        Ok(rows)
     }
 }
 
@@ -179,7 +181,9 @@ impl Job for Verify<'_> {
         let settings = config.settings(&plant.system.states())?;
         let backend = devices::open(self.global)?;
         let progress = Progress::new(self.global);
-        scenario::check(&backend, plant, record, &settings, &progress)
+        let found = scenario::check(&backend, plant, record, &settings, &progress)?;
+        devices::note_events(self.global, &backend);
+        Ok(found)
     }
 }
 

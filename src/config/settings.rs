@@ -12,6 +12,10 @@ use crate::system::Axis;
 
 /// Most values of a slice axis: a finer step is a slip, and its picture could not be drawn.
 const MOST_VALUES: f64 = 4096.0;
+/// Most cells of a slice: states, margins and picture of more would not fit a small machine.
+const MOST_CELLS: usize = 1 << 20;
+/// Most rollouts or pairs of a sample: a fast GPU's work of a day.
+const MOST_SAMPLES: u64 = 1_000_000_000_000;
 /// Most rounds of growth: each has a random stream of its own.
 const MOST_ROUNDS: u32 = 10_000;
 
@@ -52,7 +56,7 @@ impl Config {
             },
             deviation: self.deviation_settings()?,
             global: GlobalSettings {
-                draws: at_least_one("global.draws", self.global.draws)?,
+                draws: sample_size("global.draws", self.global.draws)?,
                 beta: share("global.beta", self.global.beta)?,
             },
             slice: self.slice_axes(axes)?,
@@ -82,8 +86,8 @@ impl Config {
             radius: positive_f32("deviation.radius", asked.radius)?,
             epsilon: share("deviation.epsilon", asked.epsilon)?,
             beta: share("deviation.beta", asked.beta)?,
-            scenarios: at_least_one("deviation.scenarios", asked.scenarios)?,
-            pilot: at_least_one("deviation.pilot", asked.pilot)?,
+            scenarios: sample_size("deviation.scenarios", asked.scenarios)?,
+            pilot: sample_size("deviation.pilot", asked.pilot)?,
             joint: asked.joint,
             control: asked.control,
             source: asked.source,
@@ -100,7 +104,7 @@ impl Config {
         Ok(GrowthSettings {
             radius: positive_f32("growth.radius", asked.radius)?,
             rounds: asked.rounds,
-            scenarios: at_least_one("growth.scenarios", asked.scenarios)?,
+            scenarios: sample_size("growth.scenarios", asked.scenarios)?,
             epsilon: share("growth.epsilon", asked.epsilon)?,
             beta: share("growth.beta", asked.beta)?,
             split_beta: asked.split_beta,
@@ -151,6 +155,14 @@ impl Config {
         let (x, y) = (x?, y?);
         if x.state == y.state {
             let problem = format!("`{}` is on both axes; name two states", self.slice.x.state);
+            return Err(Error::invalid("slice", problem));
+        }
+        let [columns, rows] = [&x, &y].map(|axis: &SliceAxis| axis.values.len());
+        if columns * rows > MOST_CELLS {
+            let problem = format!(
+                "{columns} x {rows} cells are {}; at most {MOST_CELLS}, change a `step`",
+                columns * rows
+            );
             return Err(Error::invalid("slice", problem));
         }
         Ok([x, y])
@@ -255,10 +267,10 @@ fn share(key: &str, value: f64) -> Result<f64> {
     Err(Error::invalid(key, format!("{value} is not strictly between 0 and 1")))
 }
 
-/// `count`, at least 1.
-fn at_least_one(key: &str, count: u64) -> Result<u64> {
-    if count > 0 {
+/// `count`, at least 1 and no more than can be rolled out.
+fn sample_size(key: &str, count: u64) -> Result<u64> {
+    if (1..=MOST_SAMPLES).contains(&count) {
         return Ok(count);
     }
-    Err(Error::invalid(key, "0; expected 1 or more"))
+    Err(Error::invalid(key, format!("{count} is not within 1..={MOST_SAMPLES}")))
 }

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::controller::Name;
 use super::log::{RaceLog, arrays, damaged, is_sealed, races, sealed};
+use crate::backend::Event;
 use crate::error::{Error, Result};
-use crate::files::{Staged, npz_bytes, read_npz};
+use crate::files::{Staged, json, npz_bytes, read_npz};
 
 /// Folder of the stored races.
 pub(super) const RACES: &str = "races";
@@ -15,15 +16,26 @@ pub(super) fn batch_file(name: Name, noise_seed: u64, first: usize) -> String {
     format!("{}-seed{noise_seed}-from{first}.npz", name.text())
 }
 
-/// Stores races as `file`; `label` says which ones they are.
+/// Name of the file with what failed on the adapter until the races of `file` were done.
+pub(super) fn events_of(file: &str) -> String {
+    format!("{file}.events.json")
+}
+
+/// Stores races as `file`, `label` says which ones they are, and what failed on the adapter until
+/// then.
 pub(super) fn store(
     folder: &Path,
     file: &str,
     races: &[RaceLog],
     steps: u32,
     label: &str,
+    events: &[Event],
 ) -> Result<()> {
     let mut staged = Staged::within(folder, RACES)?;
+    // First: races that are there are not flown again.
+    if !events.is_empty() {
+        staged.add(&events_of(file), json(file, &events)?.as_bytes())?;
+    }
     staged.add(file, &npz_bytes(&sealed(arrays(races, steps as usize), label))?)?;
     staged.publish().map(drop)
 }

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::judge::{FailureClass, Judge};
+use crate::backend::Event;
 use crate::scenario::record::{ConstantsRecord, DeviationRecord, Provenance};
 
 /// Version of the record's form.
@@ -40,6 +41,9 @@ pub struct RaceRecord {
     pub absent: Vec<AbsentRecord>,
     /// One race step by step, for the picture.
     pub picture: Option<PictureRecord>,
+    /// What failed on the adapter and was worked around.
+    #[serde(default)]
+    pub events: Vec<Event>,
 }
 
 /// What V_check was computed with; the same for all controllers and races.

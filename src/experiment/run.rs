@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use serde::Serialize;
 
 use super::controller::{Name, World};
-use super::folder::{RACES, batch_file, store, stored};
+use super::folder::{RACES, batch_file, events_of, store, stored};
 use super::judge::{Judge, safe_at_start};
 use super::log::{RaceLog, arrays};
 use super::picture::picture;
@@ -19,6 +19,7 @@ use super::record::{
 use super::roster::{absent, certifies, controller, settings, values};
 use super::settings::RaceSettings;
 use super::summary::Summary;
+use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
@@ -196,7 +197,7 @@ impl Experiment<'_> {
         }
         let seeds = self.seeds(noise_seed, first, starts.len());
         let logs = flown(name, world, starts, &seeds, watch)?;
-        store(&self.folder, &file, &logs, steps, &label)?;
+        store(&self.folder, &file, &logs, steps, &label, &world.backend.events())?;
         Ok(logs)
     }
 
@@ -244,7 +245,30 @@ impl Experiment<'_> {
             controllers: controllers.collect(),
             absent: absent.collect(),
             picture: shown,
+            events: self.events(&ran)?,
         })
+    }
+
+    /// What failed on the adapter, in this run and in those that stored races of `names` before it.
+    fn events(&self, names: &[Name]) -> Result<Vec<Event>> {
+        let mut all = Vec::new();
+        for name in names {
+            for &noise_seed in &self.noise_seeds {
+                for first in (0..self.starts.len()).step_by(BATCH) {
+                    let file = events_of(&batch_file(*name, noise_seed, first));
+                    let path = self.folder.join(RACES).join(file);
+                    if path.exists() {
+                        let text = std::fs::read_to_string(&path);
+                        let text = text.map_err(|error| Error::file(&path, error))?;
+                        let stored: Vec<Event> = serde_json::from_str(&text)
+                            .map_err(|error| Error::file(&path, error))?;
+                        add_events(&mut all, stored);
+                    }
+                }
+            }
+        }
+        add_events(&mut all, self.world.backend.events());
+        Ok(all)
     }
 
     /// What V_check is computed with.

@@ -21,7 +21,7 @@ pub fn html(record: &Record) -> String {
     let [value, certified, paths, deviation, growth] =
         figures::all(record).map(|figure| figure.html());
     format!(
-        "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{HATCH}{header}<main>\n{statements}\
+        "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{HATCH}{header}<main>\n{statements}{failures}\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
          <div class=\"figures\">\n{value}{certified}{paths}<div class=\"stack\">\n{deviation}{growth}</div>\
          </div></section>\n{numbers}</main>\n{footer}\
@@ -29,6 +29,7 @@ pub fn html(record: &Record) -> String {
         head = shell::head(&record.system.name, &palette::rules(), Scripts::None),
         header = header(record),
         statements = statements(record),
+        failures = shell::failures(&record.events),
         numbers = numbers(record),
         footer = shell::footer(&record.provenance, SAME),
     )

@@ -1,6 +1,7 @@
 //! What all pages share: the head of the document, styles, patterns, lists.
 
 use super::text::escape;
+use crate::backend::Event;
 use crate::scenario::record::Provenance;
 
 /// The style of every page.
@@ -77,6 +78,21 @@ pub(super) fn card(headline: &Headline) -> String {
 pub(super) fn footer(provenance: &Provenance, repeated: &str) -> String {
     let version = escape(&provenance.version);
     format!("<footer>Written by reachcast {version} from one record; {repeated}.</footer>\n")
+}
+
+/// What failed on the adapter and was worked around; nothing where nothing did.
+pub(super) fn failures(events: &[Event]) -> String {
+    if events.is_empty() {
+        return String::new();
+    }
+    let texts: Vec<String> = events.iter().map(Event::to_string).collect();
+    format!(
+        "<section class=\"card limits\" aria-labelledby=\"adapter\">\
+         <h2 id=\"adapter\">What failed on the adapter</h2>\n<ol>\n{}</ol>\n\
+         <p>Nothing was lost or counted twice; results from the CPU agree with those of the adapter up \
+         to rounding.</p></section>\n",
+        items(&texts)
+    )
 }
 
 /// The items of a list.

@@ -91,6 +91,7 @@ where
         beta_total: ledger.total(),
         ledger: spendings(&ledger),
         picture,
+        events: backend.events(),
         timing: Timing { wall_seconds: begun.elapsed().as_secs_f64(), threads: 0, rollouts },
     })
 }

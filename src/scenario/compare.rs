@@ -9,10 +9,16 @@ use super::verify::Finding;
 const TOLERANCE: f64 = 1e-3;
 /// Difference of a count beside its share of the draws that another device's rounding may make.
 const MOVED: f64 = 2.0;
-/// Fields that a second run may change: who ran it and how long it took, and the digests, which are
-/// checked when a record is read.
-const FREE: [&str; 5] =
-    ["digests", "timing", "provenance.backend", "provenance.device", "provenance.version"];
+/// Fields that a second run may change: who ran it, what failed on the way and how long it took, and
+/// the digests, which are checked when a record is read.
+const FREE: [&str; 6] = [
+    "digests",
+    "timing",
+    "events",
+    "provenance.backend",
+    "provenance.device",
+    "provenance.version",
+];
 /// Fields that are measured on the device, or that put its numbers into words.
 const OF_THE_DEVICE: [&str; 5] =
     ["statements", "global.f32_error", "global.band", "global.f64_reruns", "growth.rounds"];
@@ -26,7 +32,8 @@ const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
 pub(super) fn fields(stored: &Record, again: &Record) -> Finding {
     let same_device = stored.provenance.backend == again.provenance.backend
         && stored.provenance.device == again.provenance.device
-        && stored.provenance.version == again.provenance.version;
+        && stored.provenance.version == again.provenance.version
+        && stored.events == again.events;
     let (Ok(was), Ok(is)) = (serde_json::to_value(stored), serde_json::to_value(again)) else {
         return finding(vec!["the record has no JSON form".to_owned()]);
     };

@@ -1,5 +1,7 @@
 //! Algorithm 1 for many balls at once: a round of all that are open is one batch.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::Context;
@@ -14,6 +16,8 @@ use crate::system::System;
 
 /// Starts that are drawn side by side.
 const GROUP: usize = 16;
+/// Most starts that are held at a time; few in tests, so that their rounds are cut.
+const LISTED: usize = if cfg!(test) { 100 } else { 1 << 20 };
 
 /// A ball to be grown: where, and with which random numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,13 +120,37 @@ where
         return Ok(Vec::new());
     }
     let count = settings.growth.scenarios;
-    let draw = |open: &Open<NX>| {
+    let total = count * balls.len() as u64;
+    let mut nearest: Vec<Option<f64>> = vec![None; balls.len()];
+    for first in (0..total).step_by(LISTED) {
+        let range = first..total.min(first + LISTED as u64);
+        piece(context, settings, requests, (balls, range), (&mut nearest, band))?;
+    }
+    balls.iter_mut().for_each(|open| open.rounds += 1);
+    Ok(nearest)
+}
+
+/// The starts `range` of a round, N for each ball after the other.
+fn piece<S, P, const NX: usize, const NU: usize>(
+    context: Context<'_, S, P>,
+    settings: &Settings<NX>,
+    requests: &[Request<NX>],
+    (balls, range): (&mut [Open<NX>], Range<u64>),
+    (nearest, band): (&mut [Option<f64>], f64),
+) -> Result<()>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let count = settings.growth.scenarios;
+    let draw = |(place, open): (usize, &Open<NX>)| {
         let Request { seed, call, .. } = requests[open.request];
         let use_number = call * settings.growth.rounds + open.rounds;
         let stream = Stream::new(seed, Purpose::Growth, use_number);
-        drawn(&Region::Ball(open.ball.clone()), stream, count)
+        let own = |index: u64| index.saturating_sub(place as u64 * count).min(count);
+        drawn(&Region::Ball(open.ball.clone()), stream, own(range.start)..own(range.end))
     };
-    let starts: Vec<[f32; NX]> = balls.par_iter().flat_map_iter(draw).collect();
+    let starts: Vec<[f32; NX]> = balls.par_iter().enumerate().flat_map_iter(draw).collect();
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
         starts: Starts::Listed(&starts),
@@ -131,11 +159,9 @@ where
         tightening: &tightening,
         query: Query::Measure,
     };
-    let mut nearest: Vec<Option<f64>> = vec![None; balls.len()];
-    balls.iter_mut().for_each(|open| open.rounds += 1);
     context.backend.reach_avoid(context.plant, &task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let (start, place) = (starts[index as usize], (index / count) as usize);
+            let (start, place) = (starts[index as usize], ((range.start + index) / count) as usize);
             let mut value = f64::from(*value);
             if value.abs() <= band {
                 value = measure(context.plant, start, &settings.spec, &tightening);
@@ -147,16 +173,19 @@ where
             }
         }
         context.watch.advance(values.len() as u64)
-    })?;
-    Ok(nearest)
+    })
 }
 
-/// The first `count` starts of `stream` in `region`.
-fn drawn<const NX: usize>(region: &Region<NX>, stream: Stream, count: u64) -> Vec<[f32; NX]> {
-    let mut starts = Vec::with_capacity(count as usize);
-    for first in (0..count).step_by(GROUP) {
+/// The starts `range` of `stream` in `region`.
+fn drawn<const NX: usize>(
+    region: &Region<NX>,
+    stream: Stream,
+    range: Range<u64>,
+) -> Vec<[f32; NX]> {
+    let mut starts = Vec::with_capacity((range.end - range.start) as usize);
+    for first in range.clone().step_by(GROUP) {
         let lanes = region.sample::<GROUP>(stream, first);
-        let live = GROUP.min((count - first) as usize);
+        let live = GROUP.min((range.end - first) as usize);
         starts.extend((0..live).map(|i| lanes.each_ref().map(|lane| lane.0[i])));
     }
     starts

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::backend::Event;
 use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
@@ -50,6 +51,10 @@ pub struct Record {
     pub beta_total: f64,
     /// A few rollouts, for the picture.
     pub picture: PictureRecord,
+    /// What failed on the adapter and was worked around, in order; empty where all of it ran on the
+    /// device of the provenance as planned.
+    #[serde(default)]
+    pub events: Vec<Event>,
     /// Wall time and threads: the only part that a second run may change.
     pub timing: Timing,
 }

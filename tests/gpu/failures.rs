@@ -5,7 +5,7 @@ use reachcast::backend::gpu::{Choice, Gpu, adapters};
 use reachcast::policy::Activation;
 use reachcast::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Tightening};
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
-use reachcast::{Error, Result};
+use reachcast::{Error, Fault, Result};
 
 use crate::{drawn, gpu, race_policy, ramp, random_network, reach_avoid, whole_box};
 
@@ -63,7 +63,10 @@ fn edited_kernels_are_the_ones_that_run() {
 fn a_kernel_that_does_not_compile_is_a_device_failure() {
     let Some(gpu) = gpu() else { return };
     let result = mutated(gpu, "fn judge(", "fn judge(,");
-    assert!(matches!(&result, Err(Error::DeviceFailed(_))), "{result:?}");
+    assert!(
+        matches!(&result, Err(Error::DeviceFailed { fault: Fault::Validation, .. })),
+        "{result:?}"
+    );
 }
 
 #[test]

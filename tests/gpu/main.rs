@@ -3,8 +3,12 @@
 //! Without an adapter every test says so and passes, unless `REACHCAST_REQUIRE_GPU` is 1.
 
 mod cache;
+mod certificates;
+#[path = "../common/mod.rs"]
+mod common;
 mod edges;
 mod failures;
+mod faults;
 mod measures;
 mod mppi;
 mod networks;
@@ -13,6 +17,7 @@ mod oracle;
 mod pairs;
 mod starts;
 mod systems;
+mod threads;
 mod timing;
 
 use std::path::Path;

@@ -81,6 +81,7 @@ pub(crate) fn full() -> RaceRecord {
             reason: "needs --ppo-policy FILE: no PPO policy was given".to_owned(),
         }],
         picture: Some(picture()),
+        events: Vec::new(),
     }
 }
 

@@ -84,6 +84,7 @@ fn grid(axes: Axes<'_>, result: impl Fn(&Values<'_>) -> PointResult) -> SweepRec
             sha256: format!("{index:064x}"),
             values: values.iter().map(|(_, value)| (*value).to_owned()).collect(),
             result: result(&Values(values)),
+            events: Vec::new(),
         })
         .collect();
     let axis = |(name, values): &(&str, &[&str])| AxisRecord {

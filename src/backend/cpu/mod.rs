@@ -28,8 +28,8 @@ use self::packs::Packs;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
-use super::{MeasureSink, PairSink};
-use crate::error::{Error, Result};
+use super::{Action, Event, MeasureSink, PairSink};
+use crate::error::{Error, Fault, Result};
 use crate::policy::{Mlp, Policy};
 use crate::rollout::{
     DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask, RolloutSpec, Starts, Tightening,
@@ -43,6 +43,8 @@ pub struct Cpu {
     instructions: Instructions,
     model: String,
     packs: Packs,
+    /// Why it runs what an adapter was meant for.
+    instead: Option<Event>,
 }
 
 impl Cpu {
@@ -70,7 +72,20 @@ impl Cpu {
             .thread_name(|i| format!("rollout-{i}"))
             .build()
             .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
-        Ok(Self { pool, instructions, model: model_name(), packs: Packs::default() })
+        Ok(Self { pool, instructions, model: model_name(), packs: Packs::default(), instead: None })
+    }
+
+    /// The same processor in place of an adapter that did not open, for the reason `problem`.
+    #[must_use]
+    pub fn in_place_of_adapter(self, problem: String) -> Self {
+        let (fault, action) = (Fault::Absent, Action::Cpu);
+        let instead = Event { fault, problem, work: String::new(), index: 0, action };
+        Self { instead: Some(instead), ..self }
+    }
+
+    /// See [`super::Backend::events`].
+    pub(super) fn events(&self) -> Vec<Event> {
+        self.instead.iter().cloned().collect()
     }
 
     /// The processor in words: model and instruction set. Not the number of threads: nothing that a

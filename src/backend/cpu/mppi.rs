@@ -12,6 +12,8 @@ use crate::system::System;
 /// Samples of a unit: the softmin is merged unit by unit, so the bits depend on it. Half of the
 /// study's 500 samples, so that two threads share one problem.
 const UNIT: u32 = 256;
+/// Most memory of the partials of the problems that are improved at a time, bytes.
+const PARTIAL_BYTES: usize = 64 << 20;
 
 impl Cpu {
     /// See [`crate::backend::Backend::mppi`].
@@ -21,6 +23,28 @@ impl Cpu {
         cost: &C,
         task: &MppiTask<'_, NX, NU, NC>,
     ) -> Result<Vec<MppiResult<NU>>>
+    where
+        S: System<NX, NU>,
+        C: Cost<NX, NU, NC>,
+    {
+        let settings = task.spec.settings();
+        let units = settings.samples.div_ceil(UNIT) as usize;
+        let bytes = units * settings.horizon as usize * size_of::<[f64; NU]>();
+        let most = (PARTIAL_BYTES / bytes).max(1);
+        let mut results = Vec::with_capacity(task.problems.len());
+        for problems in task.problems.chunks(most) {
+            results.extend(self.improve(system, cost, &MppiTask { problems, ..*task }));
+        }
+        Ok(results)
+    }
+
+    /// The results of all problems of `task` at a time.
+    fn improve<S, C, const NX: usize, const NU: usize, const NC: usize>(
+        &self,
+        system: &S,
+        cost: &C,
+        task: &MppiTask<'_, NX, NU, NC>,
+    ) -> Vec<MppiResult<NU>>
     where
         S: System<NX, NU>,
         C: Cost<NX, NU, NC>,
@@ -56,7 +80,7 @@ impl Cpu {
             };
             all.finish(samples, &problem.plan, &settings.bounds, costs)
         });
-        Ok(results.collect())
+        results.collect()
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use bytemuck::{Pod, Zeroable};
 
 use super::device::Device;
-use crate::error::Result;
+use crate::error::{Fault, Result};
 
 /// Parameters of one dispatch; twin: `shaders/params.wgsl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -35,6 +35,7 @@ pub struct Params {
     pub layer_offset: u32,
     pub layer_inputs: u32,
     pub layer_outputs: u32,
+    pub layer_neurons: u32,
     pub segment_start: u32,
     pub iteration: u32,
     pub samples: u32,
@@ -124,6 +125,11 @@ impl Pool {
         };
         Buffer { inner, bytes, reusable: true, pool: self.clone() }
     }
+
+    /// Lets go of the buffers that no call uses.
+    pub(super) fn clear(&self) {
+        self.free.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
 }
 
 /// A buffer that returns to its pool.
@@ -172,14 +178,16 @@ impl Buffer {
         staging.reusable = false;
         let mut encoder = device.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&self.inner, 0, &staging.inner, 0, bytes);
-        device.queue.submit([encoder.finish()]);
+        device.submit(encoder.finish())?;
         let (send, mapped) = mpsc::channel();
         staging.inner.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
             // The receiver is gone only if the wait failed, which is reported by itself.
             let _ = send.send(result);
         });
         device.wait(None)?;
-        let failed = |text: String| device.failed(&format!("cannot read results: {text}"));
+        let failed = |text: String| {
+            device.failed(Fault::Validation, &format!("cannot read results: {text}"))
+        };
         match mapped.recv() {
             Ok(Ok(())) => {}
             Ok(Err(e)) => return Err(failed(e.to_string())),

@@ -1,11 +1,12 @@
 //! Pairs on the device: both rollouts of each side by side, the farthest pair of each step.
 
-use super::Gpu;
 use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, Slot};
 use super::drive::Drive;
 use super::kernel::Bound;
+use super::opened::Opened;
 use super::plan::Work;
+use super::recover::Attempt;
 use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
 use crate::backend::PairSink;
 use crate::error::Result;
@@ -13,25 +14,25 @@ use crate::policy::{Mlp, Policy};
 use crate::rollout::{DeviationTask, Farthest, PairControl, PairMeasure, Plant};
 use crate::system::System;
 
-/// See [`crate::backend::Backend::deviation`].
+/// See [`crate::backend::Backend::deviation`]; the farthest pairs are merged into `farthest` chunk by
+/// chunk, as the measures go to the sink.
 pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
-    gpu: &Gpu,
+    adapter: (&Opened, &Attempt),
     plant: Plant<'_, S, P>,
     task: &DeviationTask<'_, NX>,
-    sink: PairSink<'_>,
-) -> Result<Vec<Farthest>>
+    (farthest, sink): (&mut [Farthest], PairSink<'_>),
+) -> Result<()>
 where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
     let rows = task.spec.horizon as usize + 1;
-    let mut farthest = vec![Farthest::NONE; rows];
     let count = task.range.end.saturating_sub(task.range.start);
     if count == 0 {
-        return Ok(farthest);
+        return Ok(());
     }
     check_starts(&task.pairs.nominal)?;
-    let job = Job::new(gpu, plant, Work::Pairs, count)?;
+    let job = Job::new(adapter, plant, Work::Pairs, count)?;
     let buffers = Buffers::new(&job, plant.policy.network(), task)?;
     let chunks = Chunks {
         kernels: buffers.bind(&job)?,
@@ -44,18 +45,18 @@ where
         let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
         job.upload_starts(&task.pairs.nominal, first, columns, &buffers.state);
         chunks.run(first, columns)?;
-        let found: Vec<[u32; 2]> = buffers.farthest.read(job.call.device, rows)?;
+        let found: Vec<[u32; 2]> = buffers.farthest.read(&job.call.device, rows)?;
+        let values: Vec<PairMeasure> = buffers.measures.read(&job.call.device, columns as usize)?;
         for (farthest, [bits, column]) in farthest.iter_mut().zip(found) {
             *farthest = farthest.merge(Farthest {
                 distance: f32::from_bits(bits),
                 pair: first + u64::from(column),
             });
         }
-        let values: Vec<PairMeasure> = buffers.measures.read(job.call.device, columns as usize)?;
         sink(first, &values)?;
         first += u64::from(columns);
     }
-    Ok(farthest)
+    Ok(())
 }
 
 /// The buffers of a call.

@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use super::Gpu;
 use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, Slot, WORKGROUP, limit_kernel};
 use super::kernel::Bound;
+use super::opened::Opened;
 use super::plan::MAX_TRIPS;
 use super::run::{Batch, Call};
-use crate::error::Result;
+use crate::error::{Fault, Result};
 
 /// Multiplications and additions of one round of `shaders/peak.wgsl`: 16 chains of 4 links of 2.
 const ROUND_FLOPS: u64 = 16 * 4 * 2;
@@ -44,12 +44,12 @@ pub struct DeviceLimits {
     pub dispatch_seconds: f64,
 }
 
-/// See [`Gpu::measure_limits`].
-pub(super) fn measure(gpu: &Gpu) -> Result<DeviceLimits> {
-    let call = Call::new(gpu, DISPATCHES);
+/// See [`super::Gpu::measure_limits`].
+pub(super) fn measure(opened: &Opened) -> Result<DeviceLimits> {
+    let call = Call::new(opened, DISPATCHES);
     Ok(DeviceLimits {
         flops_per_second: flops(&call)?,
-        copy_bytes_per_second: copied_bytes(&call, copy_threads(gpu))?,
+        copy_bytes_per_second: copied_bytes(&call, copy_threads(opened))?,
         submit_seconds: median_seconds(&call, &Batch::default())?,
         dispatch_seconds: dispatch_seconds(&call)?,
     })
@@ -76,19 +76,22 @@ fn flops(call: &Call<'_>) -> Result<f64> {
 
 /// Whether every chain has all its links.
 fn check_peak(call: &Call<'_>, sink: &Buffer, rounds: u32) -> Result<()> {
-    let sums: Vec<f32> = sink.read(call.device, PEAK_THREADS as usize)?;
+    let sums: Vec<f32> = sink.read(&call.device, PEAK_THREADS as usize)?;
     let expected = (FIRST_SUM + ROUND_LINKS * u64::from(rounds)) as f32;
     match sums.iter().find(|sum| **sum != expected) {
         None => Ok(()),
-        Some(wrong) => Err(call.device.failed(&format!(
-            "the kernel that measures arithmetic counted {wrong} links instead of {expected}"
-        ))),
+        Some(wrong) => Err(call.device.failed(
+            Fault::Validation,
+            &format!(
+                "the kernel that measures arithmetic counted {wrong} links instead of {expected}"
+            ),
+        )),
     }
 }
 
 /// Threads of the copy: as many as the buffers that the adapter allows have vectors for.
-fn copy_threads(gpu: &Gpu) -> u32 {
-    let adapter = gpu.adapter();
+fn copy_threads(opened: &Opened) -> u32 {
+    let adapter = &opened.device.adapter;
     let bytes = COPY_BYTES.min(adapter.max_binding_bytes).min(adapter.max_buffer_bytes);
     let threads = bytes / (VECTOR_BYTES * u64::from(COPY_ROUNDS));
     (threads / u64::from(WORKGROUP) * u64::from(WORKGROUP)) as u32
@@ -100,7 +103,7 @@ fn copied_bytes(call: &Call<'_>, threads: u32) -> Result<f64> {
     let bytes = VECTOR_BYTES * u64::from(vectors);
     let [source, sink] = [(); 2].map(|()| call.storage(bytes));
     let numbers: Vec<[u32; 4]> = (0..vectors).map(|i| [i, !i, i ^ 1, 0]).collect();
-    source.write(call.device, &numbers);
+    source.write(&call.device, &numbers);
     let copy = bind(call, Kernel::Copy, [&source, &sink])?;
     let params = Params { rounds: COPY_ROUNDS, stride: threads, ..Params::default() };
     let mut copies = 1;
@@ -111,8 +114,9 @@ fn copied_bytes(call: &Call<'_>, threads: u32) -> Result<f64> {
         }
         let seconds = median_seconds(call, &batch)?;
         if seconds >= LONG_ENOUGH_SECONDS || 4 * copies > DISPATCHES {
-            if sink.read::<[u32; 4]>(call.device, vectors as usize)? != numbers {
-                return Err(call.device.failed("a copied buffer differs from its source"));
+            if sink.read::<[u32; 4]>(&call.device, vectors as usize)? != numbers {
+                let problem = "a copied buffer differs from its source";
+                return Err(call.device.failed(Fault::Validation, problem));
             }
             return Ok((2 * bytes * copies) as f64 / seconds);
         }

@@ -6,44 +6,52 @@ pub mod compose;
 mod deviation;
 mod device;
 mod drive;
+mod fault;
 mod kernel;
 mod limits;
 mod mppi;
 mod mppi_plan;
 mod network;
+mod opened;
 mod plan;
 mod reach_avoid;
+mod recover;
 mod run;
 mod timing;
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
-use super::{MeasureSink, PairSink};
+use super::cpu::Cpu;
+use super::{Event, MeasureSink, PairSink};
 use crate::cost::Cost;
 use crate::error::Result;
 use crate::policy::Policy;
 use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, Plant, ReachAvoidTask};
 use crate::system::System;
 
-use buffer::Pool;
-use device::Device;
-use kernel::Pipelines;
-use timing::Clock;
+use opened::{Opened, Setup};
+use recover::State;
 
 pub use buffer::Params;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
+pub use fault::Injection;
 pub use limits::DeviceLimits;
 pub use plan::NetworkKernels;
 pub use timing::KernelTime;
 
-/// An opened adapter with its pipelines and buffers.
+/// An adapter, and what becomes of the work where it fails.
+///
+/// Out of memory, or over time, it goes on in chunks of half the size, down to a smallest one. A
+/// device that is lost is opened again, once. After that, and where a driver refuses what it is
+/// given, the rest is for the CPU if that was allowed, and an error if not.
 pub struct Gpu {
-    device: Device,
-    pipelines: Pipelines,
-    pool: Pool,
-    clock: Clock,
-    networks: NetworkKernels,
+    adapter: Adapter,
+    setup: Setup,
+    state: Mutex<State>,
+    fallback: Option<Cpu>,
+    events: Mutex<Vec<Event>>,
 }
 
 impl Gpu {
@@ -53,14 +61,26 @@ impl Gpu {
     /// # Errors
     /// [`crate::Error::Device`] if none fits the choice or it does not open; it names those found.
     pub fn open(choice: &Choice) -> Result<Self> {
-        let device = Device::open(choice)?;
+        let device = device::Device::open(choice)?;
+        let setup = Setup::default();
         Ok(Self {
-            pipelines: Pipelines::new(&device),
-            device,
-            pool: Pool::default(),
-            clock: Clock::default(),
-            networks: NetworkKernels::Chosen,
+            adapter: device.adapter.clone(),
+            state: Mutex::new(State::new(Opened::new(device, setup.clone()))),
+            setup,
+            fallback: None,
+            events: Mutex::default(),
         })
+    }
+
+    /// The same adapter, whose work goes on on `cpu` where it fails for good.
+    #[must_use]
+    pub fn with_fallback(self, cpu: Cpu) -> Self {
+        Self { fallback: Some(cpu), ..self }
+    }
+
+    /// What failed so far and was worked around, in order.
+    pub fn events(&self) -> Vec<Event> {
+        self.events.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The same adapter, with the text of every kernel changed by `edit` before it is compiled.
@@ -73,15 +93,49 @@ impl Gpu {
         mut self,
         edit: impl Fn(&str) -> String + Send + Sync + 'static,
     ) -> Self {
-        self.pipelines = Pipelines::edited(Arc::new(edit));
-        self
+        self.setup.edit = Some(Arc::new(edit));
+        let opened = Opened::new(self.opened().device.clone(), self.setup.clone());
+        self.with_opened(opened)
     }
 
     /// The same adapter, whose rollouts run networks as `networks` says.
     #[must_use]
     pub fn with_networks(mut self, networks: NetworkKernels) -> Self {
-        self.networks = networks;
-        self
+        self.setup.networks = networks;
+        let opened = Opened { setup: self.setup.clone(), ..self.opened().changed(|device| device) };
+        self.with_opened(opened)
+    }
+
+    /// The same adapter, which fails as `asked`; for tests of what becomes of the work.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_failures(self, asked: Vec<Injection>) -> Self {
+        let opened = self.opened().changed(|device| device.failing(asked));
+        self.with_opened(opened)
+    }
+
+    /// The same adapter, where work may take no longer than `patience`; for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_patience(self, patience: Duration) -> Self {
+        let opened = self.opened().changed(|device| device.waiting(patience));
+        self.with_opened(opened)
+    }
+
+    /// Submissions so far, which [`Injection`] counts.
+    #[doc(hidden)]
+    pub fn submissions(&self) -> u64 {
+        self.opened().device.submissions()
+    }
+
+    /// The same adapter, opened as `opened`, without any failure so far.
+    fn with_opened(self, opened: Opened) -> Self {
+        Self { state: Mutex::new(State::new(opened)), events: Mutex::default(), ..self }
+    }
+
+    /// The device and what is kept on it.
+    fn opened(&self) -> Arc<Opened> {
+        self.state().opened()
     }
 
     /// Times every dispatch on the device from now on, or no longer; off at first.
@@ -89,13 +143,13 @@ impl Gpu {
     /// Timed dispatches run in a pass each, and the host waits for each submission. On an adapter
     /// without timestamp queries nothing changes.
     pub fn time_kernels(&self, on: bool) {
-        self.clock.switch(on);
+        self.setup.clock.switch(on);
     }
 
     /// Times since the last call, by kernel, in the order in which they first ran; empty where
     /// nothing was timed.
     pub fn take_kernel_times(&self) -> Vec<KernelTime> {
-        self.clock.take()
+        self.setup.clock.take()
     }
 
     /// Measures what the adapter can do; takes a second or so, more on a software adapter.
@@ -103,17 +157,17 @@ impl Gpu {
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if a kernel fails or leaves wrong results.
     pub fn measure_limits(&self) -> Result<DeviceLimits> {
-        limits::measure(self)
+        limits::measure(&self.opened())
     }
 
     /// The adapter in figures.
     pub fn adapter(&self) -> &Adapter {
-        &self.device.adapter
+        &self.adapter
     }
 
     /// The adapter in words: name, interface, kind and driver.
     pub fn device(&self) -> String {
-        self.device.adapter.to_string()
+        self.adapter.to_string()
     }
 
     /// See [`super::Backend::reach_avoid`].
@@ -127,7 +181,7 @@ impl Gpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        reach_avoid::reach_avoid(self, plant, task, sink)
+        recover::reach_avoid(self, plant, task, sink)
     }
 
     /// See [`super::Backend::deviation`].
@@ -141,7 +195,7 @@ impl Gpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        deviation::deviation(self, plant, task, sink)
+        recover::deviation(self, plant, task, sink)
     }
 
     /// See [`super::Backend::mppi`].
@@ -155,12 +209,12 @@ impl Gpu {
         S: System<NX, NU>,
         C: Cost<NX, NU, NC>,
     {
-        mppi::mppi(self, system, cost, task)
+        recover::mppi(self, system, cost, task)
     }
 }
 
 impl fmt::Debug for Gpu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Gpu").field(&self.device.adapter).finish()
+        f.debug_tuple("Gpu").field(&self.adapter).finish()
     }
 }

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
-use super::Gpu;
 use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, MppiText, PARTIAL_HEADER, Slot, map_of};
 use super::kernel::Bound;
 use super::mppi_plan::{MppiPlan, Size};
 use super::network::Network;
+use super::opened::Opened;
+use super::recover::Attempt;
 use super::run::{Batch, Call};
 use crate::backend::softmin::Partial;
 use crate::cost::{Cost, CostMap};
@@ -21,13 +22,13 @@ use crate::system::System;
 /// Most dispatches of a submission.
 const DISPATCHES: u64 = 1024;
 
-/// See [`crate::backend::Backend::mppi`].
+/// See [`crate::backend::Backend::mppi`]; results go to `sink` chunk by chunk, in order.
 pub(super) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
-    gpu: &Gpu,
-    system: &S,
-    cost: &C,
+    (opened, attempt): (&Opened, &Attempt),
+    (system, cost): (&S, &C),
     task: &MppiTask<'_, NX, NU, NC>,
-) -> Result<Vec<MppiResult<NU>>>
+    sink: &mut dyn FnMut(Vec<MppiResult<NU>>),
+) -> Result<()>
 where
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
@@ -36,6 +37,7 @@ where
     let cells = map_of(cost).map_or(&[][..], CostMap::cells);
     let networks =
         [task.value.map(|term| term.network), task.disturbance.map(|asked| asked.network)];
+    let text = MppiText::new(system, cost, task);
     let size = Size {
         states: NX,
         controls: NU,
@@ -44,19 +46,21 @@ where
         horizon: settings.horizon,
         samples: settings.samples,
         problems: task.problems.len(),
+        // A line of the text is an operation.
+        flops: text.compose(Kernel::MppiRollout).lines().count() as u64,
         networks,
     };
-    let plan = MppiPlan::new(&gpu.device.adapter, &size)?;
+    let plan = MppiPlan::new(&opened.device.adapter, attempt.limit, &size)?;
+    attempt.columns.set(u64::from(plan.stride));
     let layers = networks.into_iter().flatten().map(|mlp| mlp.layers().len() as u64).sum::<u64>();
-    let call = Call::new(gpu, DISPATCHES + layers + 1);
+    let call = Call::new(opened, DISPATCHES + layers + 1);
     let buffers = Buffers::new(&call, &size, &plan, task.spec.noise());
-    let kernels = buffers.bind(&call, &MppiText::new(system, cost, task))?;
+    let kernels = buffers.bind(&call, &text)?;
     let chunks = Chunks { call: &call, plan, buffers: &buffers, kernels, task, cells };
-    let mut results = Vec::with_capacity(task.problems.len());
     for problems in task.problems.chunks(plan.problems as usize) {
-        results.extend(chunks.improve(problems)?);
+        sink(chunks.improve(problems)?);
     }
-    Ok(results)
+    Ok(())
 }
 
 /// The buffers of a call.
@@ -86,7 +90,7 @@ impl Buffers {
         let horizon = size.horizon as usize;
         let rows = spline_words(noise.shape());
         let spline = call.storage(4 * rows.len() as u64);
-        spline.write(call.device, &rows);
+        spline.write(&call.device, &rows);
         let colored = matches!(noise.shape(), NoiseShape::Colored { .. });
         let groups = problems * u64::from(groups(plan));
         let network = |mlp: Option<&Mlp>| mlp.map(|mlp| Network::new(call, mlp, plan.stride));
@@ -144,6 +148,13 @@ struct Kernels {
     layers: [Vec<Bound>; 2],
 }
 
+/// Dispatches of one submission, and the steps of all of them.
+#[derive(Default)]
+struct Timed<'a> {
+    dispatches: Batch<'a>,
+    steps: u32,
+}
+
 /// What the chunks of a call share.
 struct Chunks<'a, const NX: usize, const NU: usize, const NC: usize> {
     call: &'a Call<'a>,
@@ -189,7 +200,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
         let plans: Vec<f32> = plans.copied().collect();
         let contexts = problems.iter().flat_map(|problem| problem.context.iter().flatten());
         let contexts: Vec<f32> = self.cells.iter().chain(contexts).copied().collect();
-        let device = self.call.device;
+        let device = &self.call.device;
         self.buffers.streams.write(device, &streams);
         self.buffers.starts.write(device, &starts);
         self.buffers.plans.write(device, &plans);
@@ -211,35 +222,37 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
             temperature: settings.temperature,
             ..Params::default()
         };
-        let mut batch = Batch::default();
-        batch.push_columns(Kernel::MppiStart, &self.kernels.start, &params);
+        let mut batch = Timed::default();
+        batch.dispatches.push_columns(Kernel::MppiStart, &self.kernels.start, &params);
         for step in (0..settings.horizon).step_by(self.plan.rollout_steps as usize) {
             let steps = self.plan.rollout_steps.min(settings.horizon - step);
-            self.make_room(&mut batch)?;
+            self.make_room(&mut batch, steps)?;
             for (network, layers) in self.buffers.networks.iter().zip(&self.kernels.layers) {
                 if let Some(network) = network {
-                    network.forward(&mut batch, layers, params.columns, params.stride);
+                    let (columns, row) = (params.columns, params.stride);
+                    network.forward(&mut batch.dispatches, layers, columns, row);
                 }
             }
-            let params = params.over(step, steps);
-            batch.push_columns(Kernel::MppiRollout, &self.kernels.rollout, &params);
+            let (kernel, params) = (&self.kernels.rollout, params.over(step, steps));
+            batch.dispatches.push_columns(Kernel::MppiRollout, kernel, &params);
         }
         for step in (0..settings.horizon).step_by(self.plan.update_steps as usize) {
             let steps = self.plan.update_steps.min(settings.horizon - step);
-            self.make_room(&mut batch)?;
+            self.make_room(&mut batch, steps)?;
             let groups = problems * groups(&self.plan);
-            batch.push(&self.kernels.update, &params.over(step, steps), [groups, 1]);
+            batch.dispatches.push(&self.kernels.update, &params.over(step, steps), [groups, 1]);
         }
-        self.call.submit(&batch, None)
+        self.call.submit(&batch.dispatches, None)
     }
 
-    /// Submits a batch that is full.
-    fn make_room(&self, batch: &mut Batch<'_>) -> Result<()> {
-        if batch.len() < DISPATCHES {
-            return Ok(());
+    /// Submits a batch that has no room for a dispatch of `steps` more steps.
+    fn make_room<'a>(&'a self, batch: &mut Timed<'a>, steps: u32) -> Result<()> {
+        let full = batch.steps > 0 && batch.steps + steps > self.plan.timely_steps;
+        if full || batch.dispatches.len() >= DISPATCHES {
+            self.call.submit(&batch.dispatches, None)?;
+            *batch = Timed::default();
         }
-        self.call.submit(batch, None)?;
-        *batch = Batch::default();
+        batch.steps += steps;
         Ok(())
     }
 
@@ -249,7 +262,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
         let words = partial_words(settings.horizon, NU);
         let groups = groups(&self.plan) as usize;
         let count = merged.len() * groups * words;
-        let read: Vec<u32> = self.buffers.partials.read(self.call.device, count)?;
+        let read: Vec<u32> = self.buffers.partials.read(&self.call.device, count)?;
         for ((all, _), problem) in merged.iter_mut().zip(read.chunks(groups * words)) {
             for group in problem.chunks(words) {
                 all.merge(&partial(group), settings.temperature);
@@ -262,7 +275,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
     fn read_costs(&self, merged: &mut [(Partial<NU>, Vec<f32>)], samples: u32) -> Result<()> {
         let width = self.plan.width as usize;
         let count = merged.len() * width;
-        let read: Vec<f32> = self.buffers.totals.read(self.call.device, count)?;
+        let read: Vec<f32> = self.buffers.totals.read(&self.call.device, count)?;
         for ((_, costs), problem) in merged.iter_mut().zip(read.chunks(width)) {
             let counts = |cost: f32| cost.is_finite() && cost < HUGE;
             let cost = |&cost: &f32| if counts(cost) { cost } else { f32::INFINITY };

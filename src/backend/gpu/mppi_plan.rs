@@ -4,7 +4,9 @@
 use super::compose::{PARTIAL_HEADER, WORKGROUP, tile_steps};
 use super::device::Adapter;
 use super::network::{input_quads, output_quads, parameter_quads};
-use super::plan::{COLUMN_UNIT, FORMULA_COLUMNS, MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS};
+use super::plan::{
+    COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS, network_flops,
+};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 
@@ -13,6 +15,8 @@ use crate::policy::Mlp;
 const BUSY_GROUPS: u32 = 1024;
 /// Iterations of Philox.
 const PHILOX_TRIPS: u64 = 10;
+/// Operations of one number of the noise: its part in a block of Philox and in a pair of normals.
+const NOISE_FLOPS: u64 = 100;
 /// Knots of a spline that a dispatch draws before its first step.
 const WINDOW: u64 = 4;
 
@@ -33,8 +37,18 @@ pub(super) struct Size<'a> {
     pub(super) samples: u32,
     /// Problems.
     pub(super) problems: usize,
+    /// Operations of the formulas for one step of one sample.
+    pub(super) flops: u64,
     /// Value network and disturbance network.
     pub(super) networks: [Option<&'a Mlp>; 2],
+}
+
+impl Size<'_> {
+    /// Operations of one step of one sample: formulas, noise and networks.
+    pub(super) fn step_flops(&self) -> u64 {
+        let networks = self.networks.into_iter().flatten().map(network_flops).sum::<u64>();
+        self.flops + NOISE_FLOPS * self.controls as u64 + networks
+    }
 }
 
 /// How the batch is cut up.
@@ -54,19 +68,21 @@ pub(super) struct MppiPlan {
     pub(super) rollout_steps: u32,
     /// Steps per dispatch of the update.
     pub(super) update_steps: u32,
+    /// Steps of rollout and update that a submission takes together.
+    pub(super) timely_steps: u32,
 }
 
 impl MppiPlan {
-    /// The plan for a batch on `adapter`.
+    /// The plan for a batch on `adapter` within `limit`.
     ///
     /// # Errors
     /// [`Error::Device`] if not even the smallest chunk fits, or a kernel needs more loop
     /// iterations or threads than it may have.
-    pub(super) fn new(adapter: &Adapter, size: &Size<'_>) -> Result<Self> {
+    pub(super) fn new(adapter: &Adapter, limit: Limit, size: &Size<'_>) -> Result<Self> {
         let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
         let networks = || size.networks.into_iter().flatten();
         let parameters = networks().map(|mlp| 16 * parameter_quads(mlp) as u64).max().unwrap_or(0);
-        let columns = most_columns(size, binding);
+        let columns = most_columns(size, binding, limit);
         let cells = 4 * size.cells as u64;
         let problems = (binding.saturating_sub(cells) / problem_row_bytes(size))
             .min((MEMORY_BYTES / 4).saturating_sub(cells) / problem_bytes(size))
@@ -84,27 +100,33 @@ impl MppiPlan {
             0 => (1, samples.next_multiple_of(unit), 1),
             fitting => (problems.min(fitting), width, rounds),
         };
+        let stride = (problems * width).next_multiple_of(COLUMN_UNIT);
+        // Rollout and update take every step once each.
+        let timely = limit.pieces(stride * size.step_flops());
+        let timely = timely.min(2 * u64::from(size.horizon)) as u32;
         Ok(Self {
             problems: problems as u32,
             samples: samples as u32,
             width: width as u32,
-            stride: (problems * width).next_multiple_of(COLUMN_UNIT) as u32,
+            stride: stride as u32,
             rounds,
-            rollout_steps: rollout_steps(size)?,
-            update_steps: update_steps(size, rounds)?,
+            rollout_steps: rollout_steps(size)?.min(timely),
+            update_steps: update_steps(size, rounds)?.min(timely),
+            timely_steps: timely,
         })
     }
 }
 
 /// Most columns of a chunk: whole tiles of the networks' layers.
-fn most_columns(size: &Size<'_>, binding: u64) -> u64 {
+fn most_columns(size: &Size<'_>, binding: u64, limit: Limit) -> u64 {
     let networked = size.networks.iter().any(Option::is_some);
     let cap = if networked { NETWORK_COLUMNS } else { FORMULA_COLUMNS };
     let parts = column_bytes(size);
     let largest = parts.iter().copied().max().unwrap_or(1);
     // A quarter of the memory is the problems'.
     let fitting = (binding / largest).min(MEMORY_BYTES / 4 * 3 / parts.iter().sum::<u64>());
-    fitting.min(cap) / COLUMN_UNIT * COLUMN_UNIT
+    let timely = limit.pieces(size.step_flops()).max(COLUMN_UNIT);
+    fitting.min(cap).min(timely).min(limit.columns) / COLUMN_UNIT * COLUMN_UNIT
 }
 
 /// Bytes that each buffer holds per column: states, costs, correlated noise, partials of single
@@ -215,7 +237,12 @@ mod tests {
 
     fn size(controls: usize, horizon: u32, samples: u32, problems: usize) -> Size<'static> {
         let networks = [None; 2];
-        Size { states: 12, controls, contexts: 8, cells: 0, horizon, samples, problems, networks }
+        let (states, contexts, cells, flops) = (12, 8, 0, 300);
+        Size { states, controls, contexts, cells, horizon, samples, problems, flops, networks }
+    }
+
+    fn planned(adapter: &Adapter, size: &Size<'_>) -> Result<MppiPlan> {
+        MppiPlan::new(adapter, Limit::default(), size)
     }
 
     /// Blocks of Philox that `steps` draws of `controls` numbers touch, from the worst place on.
@@ -252,7 +279,7 @@ mod tests {
                 for (controls, problems) in [(1, 1), (3, 1), (3, 500), (12, 100_000)] {
                     let size = size(controls, horizon, samples, problems);
                     let plan =
-                        MppiPlan::new(&Adapter::made_up(1 << 27), &size).expect("a plan that fits");
+                        planned(&Adapter::made_up(1 << 27), &size).expect("a plan that fits");
                     check(&size, &plan, 1 << 27);
                 }
             }
@@ -264,7 +291,7 @@ mod tests {
         // Contexts of 640 bytes for each problem, behind the cells: room for ten.
         let cells = ((1 << 22) - 10 * 640) / 4;
         let size = Size { cells, ..size(3, 20, 64, 100) };
-        let plan = MppiPlan::new(&Adapter::made_up(1 << 22), &size).expect("a plan that fits");
+        let plan = planned(&Adapter::made_up(1 << 22), &size).expect("a plan that fits");
         assert_eq!(plan.problems, 10);
     }
 
@@ -285,11 +312,9 @@ mod tests {
 
     #[test]
     fn long_plans_are_split_over_dispatches() {
-        let long =
-            MppiPlan::new(&Adapter::made_up(1 << 27), &size(24, 512, 64, 1)).expect("a plan");
+        let long = planned(&Adapter::made_up(1 << 27), &size(24, 512, 64, 1)).expect("a plan");
         assert!((1..512).contains(&long.update_steps), "{long:?}");
-        let race =
-            MppiPlan::new(&Adapter::made_up(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
+        let race = planned(&Adapter::made_up(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
         assert_eq!((race.rollout_steps, race.update_steps), (20, 20));
     }
 
@@ -298,8 +323,7 @@ mod tests {
     fn rounds_depend_on_the_samples_alone() {
         for (samples, rounds) in [(500, 1), (65_536, 1), (200_000, 3), (1_000_000, 4)] {
             for problems in [1, 500] {
-                let plan =
-                    MppiPlan::new(&Adapter::made_up(1 << 27), &size(3, 20, samples, problems));
+                let plan = planned(&Adapter::made_up(1 << 27), &size(3, 20, samples, problems));
                 assert_eq!(plan.expect("a plan").rounds, rounds, "{samples} x {problems}");
             }
         }
@@ -307,12 +331,12 @@ mod tests {
 
     #[test]
     fn what_cannot_run_is_refused() {
-        let small = MppiPlan::new(&Adapter::made_up(1 << 10), &size(3, 20, 500, 1));
+        let small = planned(&Adapter::made_up(1 << 10), &size(3, 20, 500, 1));
         assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
         let mapped = Size { cells: 1 << 25, ..size(3, 20, 500, 1) };
-        let mapped = MppiPlan::new(&Adapter::made_up(1 << 27), &mapped);
+        let mapped = planned(&Adapter::made_up(1 << 27), &mapped);
         assert!(mapped.expect_err("no room for contexts").to_string().contains("the map"));
-        let wide = MppiPlan::new(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));
+        let wide = planned(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));
         assert!(wide.expect_err("too wide").to_string().contains("65 controls"));
         let long = most_steps(4, |steps| steps * MAX_TRIPS * 2);
         assert!(long.expect_err("too long").to_string().contains("loop iterations"));

@@ -62,7 +62,7 @@ impl Network {
         let bytes = 16 * u64::from(widest) * u64::from(row);
         Self {
             weights: upload(call, mlp),
-            activations: [(); 2].map(|()| call.pool.take(call.device, Use::Storage, bytes)),
+            activations: [(); 2].map(|()| call.pool.take(&call.device, Use::Storage, bytes)),
             layers,
             shape: Shape::new(mlp.widths()[0], mlp.widths()[mlp.layers().len()], Some(mlp)),
         }
@@ -104,6 +104,7 @@ impl Network {
                 layer_offset: layer.offset,
                 layer_inputs: layer.inputs,
                 layer_outputs: layer.outputs,
+                layer_neurons: layer.neurons,
                 ..Params::default()
             };
             let across = columns.div_ceil(WORKGROUP);

@@ -28,6 +28,40 @@ const FUSED_WIDTH: usize = 128;
 /// Most device memory of one call, bytes.
 pub(super) const MEMORY_BYTES: u64 = 256 << 20;
 
+/// Most operations of one submission, as counted from formulas and networks.
+///
+/// Some systems reset a device after 2 s. This takes half a second at 34 GFLOP/s, which a small
+/// integrated GPU reaches, and on a large one still many times what a submission costs.
+const WORK_FLOPS: u64 = 1 << 34;
+
+/// What a plan may ask of an adapter; halved where the adapter fails at it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Limit {
+    /// Columns of a chunk.
+    pub(super) columns: u64,
+    /// Operations of a submission.
+    pub(super) flops: u64,
+}
+
+impl Default for Limit {
+    fn default() -> Self {
+        Self { columns: FORMULA_COLUMNS, flops: WORK_FLOPS }
+    }
+}
+
+impl Limit {
+    /// Half of it, after a chunk of `columns` columns; `None` if that was the smallest there is.
+    pub(super) fn half(self, columns: u64) -> Option<Self> {
+        let columns = columns / 2 / COLUMN_UNIT * COLUMN_UNIT;
+        (columns > 0).then_some(Self { columns, flops: self.flops / 2 })
+    }
+
+    /// How many pieces of `each` operations a submission takes, at least one.
+    pub(super) fn pieces(self, each: u64) -> u64 {
+        (self.flops / each.max(1)).max(1)
+    }
+}
+
 /// What is asked of the rollouts, as far as it decides the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
@@ -138,6 +172,33 @@ fn step_trips(fused: &Fused, work: Work) -> u64 {
     1 + u64::from(work.sides()) * fused.trips()
 }
 
+/// A batch, as far as it decides the plan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size<'a> {
+    /// States of the system.
+    pub(super) states: usize,
+    /// Operations of the formulas for one step of one trajectory.
+    pub(super) flops: u64,
+    /// The network that drives the rollouts.
+    pub(super) network: Option<&'a Mlp>,
+    /// The same, where they run it themselves.
+    pub(super) fused: Option<&'a Fused>,
+    /// Starts or pairs.
+    pub(super) count: u64,
+}
+
+impl Size<'_> {
+    /// Operations of a step of one trajectory.
+    fn step_flops(&self) -> u64 {
+        self.flops + self.network.map_or(0, network_flops)
+    }
+}
+
+/// Operations of a network for one input.
+pub(super) fn network_flops(mlp: &Mlp) -> u64 {
+    mlp.layers().iter().map(|layer| 2 * layer.weight.len() as u64).sum()
+}
+
 /// How a batch is cut up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Plan {
@@ -153,18 +214,17 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// The plan for `count` starts or pairs of `states` states on `adapter`, driven by `network`,
-    /// which the rollouts run themselves where it is fused.
+    /// The plan for a batch on `adapter` within `limit`.
     ///
     /// # Errors
     /// [`Error::Device`] if not even the smallest chunk fits.
     pub(super) fn new(
         adapter: &Adapter,
+        limit: Limit,
         work: Work,
-        states: usize,
-        (network, fused): (Option<&Mlp>, Option<&Fused>),
-        count: u64,
+        size: &Size<'_>,
     ) -> Result<Self> {
+        let Size { states, network, fused, count, .. } = *size;
         let driven = Driven::new(network, fused);
         let segment = work.segment(driven);
         let layered = network.filter(|_| driven == Driven::Layered);
@@ -172,12 +232,17 @@ impl Plan {
         let largest = parts.iter().copied().max().unwrap_or(1);
         let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
         let fitting = (binding / largest).min(MEMORY_BYTES / parts.iter().sum::<u64>());
+        // A step of the smallest chunk is what there is at least.
+        let step_flops = u64::from(work.sides()) * size.step_flops();
+        let timely = limit.pieces(step_flops).max(COLUMN_UNIT);
         let wanted = count.max(1).next_multiple_of(COLUMN_UNIT).min(driven.columns());
-        let stride = wanted.min(fitting / COLUMN_UNIT * COLUMN_UNIT);
+        let most = fitting.min(timely).min(limit.columns);
+        let stride = wanted.min(most / COLUMN_UNIT * COLUMN_UNIT);
         let parameters = 16 * network.map_or(0, parameter_quads) as u64;
         if stride == 0 || parameters > binding {
             return Err(too_large(adapter, largest * COLUMN_UNIT, parameters, binding));
         }
+        let segment = u64::from(segment).min(limit.pieces(stride * step_flops)) as u32;
         let steps = match (layered, fused) {
             (Some(_), _) => 1,
             (None, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work)) as u32),
@@ -251,6 +316,18 @@ mod tests {
         Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
     }
 
+    fn size<'a>(
+        states: usize,
+        (network, fused): (Option<&'a Mlp>, Option<&'a Fused>),
+        count: u64,
+    ) -> Size<'a> {
+        Size { states, flops: 200, network, fused, count }
+    }
+
+    fn planned(adapter: &Adapter, work: Work, size: &Size<'_>) -> Result<Plan> {
+        Plan::new(adapter, Limit::default(), work, size)
+    }
+
     #[test]
     fn chunks_are_whole_tiles_within_the_limits() {
         let (wide, narrow) = (network(&[12, 512, 512, 3]), network(&[12, 64, 64, 3]));
@@ -260,8 +337,8 @@ mod tests {
                 for work in [Work::Measure, Work::Sign, Work::Pairs] {
                     // Parameters of the wide network take a megabyte of their own.
                     let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
-                    let driven = (network, fused.as_ref());
-                    let plan = Plan::new(&Adapter::made_up(binding), work, 12, driven, count);
+                    let size = size(12, (network, fused.as_ref()), count);
+                    let plan = planned(&Adapter::made_up(binding), work, &size);
                     let plan = plan.expect("a plan within the limits");
                     let layered = network.filter(|_| fused.is_none());
                     let bytes = column_bytes(work, 12, layered, plan.segment);
@@ -272,6 +349,8 @@ mod tests {
                     let step = fused.as_ref().map_or(1, |fused| step_trips(fused, work));
                     assert!(u64::from(plan.steps) * step <= MAX_TRIPS);
                     assert_eq!(plan.steps == 1, layered.is_some());
+                    let flops = stride * u64::from(work.sides() * plan.segment);
+                    assert!(flops * size.step_flops() <= WORK_FLOPS, "{plan:?}");
                 }
             }
         }
@@ -279,18 +358,54 @@ mod tests {
 
     #[test]
     fn small_batches_get_small_chunks() {
-        let plan = Plan::new(&Adapter::made_up(1 << 27), Work::Measure, 12, (None, None), 468);
+        let size = size(12, (None, None), 468);
+        let plan = planned(&Adapter::made_up(1 << 27), Work::Measure, &size);
         assert_eq!(plan.expect("a plan").stride, 512);
     }
 
     #[test]
     fn what_cannot_run_is_refused() {
-        let small = Plan::new(&Adapter::made_up(1 << 10), Work::Measure, 12, (None, None), 10);
+        let formula = |states| size(states, (None, None), 10);
+        let small = planned(&Adapter::made_up(1 << 10), Work::Measure, &formula(12));
         assert!(matches!(small, Err(Error::Device(_))), "{small:?}");
         let states = 4 * MAX_TRIPS as usize;
-        let long = Plan::new(&Adapter::made_up(1 << 30), Work::Measure, states, (None, None), 10);
+        let long = planned(&Adapter::made_up(1 << 30), Work::Measure, &formula(states));
         let text = long.expect_err("too many iterations").to_string();
         assert!(text.contains("loop iterations"), "{text}");
+    }
+
+    #[test]
+    fn a_submission_has_no_more_work_than_a_watchdog_allows() {
+        let wide = network(&[12, 64, 64, 3]);
+        let size = size(12, (Some(&wide), None), 1 << 20);
+        let step = size.step_flops();
+        for (pieces, expected) in
+            [(1 << 20, (1 << 14, 64)), (1 << 15, (1 << 14, 2)), (100, (64, 1))]
+        {
+            let limit = Limit { flops: pieces * step, ..Limit::default() };
+            let plan = Plan::new(&Adapter::made_up(1 << 27), limit, Work::Measure, &size);
+            let plan = plan.expect("a plan");
+            assert_eq!((plan.stride, plan.segment), expected, "{pieces} trajectories and steps");
+        }
+    }
+
+    #[test]
+    fn half_a_limit_is_smaller_until_there_is_none() {
+        let mut limit = Limit::default();
+        let mut columns = FORMULA_COLUMNS;
+        while let Some(half) = limit.half(columns) {
+            assert!(half.columns <= columns / 2 && half.flops == limit.flops / 2);
+            assert_eq!(half.columns % COLUMN_UNIT, 0);
+            (limit, columns) = (half, half.columns);
+            let plan = Plan::new(
+                &Adapter::made_up(1 << 27),
+                limit,
+                Work::Pairs,
+                &size(12, (None, None), u64::MAX / 2),
+            );
+            assert_eq!(u64::from(plan.expect("a plan").stride), columns);
+        }
+        assert_eq!(columns, COLUMN_UNIT);
     }
 
     /// Whether a network of these widths is fused on hardware with `bytes` of workgroup memory.
@@ -320,7 +435,9 @@ mod tests {
         let deep = network(&[[12].as_slice(), &[128; 60], &[3]].concat());
         let fused = Fused::new(&deep);
         let adapter = Adapter::made_up(1 << 27);
-        let plan = Plan::new(&adapter, Work::Measure, 12, (Some(&deep), Some(&fused)), 1000);
+        let size = size(12, (Some(&deep), Some(&fused)), 1000);
+        let limit = Limit { flops: u64::MAX, ..Limit::default() };
+        let plan = Plan::new(&adapter, limit, Work::Measure, &size);
         // 3 vectors of inputs, then 60 times 32, and the 61 layers themselves.
         let trips = 1 + 3 + 60 * 32 + 61;
         assert_eq!(u64::from(plan.expect("a plan").steps), MAX_TRIPS / trips);

@@ -1,11 +1,12 @@
 //! Reach-avoid measures on the device: chunks of trajectories, compacted where only signs count.
 
-use super::Gpu;
 use super::buffer::{Buffer, Params};
 use super::compose::{Kernel, Slot};
 use super::drive::Drive;
 use super::kernel::Bound;
+use super::opened::Opened;
 use super::plan::Work;
+use super::recover::Attempt;
 use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
 use crate::backend::MeasureSink;
 use crate::error::Result;
@@ -15,7 +16,7 @@ use crate::system::System;
 
 /// See [`crate::backend::Backend::reach_avoid`].
 pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
-    gpu: &Gpu,
+    adapter: (&Opened, &Attempt),
     plant: Plant<'_, S, P>,
     task: &ReachAvoidTask<'_, NX>,
     sink: MeasureSink<'_>,
@@ -33,7 +34,7 @@ where
         Query::Measure => Work::Measure,
         Query::Sign => Work::Sign,
     };
-    let job = Job::new(gpu, plant, work, count)?;
+    let job = Job::new(adapter, plant, work, count)?;
     let buffers = Buffers::new(&job, plant.policy.network(), task)?;
     let chunks = Chunks {
         kernels: [buffers.bind(&job, 0)?, buffers.bind(&job, 1)?],
@@ -50,7 +51,7 @@ where
         let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
         job.upload_starts(&task.starts, first, columns, &buffers.sets[0].state);
         chunks.run(first, columns)?;
-        let values: Vec<f32> = buffers.measures.read(job.call.device, columns as usize)?;
+        let values: Vec<f32> = buffers.measures.read(&job.call.device, columns as usize)?;
         sink(first, &values)?;
         first += u64::from(columns);
     }
@@ -160,7 +161,7 @@ impl Chunks<'_> {
                 let compact = &self.kernels[set].compact;
                 batch.push_columns(Kernel::Compact, compact, &params);
                 self.job.call.submit(&batch, Some(&self.buffers.survivors))?;
-                params.columns = self.buffers.survivors.read::<u32>(self.job.call.device, 1)?[0];
+                params.columns = self.buffers.survivors.read::<u32>(&self.job.call.device, 1)?[0];
                 set = 1 - set;
                 if params.columns == 0 {
                     break;

@@ -2,12 +2,13 @@
 
 use std::cell::Cell;
 
-use super::Gpu;
 use super::buffer::{Buffer, Params, Pool, Use};
 use super::compose::{Access, Kernel, Shape, Slot, compose};
 use super::device::Device;
 use super::kernel::{Bound, Pipelines};
-use super::plan::{Plan, Work, fused};
+use super::opened::Opened;
+use super::plan::{Plan, Size, Work, fused};
+use super::recover::Attempt;
 use super::timing::{Clock, Stamps};
 use crate::backend::physics;
 use crate::error::{Error, Result};
@@ -20,7 +21,7 @@ const REGION_LISTED: u32 = 2;
 
 /// One call on the device.
 pub(super) struct Call<'a> {
-    pub(super) device: &'a Device,
+    pub(super) device: Device,
     pub(super) pool: &'a Pool,
     pipelines: &'a Pipelines,
     clock: &'a Clock,
@@ -30,27 +31,29 @@ pub(super) struct Call<'a> {
 
 impl<'a> Call<'a> {
     /// A call with at most `dispatches` dispatches per submission.
-    pub(super) fn new(gpu: &'a Gpu, dispatches: u64) -> Self {
+    pub(super) fn new(opened: &'a Opened, dispatches: u64) -> Self {
         let bytes = dispatches * Params::PITCH as u64;
+        // Before the first buffer is made: what fails from here on is this call's.
+        let device = opened.device.for_call();
         Self {
-            device: &gpu.device,
-            pool: &gpu.pool,
-            pipelines: &gpu.pipelines,
-            clock: &gpu.clock,
-            uniform: gpu.pool.take(&gpu.device, Use::Uniform, bytes),
+            uniform: opened.pool.take(&device, Use::Uniform, bytes),
+            device,
+            pool: &opened.pool,
+            pipelines: &opened.pipelines,
+            clock: &opened.setup.clock,
             in_flight: Cell::new(None),
         }
     }
 
     /// A storage buffer.
     pub(super) fn storage(&self, bytes: u64) -> Buffer {
-        self.pool.take(self.device, Use::Storage, bytes)
+        self.pool.take(&self.device, Use::Storage, bytes)
     }
 
     /// A storage buffer with `data` in it.
     pub(super) fn uploaded(&self, data: &[[f32; 4]]) -> Buffer {
         let buffer = self.storage(size_of_val(data) as u64);
-        buffer.write(self.device, data);
+        buffer.write(&self.device, data);
         buffer
     }
 
@@ -62,8 +65,8 @@ impl<'a> Call<'a> {
         composed: String,
         buffer: impl Fn(Slot) -> &'b Buffer,
     ) -> Result<Bound> {
-        let pipeline = self.pipelines.pipeline(self.device, kernel, bindings, composed)?;
-        Ok(pipeline.bind(self.device, |slot| match slot {
+        let pipeline = self.pipelines.pipeline(&self.device, kernel, bindings, composed)?;
+        Ok(pipeline.bind(&self.device, |slot| match slot {
             Slot::Params => self.uniform.first_block(),
             _ => buffer(slot).binding(),
         }))
@@ -71,16 +74,16 @@ impl<'a> Call<'a> {
 
     /// Starts `batch`, after clearing `cleared`; at most two submissions are under way at a time.
     pub(super) fn submit(&self, batch: &Batch<'_>, cleared: Option<&Buffer>) -> Result<()> {
-        self.uniform.write(self.device, &batch.blocks);
+        self.uniform.write(&self.device, &batch.blocks);
         let mut encoder = self.device.device.create_command_encoder(&Default::default());
         if let Some(buffer) = cleared {
             buffer.clear(&mut encoder);
         }
-        let stamps = self.clock.stamps(self.device, self.pool, batch.calls.len());
+        let stamps = self.clock.stamps(&self.device, self.pool, batch.calls.len());
         batch.encode(&mut encoder, stamps.as_ref());
-        let index = self.device.queue.submit([encoder.finish()]);
+        let index = self.device.submit(encoder.finish())?;
         if let Some(stamps) = &stamps {
-            self.clock.add(self.device, stamps, batch.kernels())?;
+            self.clock.add(&self.device, stamps, batch.kernels())?;
         }
         match self.in_flight.replace(Some(index)) {
             Some(before) => self.device.wait(Some(before)),
@@ -100,7 +103,7 @@ pub(super) struct Job<'a> {
 impl<'a> Job<'a> {
     /// The call for `count` starts or pairs under `plant`.
     pub(super) fn new<S, P, const NX: usize, const NU: usize>(
-        gpu: &'a Gpu,
+        (opened, attempt): (&'a Opened, &Attempt),
         plant: Plant<'_, S, P>,
         work: Work,
         count: u64,
@@ -111,15 +114,26 @@ impl<'a> Job<'a> {
     {
         let network = plant.policy.network();
         check_network(network, NX, NU)?;
-        let fused = fused(&gpu.device.adapter, network, gpu.networks)?;
-        let plan = Plan::new(&gpu.device.adapter, work, NX, (network, fused.as_ref()), count)?;
+        let adapter = &opened.device.adapter;
+        let fused = fused(adapter, network, opened.setup.networks)?;
+        let physics = physics(plant);
+        let size = Size {
+            states: NX,
+            // A line of the text is an operation.
+            flops: physics.lines().count() as u64,
+            network,
+            fused: fused.as_ref(),
+            count,
+        };
+        let plan = Plan::new(adapter, attempt.limit, work, &size)?;
+        attempt.columns.set(u64::from(plan.stride));
         // Per submission: the draw, compaction or reduction, and each step with its layers.
         let layers = network.map_or(0, |mlp| mlp.layers().len() as u64);
         Ok(Self {
-            call: Call::new(gpu, 2 + u64::from(plan.segment) * (layers + 1)),
+            call: Call::new(opened, 2 + u64::from(plan.segment) * (layers + 1)),
             plan,
             shape: Shape { fused, ..Shape::new(NX, NU, network) },
-            physics: physics(plant),
+            physics,
         })
     }
 
@@ -157,7 +171,7 @@ impl<'a> Job<'a> {
                 packed[i / 4 * row + column][i % 4] = x;
             }
         }
-        state.write(self.call.device, &packed);
+        state.write(&self.call.device, &packed);
     }
 }
 

@@ -51,7 +51,9 @@ pub(super) fn run(
     });
     let mut store = Store::open(out, &identity, record)?;
     for (values, sha256) in points.into_iter().zip(hashes) {
-        store.point(sha256, values.clone(), || sweep.certify(&values, progress))?;
+        store.point(sha256, values.clone(), || {
+            sweep.certify(&values, progress).map(|point| (point, backend.events()))
+        })?;
     }
     Ok(store)
 }

@@ -33,6 +33,7 @@ pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
         Of::Certificate => certificate::run(global, asked, &grid, work)?,
     };
     progress.finish();
+    devices::note_events(global, &backend);
     let files = store.finish(sweep_html)?;
     report(global, store.record(), || text::text(store.record(), &files))?;
     Ok(Outcome::Done)

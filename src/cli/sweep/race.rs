@@ -51,7 +51,9 @@ pub(super) fn run(
     let total = points.len();
     for (i, (values, sha256)) in points.into_iter().zip(hashes).enumerate() {
         let label = grid.label(i, total, &values);
-        store.point(sha256, values.clone(), || sweep.race(&values, &label, progress))?;
+        store.point(sha256, values.clone(), || {
+            sweep.race(&values, &label, progress).map(|point| (point, backend.events()))
+        })?;
     }
     Ok(store)
 }

@@ -37,7 +37,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
     let begun = Instant::now();
     keep_memory();
     let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let (backend, progress) = (devices::cpu(global)?, Progress::new(global));
+    let (backend, progress) = (Backend::Cpu(devices::cpu(global)?), Progress::new(global));
     let settings = config.train_settings()?;
     let training = Training { config, settings, backend: &backend, watch: &progress, out: &out };
     let trained = match settings.method {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::backend::{Event, add_events};
 use crate::experiment::judge::Judge;
 use crate::experiment::record::{JudgedRecord, StartsRecord};
 use crate::scenario::record::{GrowthOutcome, Provenance};
@@ -32,6 +33,15 @@ pub struct SweepRecord {
     pub points: Vec<PointRecord>,
 }
 
+impl SweepRecord {
+    /// What failed on the adapter and was worked around, each once.
+    pub fn events(&self) -> Vec<Event> {
+        let mut all = Vec::new();
+        self.points.iter().for_each(|point| add_events(&mut all, point.events.iter().cloned()));
+        all
+    }
+}
+
 /// One parameter and the values that it takes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -52,6 +62,9 @@ pub struct PointRecord {
     pub values: Vec<String>,
     /// What came of it.
     pub result: PointResult,
+    /// What failed on the adapter and was worked around until the point was done.
+    #[serde(default)]
+    pub events: Vec<Event>,
 }
 
 /// What came of a point.

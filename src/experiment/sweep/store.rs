@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
+use crate::backend::Event;
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::files::{Staged, claim_folder, json};
@@ -57,7 +58,7 @@ impl Store {
     }
 
     /// Adds the point with the values `values` and the hash `sha256`: the stored one, else what
-    /// `compute` comes to, which is stored.
+    /// `compute` comes to, which is stored, and what failed on the adapter until then.
     ///
     /// # Errors
     /// [`Error::File`] for a stored point that is damaged; those of `compute`; [`Error::Write`].
@@ -65,20 +66,20 @@ impl Store {
         &mut self,
         sha256: String,
         values: Vec<String>,
-        compute: impl FnOnce() -> Result<PointResult>,
+        compute: impl FnOnce() -> Result<(PointResult, Vec<Event>)>,
     ) -> Result<()> {
         let file = format!("{sha256}.json");
         let path = self.folder.join(POINTS).join(&file);
         let found = stored(&path, &sha256)?;
         let is_new = found.is_none();
-        let result = match found.map_or_else(compute, Ok) {
-            Ok(result) => result,
+        let (result, events) = match found.map_or_else(compute, Ok) {
+            Ok(done) => done,
             Err(error) => {
                 self.tables()?;
                 return Err(error);
             }
         };
-        self.record.points.push(PointRecord { sha256, values, result });
+        self.record.points.push(PointRecord { sha256, values, result, events });
         if !is_new {
             return Ok(());
         }
@@ -123,7 +124,7 @@ impl Store {
 }
 
 /// The result that the file at `path` holds; none where there is no file.
-fn stored(path: &Path, sha256: &str) -> Result<Option<PointResult>> {
+fn stored(path: &Path, sha256: &str) -> Result<Option<(PointResult, Vec<Event>)>> {
     let damaged = |problem: &dyn std::fmt::Display| {
         let text = format!("{problem}; remove the file, and the point is computed again");
         Error::file(path, text)
@@ -139,7 +140,7 @@ fn stored(path: &Path, sha256: &str) -> Result<Option<PointResult>> {
         return Err(damaged(&"it is of another point"));
     }
     match digest_of(&point)? == content_sha256 {
-        true => Ok(Some(point.result)),
+        true => Ok(Some((point.result, point.events))),
         false => Err(damaged(&"it was edited after it was stored")),
     }
 }

@@ -23,13 +23,14 @@ const SCRIPT: &str = include_str!("race.js");
 pub fn race_html(record: &RaceRecord) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n{head}<body class=\"race\">\n{HATCH}{WEAVES}{header}\
-         <main>\n{statements}\
+         <main>\n{statements}{adapter}\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
          <div class=\"gallery\">\n{success}{failures}{tiers}{film}</div></section>\n\
          {numbers}</main>\n{footer}{script}</body>\n</html>\n",
         head = shell::head("race study", &format!("{SHEET_STYLE}{RACE_STYLE}"), Scripts::Own),
         header = header(record),
         statements = statements(record),
+        adapter = shell::failures(&record.events),
         success = success::figure(record).html(),
         failures = failures::figure(record).html(),
         tiers = tiers::figure(record).html(),

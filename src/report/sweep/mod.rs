@@ -174,10 +174,11 @@ fn body(grid: &Grid<'_>, figures: &[Figure], findings: &Findings) -> String {
         "<div class=\"words\"><section aria-labelledby=\"found\">\
          <h2 id=\"found\">What was found</h2>\n{found}</section>\n\
          <section class=\"card limits\" aria-labelledby=\"limits\">\
-         <h2 id=\"limits\">What this does not say</h2>\n<ul>\n{}</ul></section></div>\n\
+         <h2 id=\"limits\">What this does not say</h2>\n<ul>\n{}</ul></section></div>\n{}\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
          <div class=\"gallery\">\n{figures}</div></section>\n{}",
         items(&findings.limits),
+        shell::failures(&grid.record.events()),
         numbers(grid)
     )
 }

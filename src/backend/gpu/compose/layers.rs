@@ -32,6 +32,8 @@ pub(in super::super) struct LayerShape {
     pub(in super::super) inputs: u32,
     /// Vectors of 4 neurons.
     pub(in super::super) outputs: u32,
+    /// Neurons, without those that pad the vectors.
+    pub(in super::super) neurons: u32,
 }
 
 impl LayerShape {
@@ -41,7 +43,8 @@ impl LayerShape {
         let shape = |layer: &crate::policy::Layer| {
             let inputs = input_quads(layer.inputs) as u32;
             let outputs = output_quads(layer.outputs) as u32;
-            let shape = Self { offset, inputs, outputs };
+            let neurons = layer.outputs as u32;
+            let shape = Self { offset, inputs, outputs, neurons };
             offset = shape.end();
             shape
         };
@@ -119,10 +122,10 @@ pub(super) fn fused_text(
 /// `layer_at`: the layers by number.
 fn layer_table(layers: &[LayerShape]) -> String {
     let mut text = String::from("fn layer_at(number: u32) -> Layer {\n    switch number {\n");
-    for (number, &LayerShape { offset, inputs, outputs }) in layers.iter().enumerate() {
+    for (number, &LayerShape { offset, inputs, outputs, neurons }) in layers.iter().enumerate() {
         let last = number + 1 == layers.len();
         let case = if last { "default".to_owned() } else { format!("case {number}u") };
-        let layer = format!("Layer({offset}u, {inputs}u, {outputs}u, {last})");
+        let layer = format!("Layer({offset}u, {inputs}u, {outputs}u, {neurons}u, {last})");
         text += &format!("        {case}: {{ return {layer}; }}\n");
     }
     text + "    }\n}\n"

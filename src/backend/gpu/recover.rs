@@ -1,0 +1,240 @@
+//! Going on after an adapter failed: in smaller chunks, with it opened again, or on the CPU.
+//!
+//! Results go to a sink in order, so what failed is the rest of a call and nothing else. Chunks do
+//! not change results: what goes on on the same adapter gives the bits that it would have given.
+
+use std::cell::Cell;
+use std::sync::{Arc, MutexGuard, PoisonError};
+
+use super::opened::Opened;
+use super::plan::Limit;
+use super::{Gpu, deviation, mppi, reach_avoid};
+use crate::backend::cpu::Cpu;
+use crate::backend::{Action, Event, MeasureSink, PairSink};
+use crate::cost::Cost;
+use crate::error::{Error, Fault, Result};
+use crate::policy::Policy;
+use crate::rollout::{
+    DeviationTask, Farthest, MppiResult, MppiTask, PairMeasure, Plant, ReachAvoidTask,
+};
+use crate::system::System;
+
+/// Where the calls of an adapter run now.
+pub(super) struct State {
+    opened: Arc<Opened>,
+    limit: Limit,
+    reopened: bool,
+    on_cpu: bool,
+}
+
+impl State {
+    pub(super) fn new(opened: Opened) -> Self {
+        let (reopened, on_cpu) = (false, false);
+        Self { opened: Arc::new(opened), limit: Limit::default(), reopened, on_cpu }
+    }
+
+    /// The device and what is kept on it.
+    pub(super) fn opened(&self) -> Arc<Opened> {
+        Arc::clone(&self.opened)
+    }
+}
+
+/// An attempt at the rest of a call on an adapter.
+pub(super) struct Attempt {
+    /// What the plan may ask of the adapter.
+    pub(super) limit: Limit,
+    /// Columns of a chunk, once they are planned.
+    pub(super) columns: Cell<u64>,
+}
+
+/// Who makes an attempt.
+enum Runner<'a> {
+    Adapter(&'a Opened, &'a Attempt),
+    Cpu(&'a Cpu),
+}
+
+/// How far a call has come, over all attempts.
+struct Progress {
+    next: Cell<u64>,
+    refused: Cell<bool>,
+}
+
+impl Progress {
+    /// Gives `count` results to a sink; its error ends the call, whatever it is.
+    fn deliver(&self, count: usize, sink: impl FnOnce() -> Result<()>) -> Result<()> {
+        let taken = sink();
+        match taken {
+            Ok(()) => self.next.set(self.next.get() + count as u64),
+            Err(_) => self.refused.set(true),
+        }
+        taken
+    }
+}
+
+/// See [`crate::backend::Backend::reach_avoid`].
+pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
+    gpu: &Gpu,
+    plant: Plant<'_, S, P>,
+    task: &ReachAvoidTask<'_, NX>,
+    sink: MeasureSink<'_>,
+) -> Result<()>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    gpu.persevere("starts", task.range.start, |runner, progress| {
+        let task = ReachAvoidTask { range: progress.next.get()..task.range.end, ..task.clone() };
+        let sink: MeasureSink<'_> =
+            &mut |first, values| progress.deliver(values.len(), || sink(first, values));
+        match runner {
+            Runner::Adapter(opened, attempt) => {
+                reach_avoid::reach_avoid((opened, attempt), plant, &task, sink)
+            }
+            Runner::Cpu(cpu) => cpu.reach_avoid(plant, &task, sink),
+        }
+    })
+}
+
+/// See [`crate::backend::Backend::deviation`].
+pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
+    gpu: &Gpu,
+    plant: Plant<'_, S, P>,
+    task: &DeviationTask<'_, NX>,
+    sink: PairSink<'_>,
+) -> Result<Vec<Farthest>>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
+    gpu.persevere("pairs", task.range.start, |runner, progress| {
+        let task = DeviationTask { range: progress.next.get()..task.range.end, ..task.clone() };
+        let sink: PairSink<'_> = &mut |first, values: &[PairMeasure]| {
+            progress.deliver(values.len(), || sink(first, values))
+        };
+        match runner {
+            Runner::Adapter(opened, attempt) => {
+                deviation::deviation((opened, attempt), plant, &task, (&mut farthest, sink))
+            }
+            Runner::Cpu(cpu) => {
+                let rest = cpu.deviation(plant, &task, sink)?;
+                let steps = farthest.iter_mut().zip(rest);
+                steps.for_each(|(farthest, found)| *farthest = farthest.merge(found));
+                Ok(())
+            }
+        }
+    })?;
+    Ok(farthest)
+}
+
+/// See [`crate::backend::Backend::mppi`].
+pub(super) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
+    gpu: &Gpu,
+    system: &S,
+    cost: &C,
+    task: &MppiTask<'_, NX, NU, NC>,
+) -> Result<Vec<MppiResult<NU>>>
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    let mut results = Vec::with_capacity(task.problems.len());
+    gpu.persevere("problems", 0, |runner, progress| {
+        let task = MppiTask { problems: &task.problems[progress.next.get() as usize..], ..*task };
+        let sink = &mut |more: Vec<MppiResult<NU>>| {
+            progress.next.set(progress.next.get() + more.len() as u64);
+            results.extend(more);
+        };
+        match runner {
+            Runner::Adapter(opened, attempt) => {
+                mppi::mppi((opened, attempt), (system, cost), &task, sink)
+            }
+            Runner::Cpu(cpu) => cpu.mppi(system, cost, &task).map(sink),
+        }
+    })?;
+    Ok(results)
+}
+
+impl Gpu {
+    /// Attempts at a call until one ends it or nothing is left to try. `work` is what results are
+    /// of, the first of which has the index `first`.
+    fn persevere(
+        &self,
+        work: &str,
+        first: u64,
+        mut run: impl FnMut(Runner<'_>, &Progress) -> Result<()>,
+    ) -> Result<()> {
+        let progress = Progress { next: Cell::new(first), refused: Cell::new(false) };
+        loop {
+            let (opened, limit, on_cpu) = {
+                let state = self.state();
+                (state.opened(), state.limit, state.on_cpu)
+            };
+            if let Some(cpu) = self.fallback.as_ref().filter(|_| on_cpu) {
+                return run(Runner::Cpu(cpu), &progress);
+            }
+            let attempt = Attempt { limit, columns: Cell::new(limit.columns) };
+            match run(Runner::Adapter(&opened, &attempt), &progress) {
+                Err(error) if !progress.refused.get() => {
+                    let (fault, problem) = self.survivable(error)?;
+                    let columns = attempt.columns.get();
+                    let Some(action) = self.go_on(fault, &opened, columns) else {
+                        return Err(Error::DeviceFailed { fault, problem });
+                    };
+                    let (work, index) = (work.to_owned(), progress.next.get());
+                    self.note(Event { fault, problem, work, index, action });
+                }
+                ended => return ended,
+            }
+        }
+    }
+
+    /// What failed on the adapter.
+    ///
+    /// # Errors
+    /// `error` itself where it is none of the adapter's, or says that work does not fit it and
+    /// nobody else may do it.
+    fn survivable(&self, error: Error) -> Result<(Fault, String)> {
+        match error {
+            Error::DeviceFailed { fault, problem } => Ok((fault, problem)),
+            Error::Device(problem) if self.fallback.is_some() => Ok((Fault::Unfit, problem)),
+            other => Err(other),
+        }
+    }
+
+    /// Gets ready for the next attempt after `failed` failed with chunks of `columns`; `None` if
+    /// nothing is left to try.
+    fn go_on(&self, fault: Fault, failed: &Arc<Opened>, columns: u64) -> Option<Action> {
+        let mut state = self.state();
+        if !Arc::ptr_eq(&state.opened, failed) {
+            // Another call has opened it again.
+            return Some(Action::Reopened);
+        }
+        let smaller = state.limit.half(columns);
+        if let (Fault::OutOfMemory | Fault::Timeout, Some(limit)) = (fault, smaller) {
+            state.limit = limit;
+            // Buffers that were made without memory are of no use, the others are in the way.
+            failed.pool.clear();
+            return Some(Action::SmallerChunks(limit.columns));
+        }
+        if fault == Fault::Lost && !state.reopened {
+            state.reopened = true;
+            if let Ok(opened) = failed.again() {
+                state.opened = Arc::new(opened);
+                // Too much memory or too long a dispatch may also end in a loss.
+                state.limit = smaller.unwrap_or(state.limit);
+                return Some(Action::Reopened);
+            }
+        }
+        state.on_cpu = self.fallback.is_some();
+        state.on_cpu.then_some(Action::Cpu)
+    }
+
+    pub(super) fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn note(&self, event: Event) {
+        self.events.lock().unwrap_or_else(PoisonError::into_inner).push(event);
+    }
+}

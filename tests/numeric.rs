@@ -1,0 +1,415 @@
+//! Numbers that are not finite or hardly numbers: policies, dynamics, margins and costs that
+//! overflow, give NaN or underflow, on every backend alike.
+//!
+//! Formulas here have + - * / sqrt and comparisons alone, so that host and adapter see the same
+//! numbers; expectations are computed in the test, in f32.
+
+mod common;
+
+use common::{backends, settings};
+use reachcast::backend::gpu::{Gpu, NetworkKernels};
+use reachcast::backend::{Backend, gpu::Choice};
+use reachcast::cost::Cost;
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::real::Real;
+use reachcast::report::html;
+use reachcast::rollout::{
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NON_FINITE, Plant, Purpose, Query,
+    ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
+};
+use reachcast::scenario::global::check_margins;
+use reachcast::scenario::record::Record;
+use reachcast::scenario::{Context, Unwatched, certify};
+use reachcast::system::{Axis, System};
+
+/// What a [`Line`] does at each step and how it is judged.
+#[derive(Clone, Copy, Debug)]
+enum Motion {
+    /// Moves by `u`; the target lies above 0.5.
+    Driven,
+    /// Is squared: above 1 it overflows, below 1 it underflows. The target lies between 100 and 300.
+    Squared,
+    /// Shrinks by 1e-10. The target lies above 0.
+    Shrinking,
+    /// Stays; the target margin overflows above 1.
+    TargetOverflows,
+    /// Stays; the constraint margin overflows downward above 1. The target lies above 0.5.
+    ConstraintOverflows,
+}
+
+/// One state on a line.
+struct Line(Motion);
+
+impl System<1, 1> for Line {
+    fn name(&self) -> &str {
+        "line"
+    }
+    fn states(&self) -> [Axis; 1] {
+        [Axis::new("x", "m", -2.0, 2.0)]
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("u", "m", -1.0, 1.0)]
+    }
+    fn step<R: Real>(&self, [x]: [R; 1], [u]: [R; 1]) -> [R; 1] {
+        match self.0 {
+            Motion::Driven => [x + R::lit(0.1) * u],
+            Motion::Squared => [x * x + R::lit(0.0) * u],
+            Motion::Shrinking => [x * R::lit(1e-10) + R::lit(0.0) * u],
+            Motion::TargetOverflows | Motion::ConstraintOverflows => [x + R::lit(0.0) * u],
+        }
+    }
+    fn target<R: Real>(&self, [x]: [R; 1]) -> R {
+        match self.0 {
+            Motion::Squared => R::lit(100.0) - (x - R::lit(200.0)).abs(),
+            Motion::Shrinking => x,
+            Motion::TargetOverflows => x * R::lit(3.0e38),
+            Motion::Driven | Motion::ConstraintOverflows => x - R::lit(0.5),
+        }
+    }
+    fn constraint<R: Real>(&self, [x]: [R; 1]) -> R {
+        match self.0 {
+            Motion::ConstraintOverflows => R::lit(1.0) - x * R::lit(3.0e38),
+            _ => R::lit(1e6) + R::lit(0.0) * x,
+        }
+    }
+}
+
+/// Root of the state: NaN below 0.
+struct Root;
+
+impl Policy<1, 1> for Root {
+    fn name(&self) -> String {
+        "root".to_owned()
+    }
+    fn control<R: Real>(&self, [x]: [R; 1]) -> [R; 1] {
+        [x.sqrt()]
+    }
+}
+
+/// No control.
+struct Idle;
+
+impl Policy<1, 1> for Idle {
+    fn name(&self) -> String {
+        "idle".to_owned()
+    }
+    fn control<R: Real>(&self, _: [R; 1]) -> [R; 1] {
+        [R::lit(0.0)]
+    }
+}
+
+/// A network with a first layer of the weights `hidden`, a second that adds up half of each,
+/// and the output weights `output`.
+fn network(hidden: &[f32], output: &[f32]) -> Mlp {
+    let width = hidden.len();
+    let layer = |weight: Vec<f32>, inputs: usize| {
+        let outputs = weight.len() / inputs;
+        Layer { weight, bias: vec![0.0; outputs], inputs, outputs }
+    };
+    let passed = layer(vec![0.5; width * width], width);
+    let layers = vec![layer(hidden.to_vec(), 1), passed, layer(output.to_vec(), width)];
+    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+}
+
+/// 401 starts over [-2, 2].
+fn starts() -> Vec<[f32; 1]> {
+    (0..=400).map(|i| [i as f32 / 100.0 - 2.0]).collect()
+}
+
+/// The backends, an adapter once for each way to run a network.
+fn every_way() -> Vec<Backend> {
+    let mut all = backends();
+    if all.len() > 1 {
+        let gpu = Gpu::open(&Choice::Any).expect("it opened before");
+        all.push(Backend::Gpu(gpu.with_networks(NetworkKernels::Fused)));
+    }
+    all
+}
+
+/// The measures, or their signs, of the starts.
+fn measures<P: Policy<1, 1>>(
+    backend: &Backend,
+    (motion, policy): (Motion, &P),
+    (query, tightening): (Query, &Tightening),
+) -> Vec<f32> {
+    let starts = starts();
+    let spec = spec(tightening);
+    let range = 0..starts.len() as u64;
+    let task = ReachAvoidTask { starts: Starts::Listed(&starts), range, spec, tightening, query };
+    let mut all = Vec::new();
+    let system = Line(motion);
+    let plant = Plant { system: &system, policy };
+    backend
+        .reach_avoid(plant, &task, &mut |_, values| {
+            all.extend_from_slice(values);
+            Ok(())
+        })
+        .expect("a batch that runs");
+    all
+}
+
+fn spec(tightening: &Tightening) -> RolloutSpec {
+    RolloutSpec::new(tightening.target.len() as u32 - 1, 1.0).expect("a horizon")
+}
+
+/// Nothing lost over `horizon` steps.
+fn none(horizon: u32) -> Tightening {
+    Tightening::none(&RolloutSpec::new(horizon, 1.0).expect("a horizon"))
+}
+
+/// What section 1 of the method says, one state after the other.
+fn expected<P: Policy<1, 1>>(motion: Motion, policy: &P, start: f32, horizon: u32) -> f32 {
+    let (system, mut x) = (Line(motion), [start]);
+    let (mut safe, mut best) = (f32::INFINITY, NON_FINITE);
+    for t in 0..=horizon {
+        let (r, c): (f32, f32) = (system.target(x), system.constraint(x));
+        if !(x[0].is_finite() && r.is_finite() && c.is_finite()) {
+            return if best > 0.0 { best } else { NON_FINITE };
+        }
+        safe = safe.min(c);
+        best = best.max(safe.min(r));
+        if t < horizon {
+            x = system.step(x, policy.control(x));
+        }
+    }
+    best
+}
+
+/// Holds every backend against the definition; the number of starts that are not finite.
+fn check<P: Policy<1, 1>>(motion: Motion, policy: &P, horizon: u32) -> usize {
+    let tightening = none(horizon);
+    let truth: Vec<f32> =
+        starts().iter().map(|[x]| expected(motion, policy, *x, horizon)).collect();
+    for backend in every_way() {
+        let name = backend.device();
+        let found = measures(&backend, (motion, policy), (Query::Measure, &tightening));
+        for ((start, truth), found) in starts().iter().zip(&truth).zip(&found) {
+            let close = (found - truth).abs() <= 1e-5 * truth.abs().max(1.0);
+            assert!(close, "{motion:?} from {start:?} on {name}: {found}, not {truth}");
+        }
+        let signs = measures(&backend, (motion, policy), (Query::Sign, &tightening));
+        for (truth, sign) in truth.iter().zip(&signs) {
+            assert_eq!(*truth > 0.0, *sign > 0.0, "{motion:?} on {name}");
+        }
+    }
+    truth.iter().filter(|value| **value == NON_FINITE).count()
+}
+
+#[test]
+fn a_policy_that_is_not_a_number_fails() {
+    // Below 0; from 0.5 on the start is in the target, before any control.
+    assert_eq!(check(Motion::Driven, &Root, 3), 200);
+}
+
+#[test]
+fn a_network_that_is_not_a_number_fails() {
+    // Infinity less infinity, for states below -3.4e38 / 3e38.
+    let lost = network(&[-3e38, -3e38], &[1.0, -1.0]);
+    assert_eq!(check(Motion::Driven, &lost, 3), 87);
+}
+
+/// A neuron that overflows saturates the output: neurons that pad a layer must not make it NaN.
+#[test]
+fn a_neuron_that_overflows_saturates() {
+    for width in [1, 2, 3, 5, 8] {
+        let saturated = network(&vec![3e38; width], &vec![1.0; width]);
+        assert_eq!(check(Motion::Driven, &saturated, 3), 0, "{width} neurons");
+    }
+}
+
+#[test]
+fn dynamics_that_overflow_fail() {
+    // Of the states beyond 1 those that pass through the target before they overflow succeed.
+    let lost = check(Motion::Squared, &Idle, 12);
+    assert!((1..200).contains(&lost), "{lost}");
+}
+
+#[test]
+fn margins_that_overflow_fail() {
+    // Upward 87 starts overflow, beyond 3.4e38 / 3e38. Downward all 200 count, since a margin below
+    // -1e30 is not told from one that overflows.
+    assert_eq!(check(Motion::TargetOverflows, &Idle, 2), 87 + 200);
+    assert_eq!(check(Motion::ConstraintOverflows, &Idle, 2), 87 + 200);
+}
+
+/// The range of subnormal numbers may be lost, nothing else; within a band nothing is.
+#[test]
+fn subnormal_numbers_are_zero_at_worst() {
+    // Only the fourth step counts, at 1e-40 times the start.
+    let mut tightening = none(4);
+    tightening.target[..4].fill(10.0);
+    for backend in backends() {
+        let found = measures(&backend, (Motion::Shrinking, &Idle), (Query::Measure, &tightening));
+        let mut flushed = 0;
+        for ([start], found) in starts().iter().zip(&found) {
+            let exact = f64::from(*start) * 1e-40;
+            assert!((f64::from(*found) - exact).abs() <= f64::from(f32::MIN_POSITIVE));
+            assert!(*found <= 0.0 || *start > 0.0, "never a success that is none");
+            flushed += u32::from(*found == 0.0 && *start != 0.0);
+        }
+        println!("{}: {flushed} of {} subnormal measures are 0", backend.device(), found.len());
+        // A certificate decides them in f64.
+        let system = Line(Motion::Shrinking);
+        let plant = Plant { system: &system, policy: &Idle };
+        let context = Context { backend: &backend, plant, watch: &Unwatched };
+        let spec = spec(&tightening);
+        let (starts, query) = (starts(), Query::Measure);
+        let margins = check_margins(context, &spec, &tightening, &starts, query, 1e-5);
+        for ([start], margin) in starts.iter().zip(margins.expect("margins")) {
+            assert_eq!(*start > 0.0, margin > 0.0, "{start} on {}", backend.device());
+        }
+    }
+}
+
+/// Two states that stay where they are. The target lies below 0.5 in the first; far out
+/// in the first the constraint margin overflows.
+struct Plane {
+    /// Where that begins.
+    edge: f32,
+}
+
+impl System<2, 1> for Plane {
+    fn name(&self) -> &str {
+        "plane"
+    }
+    fn states(&self) -> [Axis; 2] {
+        [Axis::new("x", "m", -0.9, 0.9), Axis::new("y", "m", -0.9, 0.9)]
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("u", "m", -1.0, 1.0)]
+    }
+    fn step<R: Real>(&self, [x, y]: [R; 2], [u]: [R; 1]) -> [R; 2] {
+        [x + R::lit(0.0) * u, y]
+    }
+    fn target<R: Real>(&self, [x, _]: [R; 2]) -> R {
+        R::lit(0.5) - x
+    }
+    fn constraint<R: Real>(&self, [x, _]: [R; 2]) -> R {
+        x.if_lt(R::lit(self.edge), R::lit(10.0), R::lit(-3.0e38) * (x + R::lit(1.0)))
+    }
+}
+
+struct Still;
+
+impl Policy<2, 1> for Still {
+    fn name(&self) -> String {
+        "still".to_owned()
+    }
+    fn control<R: Real>(&self, _: [R; 2]) -> [R; 1] {
+        [R::lit(0.0)]
+    }
+}
+
+/// The certificate of the plane on every backend.
+fn certificates(edge: f32) -> Vec<Record> {
+    let system = Plane { edge };
+    let mut settings = settings(&system, 2);
+    settings.state = [0.45, 0.0];
+    settings.deviation.radius = 0.02;
+    settings.growth.radius = 0.9;
+    let plant = Plant { system: &system, policy: &Still };
+    let certify = |backend: &Backend| {
+        certify(backend, plant, &settings, serde_json::json!({}), &Unwatched).expect("a record")
+    };
+    backends().iter().map(certify).collect()
+}
+
+/// Counts of a record that meet what is not finite: pairs of the deviation bound, perturbed
+/// rollouts, starts of each round of growth.
+fn non_finite(record: &Record) -> (u64, u64, Vec<u64>) {
+    let rounds = record.growth.rounds.iter().map(|round| round.non_finite).collect();
+    (record.deviation.non_finite, record.global.non_finite, rounds)
+}
+
+#[test]
+fn certificates_count_what_is_not_finite() {
+    // Beyond 0.95: no pair comes there, the first ball reaches beyond 1.2.
+    let outside = certificates(0.95);
+    for record in &outside {
+        assert!(record.global.accepted > 0, "{:?}", record.statements);
+        let (pairs, perturbed, rounds) = non_finite(record);
+        assert_eq!((pairs, perturbed), (0, 0));
+        assert!(rounds[0] > 0, "{rounds:?}");
+        assert_eq!(non_finite(record), non_finite(&outside[0]));
+    }
+    // Beyond 0.8, in the box: the certificate does not hold.
+    let inside = certificates(0.8);
+    for record in &inside {
+        let (pairs, perturbed, _) = non_finite(record);
+        assert!(pairs > 0 && perturbed > 0);
+        assert!(!record.holds, "{:?}", record.statements);
+        assert_eq!(non_finite(record), non_finite(&inside[0]));
+        assert_eq!(record.deviation.claim.failures, inside[0].deviation.claim.failures);
+        let page = html(record);
+        for (name, count) in
+            [("pairs not finite", pairs), ("failures that are not finite", perturbed)]
+        {
+            assert!(page.contains(name) && page.contains(&count.to_string()), "{name}");
+        }
+    }
+}
+
+/// Squares of state and control.
+struct Squares;
+
+impl Cost<1, 1, 1> for Squares {
+    fn stage<R: Real>(&self, [x]: [R; 1], [u]: [R; 1], _: [R; 1]) -> R {
+        x * x + u * u
+    }
+}
+
+/// State and control squared: beyond 1 that overflows after a few steps.
+struct Kicked;
+
+impl System<1, 1> for Kicked {
+    fn name(&self) -> &str {
+        "kicked"
+    }
+    fn states(&self) -> [Axis; 1] {
+        [Axis::new("x", "m", -2.0, 2.0)]
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("u", "m", -1.0, 1.0)]
+    }
+    fn step<R: Real>(&self, [x]: [R; 1], [u]: [R; 1]) -> [R; 1] {
+        [(x + u) * (x + u)]
+    }
+    fn target<R: Real>(&self, [x]: [R; 1]) -> R {
+        x
+    }
+    fn constraint<R: Real>(&self, [x]: [R; 1]) -> R {
+        x
+    }
+}
+
+#[test]
+fn samples_that_overflow_have_no_weight() {
+    let spec = MppiSpec::new(MppiSettings::new(&Kicked, 300, 12)).expect("settings");
+    let problem = |start: f32, number| MppiProblem {
+        start: [start],
+        plan: vec![[0.25]; 12],
+        context: vec![[0.0]; 12],
+        stream: Stream::new(71, Purpose::ControlNoise, number),
+    };
+    // Some samples overflow, then all of them.
+    let problems = [problem(0.3, 0), problem(100.0, 1)];
+    let (value, disturbance, costs) = (None, None, CostQuery::Each);
+    let task =
+        MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
+    let run = |backend: &Backend| backend.mppi(&Kicked, &Squares, &task).expect("plans");
+    let results: Vec<_> = backends().iter().map(run).collect();
+    for result in &results {
+        let [some, all] = &result[..] else { panic!("two problems") };
+        assert!((1..300).contains(&some.non_finite), "{}", some.non_finite);
+        assert_eq!(some.non_finite, results[0][0].non_finite);
+        let weights = some.weights(1.0);
+        let lost = |(cost, weight): (&f32, &f64)| cost.is_finite() || *weight == 0.0;
+        assert!(some.costs.iter().zip(&weights).all(lost));
+        let near = |(a, b): (&[f32; 1], &[f32; 1])| (a[0] - b[0]).abs() < 1e-5;
+        assert!(some.plan.iter().zip(&results[0][0].plan).all(near), "{:?}", some.plan);
+        // Nothing to weigh: the plan stays, and the result says so.
+        assert_eq!((all.non_finite, all.effective_samples), (300, 0.0));
+        assert_eq!(all.plan, problems[1].plan);
+        assert!(all.least_cost.is_infinite() && all.mean_cost == 0.0);
+    }
+}

@@ -1,0 +1,94 @@
+//! 10,000 control steps in flat memory: a plan improved and a state measured at each.
+
+mod common;
+
+use common::{adapter, cpu};
+use reachcast::backend::Backend;
+use reachcast::control::mppi::{Planner, shifted};
+use reachcast::cost::Quadratic;
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::rollout::{
+    MppiProblem, MppiSettings, MppiSpec, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec,
+    Starts, Stream, Tightening,
+};
+use reachcast::system::{DoubleIntegrator, System};
+
+/// Steps before the memory counts: pools and caches have their size by then.
+const WARM_UP: u32 = 1_000;
+/// Growth that is no leak: allocators keep a page here and there. 9,000 steps that lose 512 bytes
+/// each lose more.
+const SLACK_BYTES: u64 = 4 << 20;
+/// Steps of a plan.
+const HORIZON: usize = 10;
+
+/// Memory that the process holds, bytes; `None` where the system does not say.
+fn resident_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = text.split_whitespace().nth(1)?.parse().ok()?;
+    Some(4096 * pages)
+}
+
+/// Steers the double integrator for `steps` steps; the growth of the memory after the warm-up.
+fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
+    let system = DoubleIntegrator::default();
+    let weights = |count: usize| (0..count).map(|i| 0.3 - 0.1 * (i % 7) as f32).collect();
+    let layer = |inputs: usize, outputs: usize| Layer {
+        weight: weights(inputs * outputs),
+        bias: vec![0.0; outputs],
+        inputs,
+        outputs,
+    };
+    let policy =
+        Mlp::new(vec![layer(2, 16), layer(16, 1)], Activation::Tanh, OutputActivation::Tanh);
+    let policy = policy.expect("a network");
+    let planner = Planner {
+        spec: MppiSpec::new(MppiSettings::new(&system, samples, HORIZON as u32)).expect("settings"),
+        cost: Quadratic { state: [2.0, 0.5], control: [0.1], last: [20.0, 5.0], obstacle: None },
+        iterations: 1,
+        value: None,
+        disturbance: None,
+    };
+    let spec = RolloutSpec::new(HORIZON as u32, 0.95).expect("a horizon");
+    let tightening = Tightening::none(&spec);
+    let (mut x, mut plan) = ([0.8, 0.0], vec![[0.0]; HORIZON]);
+    let mut warm = None;
+    for step in 0..steps {
+        let stream = Stream::new(81, Purpose::ControlNoise, step);
+        let context = vec![[0.0; 3]; HORIZON];
+        let mut problems = [MppiProblem { start: x, plan: shifted(&plan), context, stream }];
+        let results = planner.improve(backend, &system, &mut problems).expect("a plan");
+        plan.clone_from(&results[0].plan);
+        let task = ReachAvoidTask {
+            starts: Starts::Listed(&[x]),
+            range: 0..1,
+            spec,
+            tightening: &tightening,
+            query: Query::Measure,
+        };
+        let plant = Plant { system: &system, policy: &policy };
+        backend.reach_avoid(plant, &task, &mut |_, _| Ok(())).expect("a measure");
+        x = system.step(x, plan[0]);
+        // Away from rest now and then, so that there is something to do.
+        if step % 50 == 0 {
+            x = [0.8, 0.0];
+        }
+        if step == WARM_UP {
+            warm = resident_bytes();
+        }
+    }
+    Some(resident_bytes()? as i64 - warm? as i64)
+}
+
+#[test]
+fn memory_is_flat_over_ten_thousand_steps() {
+    if resident_bytes().is_none() {
+        println!("SKIPPED: the system does not say how much memory a process holds");
+        return;
+    }
+    let adapters = adapter().map(|gpu| (Backend::Gpu(gpu), 64));
+    for (backend, samples) in std::iter::once((cpu(2), 256)).chain(adapters) {
+        let grown = growth(&backend, samples, 10_000).expect("it said so before");
+        println!("{}: {grown} bytes in 9,000 steps", backend.device());
+        assert!(grown < SLACK_BYTES as i64, "{}: {grown} bytes", backend.device());
+    }
+}
