@@ -247,7 +247,7 @@ fn both_players_come_near_the_solution_of_the_game() {
     assert!(after[0] > 0.93 * calm && after[0] <= calm, "{after:?} of {calm}");
     // No policy does better against the worst disturbance; against a learned one it may, a little.
     assert!(after[1] > 0.9 * worst && after[1] < worst + 0.5 * (calm - worst), "{after:?} {worst}");
-    assert!(after[2] > 0.9, "{after:?}");
+    assert!(after[2] > 0.85, "{after:?}");
 }
 
 /// Interrupted anywhere and resumed, on any number of threads: the same record and networks.

@@ -8,6 +8,7 @@ use super::adam::Adam;
 use super::network::{Bound, Differentiable, Network};
 use super::physics::{apply, floats, tensor};
 use super::run::Learner;
+use super::score::{share, successes};
 use super::settings::AnalyticSettings;
 use super::soft::{measure_tape, step_tape};
 use super::starts::Mixture;
@@ -15,7 +16,7 @@ use super::tape::Tape;
 use crate::backend::Backend;
 use crate::error::Result;
 use crate::policy::Mlp;
-use crate::rollout::{Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
+use crate::rollout::{Plant, Purpose, RolloutSpec, Tightening};
 use crate::system::System;
 
 /// Weights of the last layer at first, as a share of the others': no output is near saturation.
@@ -127,22 +128,9 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Analytic<'
     }
 
     fn scores(&self) -> Result<Vec<f64>> {
-        let policy = self.policy()?;
-        let spec = self.task.spec;
-        let task = ReachAvoidTask {
-            starts: Starts::Listed(&self.held_out),
-            range: 0..self.held_out.len() as u64,
-            spec,
-            tightening: &Tightening::none(&spec),
-            query: Query::Sign,
-        };
-        let plant = Plant { system: self.task.system, policy: &policy };
-        let mut reached = 0;
-        self.task.backend.reach_avoid(plant, &task, &mut |_, signs| {
-            reached += signs.iter().filter(|sign| **sign > 0.0).count();
-            Ok(())
-        })?;
-        Ok(vec![reached as f64 / self.held_out.len() as f64])
+        let Task { system, backend, spec, .. } = self.task;
+        let plant = Plant { system, policy: &self.policy()? };
+        Ok(vec![share(successes(backend, plant, spec, &self.held_out)?.into_iter())])
     }
 
     fn networks(&self) -> Result<Vec<(&'static str, Mlp)>> {

@@ -1,7 +1,7 @@
 //! The ordinary reward of a task, which knows neither measure nor certificate.
 
+use super::settings::RewardSettings;
 use crate::system::System;
-use crate::train::settings::RewardSettings;
 
 /// What a step earns: progress toward a goal, the target set, and a penalty for what is not safe.
 #[derive(Clone, Debug, PartialEq)]
