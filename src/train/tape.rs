@@ -268,19 +268,19 @@ mod tests {
         let graph = record(3, |x| {
             let inner = x[2] - x[0].max(x[1]);
             let terms = Expr::lit(2.0) * (x[0].min(x[1]) - Expr::lit(0.5));
-            vec![(Expr::lit(3.0) * terms.min(inner)).max(x[2])]
+            vec![Expr::lit(2.0) * (Expr::lit(3.0) * terms.min(inner)).max(x[2])]
         });
         let tape = Tape::soft(&graph);
         let (x, tau) = ([0.3_f64, 0.45, 0.8], 0.6);
         let (found, slope) = slopes(&tape, &x, 0.6);
-        let terms = [6.0 * (x[0] - 0.5), 6.0 * (x[1] - 0.5), 3.0 * (x[2] - x[1])];
+        let terms = [12.0 * (x[0] - 0.5), 12.0 * (x[1] - 0.5), 6.0 * (x[2] - x[1])];
         let sum: f64 = terms.iter().map(|term| (-term / tau).exp()).sum();
-        let expected = tau * ((-tau * sum.ln() / tau).exp() + (x[2] / tau).exp()).ln();
+        let expected = tau * ((-tau * sum.ln() / tau).exp() + (2.0 * x[2] / tau).exp()).ln();
         assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         // The maximum inside of a term is hard: x[0] moves the output through its own term alone.
         let share = (-tau * sum.ln() / tau - expected / tau).exp();
         let weight = share * (-terms[0] / tau).exp() / sum;
-        assert!((slope[0] - 6.0 * weight).abs() < 1e-6, "{} {weight}", slope[0]);
+        assert!((slope[0] - 12.0 * weight).abs() < 1e-6, "{} {weight}", slope[0]);
     }
 
     #[test]
