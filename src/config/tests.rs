@@ -303,6 +303,10 @@ fn shipped_configurations_are_complete() {
     assert_eq!((settings.deviation.radius, settings.growth.radius), (0.02, 0.1));
     // The race's file says what the defaults say.
     let shipped = Config::load(&folder.join("race.toml"), &Overrides::default()).unwrap();
-    let plain = load(RACE, &["policy.file=policies/race_policy.safetensors"]).unwrap();
+    let networks = [
+        "policy.file=policies/race_policy.safetensors",
+        "race.networks.ppo=policies/race_ppo_policy.safetensors",
+    ];
+    let plain = load(RACE, &networks).unwrap();
     assert_eq!(shipped, plain);
 }

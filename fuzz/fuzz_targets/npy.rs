@@ -1,0 +1,13 @@
+//! States in .npy files, read in pieces, for both systems.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use reachcast_fuzz::{read_states, with_file};
+
+fuzz_target!(|bytes: &[u8]| {
+    with_file("fuzz.npy", bytes, |path| {
+        read_states::<2>(path);
+        read_states::<12>(path);
+    });
+});
