@@ -3,11 +3,13 @@
 #![cfg(feature = "train")]
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
+mod command;
 mod common;
 
 use std::cell::Cell;
 use std::path::Path;
 
+use command::{Folder, document};
 use common::cpu;
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
@@ -104,6 +106,9 @@ impl Watch for Patience {
     }
 }
 
+/// A record, and the bytes of the files.
+type Outcome = (TrainRecord, Vec<(String, Vec<u8>)>);
+
 /// Trains `learner` in `folder` for `total` updates; the record, and the bytes of the files.
 fn trained(
     learner: &mut dyn Learner,
@@ -111,7 +116,7 @@ fn trained(
     config: &Config,
     total: u64,
     watch: &dyn Watch,
-) -> Result<(TrainRecord, Vec<(String, Vec<u8>)>)> {
+) -> Result<Outcome> {
     let provenance = Provenance {
         version: String::new(),
         seed: config.seed,
@@ -289,10 +294,11 @@ fn a_replay_holds_the_latest_rows() {
     let mut replay = Replay::new(8, 2);
     let stream = Stream::new(1, Purpose::TrainChoice, 0);
     for number in 0..11_u64 {
-        replay.write(number, &[number as f32, -(number as f32)]);
+        // No row is zero, as those are that were not written.
+        replay.write(number, &[number as f32 + 1.0, -(number as f32)]);
         let written = number + 1;
         let drawn: Vec<f32> = replay.draw(written, stream, 0, 400).map(|row| row[0]).collect();
-        let held: Vec<f32> = (written.saturating_sub(8)..written).map(|n| n as f32).collect();
+        let held: Vec<f32> = (written.saturating_sub(8)..written).map(|n| n as f32 + 1.0).collect();
         assert!(held.iter().all(|n| drawn.contains(n)), "{number}");
         assert!(drawn.iter().all(|n| held.contains(n)), "{number}");
     }
@@ -434,6 +440,30 @@ fn ppo_that_was_interrupted_comes_to_the_same() {
         assert!(matches!(interrupted, Err(Error::Interrupted)));
     }
     assert!(run(&parts, 2, &Unwatched).unwrap() == whole);
+}
+
+/// The command writes the networks of both methods, and a second run has nothing left to do.
+#[test]
+fn the_command_writes_what_was_trained() {
+    let folder = Folder::new();
+    for (method, files) in
+        [("ddpg", &["critic", "disturbance", "policy"][..]), ("ppo", &["policy"])]
+    {
+        let out = folder.path(method);
+        let few = format!("train.{method}.iterations=4");
+        let config = format!("configs/train/race_{method}.toml");
+        let run = ["train", &config, "--out", &out, "--set", &few, "--set", "train.held_out=64"];
+        let record = document(&run);
+        assert_eq!(record["origin"]["method"], method);
+        let networks = record["networks"].as_array().unwrap();
+        let names: Vec<String> = files.iter().map(|name| format!("{name}.safetensors")).collect();
+        assert!(networks.iter().map(|network| &network["file"]).eq(&names), "{networks:?}");
+        for (network, name) in networks.iter().zip(&names) {
+            let inspected = document(&["policy", "inspect", &format!("{out}/{name}")]);
+            assert_eq!(inspected["digest"], network["sha256"]);
+        }
+        assert_eq!(document(&run), record);
+    }
 }
 
 /// Numbers out of range are refused by key.

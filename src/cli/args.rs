@@ -196,10 +196,10 @@ Examples:
     Sweep(Box<SweepArguments>),
     /// Train a policy, or a network that tells its value
     ///
-    /// Writes policy.safetensors (or value.safetensors, or action_value.safetensors), train.json,
-    /// curve.csv and report.html to the folder of --out (default: reachcast-train). Stopped half-way,
-    /// the same command goes on where it was; the network is the same. Needs a program that was built
-    /// with `--features train`.
+    /// Writes policy.safetensors (or value.safetensors, or action_value.safetensors; beside the policy
+    /// of `ddpg` disturbance.safetensors and critic.safetensors), train.json, curve.csv and report.html
+    /// to the folder of --out (default: reachcast-train). Stopped half-way, the same command goes on
+    /// where it was; the network is the same. Needs a program that was built with `--features train`.
     #[command(after_help = "\
 Rollouts, scores and networks are functions of the configuration and the seed, on any number of
 threads. Everything in the section [train] of the configuration can be set.
@@ -207,7 +207,9 @@ threads. Everything in the section [train] of the configuration can be set.
 Examples:
   reachcast train configs/train/race.toml
   reachcast train configs/train/race.toml --seed 2 --set train.analytic.iterations=1500 --out quick
-  reachcast train configs/race.toml --method value --out value")]
+  reachcast train configs/race.toml --method value --out value
+  reachcast train configs/train/race_ppo.toml
+  reachcast train configs/train/race_ddpg.toml --set train.ddpg.iterations=20000 --out quick")]
     Train {
         /// Configuration (TOML)
         config: PathBuf,

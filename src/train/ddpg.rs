@@ -151,14 +151,14 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
             .map(|row| (from_fn(|i| row[i]), &row[NX..]))
             .collect();
         let next: Vec<[f32; NX]> = rows.iter().map(|(x, acts)| self.next(*x, acts)).collect();
-        let told =
-            self.told([&self.control.slow, &self.disturbance.slow, &self.critic.slow], &next);
+        let slow = [&self.control.slow, &self.disturbance.slow, &self.critic.slow];
+        let mut wanted = self.told(slow, &next);
         let (system, gamma) = (self.task.system, self.task.spec.gamma);
-        let backup = |((told, next), (x, _)): ((f32, [f32; NX]), ([f32; NX], &[f32]))| {
-            let held = Margins::of(system, next).hold(told);
-            Margins::of(system, x).backup(gamma, held)
-        };
-        told.into_iter().zip(next).zip(rows).map(backup).collect()
+        for ((value, next), (x, _)) in wanted.iter_mut().zip(next).zip(rows) {
+            let held = Margins::of(system, next).hold(*value);
+            *value = Margins::of(system, x).backup(gamma, held);
+        }
+        wanted
     }
 
     /// What `critic` tells of `states` under the acts of both players.
