@@ -133,14 +133,13 @@ fn usage_is_explained() {
         "sweep",
         "bench",
         "policy",
+        "train",
         "scenarios",
         "devices",
         "Exit codes",
     ] {
         assert!(help.contains(word), "{word}");
     }
-    // Only what is built is offered.
-    assert!(!help.contains("train"), "{help}");
     assert!(done(&["certify", "--help"]).contains("reachcast certify configs/smoke.toml"));
     assert!(done(&["--version"]).contains(env!("CARGO_PKG_VERSION")));
     refused(&[], &["Usage"]);

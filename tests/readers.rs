@@ -12,8 +12,8 @@ use std::path::Path;
 use allocator::peak;
 use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed, TestRunner};
-use reachcast::config::{Config, Overrides};
 use reachcast::backend::Event;
+use reachcast::config::{Config, Overrides};
 use reachcast::experiment::log::{RaceLog, StepLog, arrays, races};
 use reachcast::experiment::record::RaceRecord;
 use reachcast::experiment::sweep::Store;
@@ -338,7 +338,8 @@ fn points_of_sweeps() {
     let read = |path: &Path| {
         std::fs::copy(path, folder.path().join("points").join(&name)).unwrap();
         let mut store = Store::open(folder.path(), &json!({}), record.clone()).unwrap();
-        let computes = || -> reachcast::Result<(PointResult, Vec<Event>)> { panic!("it is stored") };
+        let computes =
+            || -> reachcast::Result<(PointResult, Vec<Event>)> { panic!("it is stored") };
         let stored = store.point(hash.clone(), vec!["1".to_owned()], computes);
         if stored.is_ok() {
             assert_eq!(store.record().points[0].result, result);

@@ -42,7 +42,6 @@ pub struct RaceRecord {
     /// One race step by step, for the picture.
     pub picture: Option<PictureRecord>,
     /// What failed on the adapter and was worked around.
-    #[serde(default)]
     pub events: Vec<Event>,
 }
 

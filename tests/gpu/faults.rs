@@ -314,15 +314,17 @@ fn an_error_of_the_sink_is_not_survived() {
 #[test]
 fn work_that_takes_too_long_is_left() {
     let work = Work::Measures(NetworkKernels::Layered);
-    let Some((gpu, _, host)) = prepared(work) else { return };
+    let Some((gpu, adapter, host)) = prepared(work) else { return };
     let backend = Backend::Gpu(gpu.with_patience(Duration::from_nanos(1)));
     let (found, result) = run(&backend, work);
     result.expect("the host goes on");
     let events = backend.events();
+    assert!(!events.is_empty(), "no time is too little for it");
     assert!(events.iter().all(|event| event.fault == Fault::Timeout), "{events:?}");
-    let last = events.last().expect("an event");
-    assert_eq!((last.action, last.index), (Action::Cpu, 0));
-    assert_eq!(found, host);
+    // A smaller chunk may be done before the driver is asked.
+    let left = events.iter().find(|event| event.action == Action::Cpu);
+    let left = left.map_or(COUNT, |event| event.index);
+    assert_eq!(found, adapter.then(&host, left as usize));
 }
 
 #[test]

@@ -63,7 +63,6 @@ pub struct PointRecord {
     /// What came of it.
     pub result: PointResult,
     /// What failed on the adapter and was worked around until the point was done.
-    #[serde(default)]
     pub events: Vec<Event>,
 }
 
