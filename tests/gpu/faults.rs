@@ -310,7 +310,8 @@ fn an_error_of_the_sink_is_not_survived() {
     assert_eq!((calls, backend.events()), (1, Vec::new()));
 }
 
-/// The driver itself says that the time is over.
+/// The driver itself says that the time is over, unless it is done when it is asked: software
+/// adapters may compute within the submission.
 #[test]
 fn work_that_takes_too_long_is_left() {
     let work = Work::Measures(NetworkKernels::Layered);
@@ -319,9 +320,7 @@ fn work_that_takes_too_long_is_left() {
     let (found, result) = run(&backend, work);
     result.expect("the host goes on");
     let events = backend.events();
-    assert!(!events.is_empty(), "no time is too little for it");
     assert!(events.iter().all(|event| event.fault == Fault::Timeout), "{events:?}");
-    // A smaller chunk may be done before the driver is asked.
     let left = events.iter().find(|event| event.action == Action::Cpu);
     let left = left.map_or(COUNT, |event| event.index);
     assert_eq!(found, adapter.then(&host, left as usize));
