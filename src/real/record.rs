@@ -33,6 +33,27 @@ pub enum Node {
     IfLt(u32, u32, u32, u32),
 }
 
+impl Node {
+    /// Its value for `inputs`, given the `values` of the earlier nodes.
+    #[inline(always)]
+    pub fn value<R: Real>(self, inputs: &[R], values: &[R]) -> R {
+        let at = |i: u32| values[i as usize];
+        match self {
+            Self::Input(i) => inputs[i as usize],
+            Self::Literal(bits) => R::lit(f32::from_bits(bits)),
+            Self::Add(a, b) => at(a) + at(b),
+            Self::Sub(a, b) => at(a) - at(b),
+            Self::Mul(a, b) => at(a) * at(b),
+            Self::Div(a, b) => at(a) / at(b),
+            Self::Neg(a) => -at(a),
+            Self::Abs(a) => at(a).abs(),
+            Self::Sqrt(a) => at(a).sqrt(),
+            Self::Floor(a) => at(a).floor(),
+            Self::IfLt(a, b, yes, no) => at(a).if_lt(at(b), at(yes), at(no)),
+        }
+    }
+}
+
 /// A recorded formula: nodes in order of evaluation, and which of them are the outputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Graph {
@@ -140,20 +161,7 @@ impl Graph {
         assert_eq!(inputs.len(), self.inputs, "inputs of the graph");
         let mut values: Vec<R> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
-            let at = |i: u32| values[i as usize];
-            values.push(match *node {
-                Node::Input(i) => inputs[i as usize],
-                Node::Literal(bits) => R::lit(f32::from_bits(bits)),
-                Node::Add(a, b) => at(a) + at(b),
-                Node::Sub(a, b) => at(a) - at(b),
-                Node::Mul(a, b) => at(a) * at(b),
-                Node::Div(a, b) => at(a) / at(b),
-                Node::Neg(a) => -at(a),
-                Node::Abs(a) => at(a).abs(),
-                Node::Sqrt(a) => at(a).sqrt(),
-                Node::Floor(a) => at(a).floor(),
-                Node::IfLt(a, b, yes, no) => at(a).if_lt(at(b), at(yes), at(no)),
-            });
+            values.push(node.value(inputs, &values));
         }
         self.outputs.iter().map(|&i| values[i as usize]).collect()
     }

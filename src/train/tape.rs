@@ -96,19 +96,7 @@ impl Tape {
             let value = match *op {
                 Op::SoftMin(a, b, factor) => soft_min(at(a), at(b), temperature / factor),
                 Op::SoftMax(a, b, factor) => -soft_min(-at(a), -at(b), temperature / factor),
-                Op::Plain(node) => match node {
-                    Node::Input(i) => inputs[i as usize],
-                    Node::Literal(bits) => R::lit(f32::from_bits(bits)),
-                    Node::Add(a, b) => at(a) + at(b),
-                    Node::Sub(a, b) => at(a) - at(b),
-                    Node::Mul(a, b) => at(a) * at(b),
-                    Node::Div(a, b) => at(a) / at(b),
-                    Node::Neg(a) => -at(a),
-                    Node::Abs(a) => at(a).abs(),
-                    Node::Sqrt(a) => at(a).sqrt(),
-                    Node::Floor(a) => at(a).floor(),
-                    Node::IfLt(a, b, yes, no) => at(a).if_lt(at(b), at(yes), at(no)),
-                },
+                Op::Plain(node) => node.value(inputs, values),
             };
             values.push(value);
         }
