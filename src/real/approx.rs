@@ -51,20 +51,26 @@ fn half_angle<R: Real>(angle: R) -> (R, R) {
     (quarter.if_lt(half, cos, sin), quarter.if_lt(half, sin, cos))
 }
 
+/// Sine and cosine, for |angle| up to pi.
+#[inline(always)]
+pub(super) fn principal_sin_cos<R: Real>(angle: R) -> [R; 2] {
+    let (sin, cos) = half_angle(angle);
+    let double = R::lit(2.0) * sin * cos;
+    [angle.if_lt(R::lit(0.0), -double, double), R::lit(1.0) - R::lit(2.0) * sin * sin]
+}
+
 /// Sine, for angles up to 8192; absolute error below 3e-7 for |angle| up to pi.
 #[inline(always)]
 pub(super) fn sin<R: Real>(angle: R) -> R {
-    let angle = principal(angle);
-    let (sin, cos) = half_angle(angle);
-    let double = R::lit(2.0) * sin * cos;
-    angle.if_lt(R::lit(0.0), -double, double)
+    let [sin, _] = principal_sin_cos(principal(angle));
+    sin
 }
 
 /// Cosine, for angles up to 8192; absolute error below 5e-7 for |angle| up to pi.
 #[inline(always)]
 pub(super) fn cos<R: Real>(angle: R) -> R {
-    let (sin, _) = half_angle(principal(angle));
-    R::lit(1.0) - R::lit(2.0) * sin * sin
+    let [_, cos] = principal_sin_cos(principal(angle));
+    cos
 }
 
 /// Hyperbolic tangent: an odd rational function fitted to relative error 9e-9, within 4e-7 of the
@@ -110,12 +116,10 @@ pub(super) fn exp_negative<R: Real>(x: R) -> R {
     least.if_lt(x, value, zero)
 }
 
-/// Natural logarithm of `u` in `[2^-24, 1]`.
-///
-/// The exponent is found by comparisons and exact products with powers of two; the rest is
-/// `2 atanh((m - 1) / (m + 1))` as a series, exact to 2e-9 for `m` in `[0.707, 1.414]`.
+/// Mantissa, about 1, and exponent of `u` in `[2^-24, 1]`, by comparisons and exact products with
+/// powers of two.
 #[inline(always)]
-pub(super) fn ln_unit<R: Real>(u: R) -> R {
+pub(super) fn unit_parts<R: Real>(u: R) -> [R; 2] {
     let (mut mantissa, mut exponent) = (u, R::lit(0.0));
     // Powers of two as literals: calls of `exp2` are not folded.
     for (shift, power) in [(12.0, 4096.0), (6.0, 64.0), (3.0, 8.0), (2.0, 4.0), (1.0, 2.0)] {
@@ -124,6 +128,16 @@ pub(super) fn ln_unit<R: Real>(u: R) -> R {
         exponent = mantissa.if_lt(small, exponent - R::lit(shift), exponent);
         mantissa = mantissa.if_lt(small, scaled, mantissa);
     }
+    [mantissa, exponent]
+}
+
+/// Natural logarithm of `u` in `[2^-24, 1]`.
+///
+/// That of the mantissa is `2 atanh((m - 1) / (m + 1))` as a series, exact to 2e-9 for `m` in
+/// `[0.707, 1.414]`.
+#[inline(always)]
+pub(super) fn ln_unit<R: Real>(u: R) -> R {
+    let [mantissa, exponent] = u.unit_parts();
     let ratio = (mantissa - R::lit(1.0)) / (mantissa + R::lit(1.0));
     let square = ratio * ratio;
     let series = polynomial(square, [1.0 / 3.0, 1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0]);

@@ -5,12 +5,14 @@ pub mod bound;
 mod lanes;
 pub mod record;
 mod scalar;
+mod vector;
 pub mod wgsl;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use lanes::Lanes;
 pub(crate) use lanes::per_lane;
+pub(crate) use vector::{Vector, load_rows, store_rows};
 
 /// A real number as far as a system, cost or policy formula may know it.
 ///
@@ -78,6 +80,13 @@ pub trait Real:
         approx::cos(self)
     }
 
+    /// Sine and cosine of an angle within `[-pi, pi]`, with the bits of [`Real::sin`] and
+    /// [`Real::cos`].
+    #[inline(always)]
+    fn principal_sin_cos(self) -> [Self; 2] {
+        approx::principal_sin_cos(self)
+    }
+
     /// Hyperbolic tangent.
     #[inline(always)]
     fn tanh(self) -> Self {
@@ -94,5 +103,12 @@ pub trait Real:
     #[inline(always)]
     fn ln_unit(self) -> Self {
         approx::ln_unit(self)
+    }
+
+    /// Of a number in `[2^-24, 1]` that is `m 2^e`, the mantissa `m`, from the root of 1/2 to twice
+    /// that, and the whole number `e`.
+    #[inline(always)]
+    fn unit_parts(self) -> [Self; 2] {
+        approx::unit_parts(self)
     }
 }

@@ -55,6 +55,9 @@ impl Real for f64 {
     fn cos(self) -> Self {
         f64::cos(self)
     }
+    fn principal_sin_cos(self) -> [Self; 2] {
+        self.sin_cos().into()
+    }
     fn tanh(self) -> Self {
         f64::tanh(self)
     }

@@ -4,7 +4,7 @@ use super::mppi::{MppiSettings, NoiseKind};
 use super::philox::philox;
 use super::sample::{Stream, normal_pair, unit};
 use crate::error::{Error, Result};
-use crate::real::{Lanes, Real, per_lane};
+use crate::real::{Lanes, Real, Vector, load_rows, per_lane, store_rows};
 
 /// Knots that a step of a spline depends on.
 pub const SPLINE_SUPPORT: usize = 4;
@@ -96,19 +96,20 @@ impl<const NU: usize> Noise<NU> {
         (self.draws() * NU).next_multiple_of(4)
     }
 
-    /// The noise of the samples `first..first + N`, `[H]`; `normals` is scratch of [`Self::room`].
+    /// The noise of the samples `first..first + N`, `[H]`, computed in vectors `V` that N is a
+    /// multiple of; `normals` is scratch of [`Self::room`].
     ///
     /// # Panics
     /// If a slice is too short.
     #[inline(always)]
-    pub(crate) fn fill<const N: usize>(
+    pub(crate) fn fill<V: Vector, const N: usize>(
         &self,
         (stream, iteration): (Stream, u32),
         first: u32,
         normals: &mut [Lanes<N>],
         noise: &mut [[Lanes<N>; NU]],
     ) {
-        self.draw((stream, iteration), first, normals);
+        self.draw::<V, N>((stream, iteration), first, normals);
         match &self.shape {
             NoiseShape::Independent => {
                 for (t, e) in noise[..self.horizon].iter_mut().enumerate() {
@@ -138,7 +139,7 @@ impl<const NU: usize> Noise<NU> {
 
     /// The standard normal numbers of the samples `first..first + N`.
     #[inline(always)]
-    fn draw<const N: usize>(
+    fn draw<V: Vector, const N: usize>(
         &self,
         (stream, iteration): (Stream, u32),
         first: u32,
@@ -149,9 +150,12 @@ impl<const NU: usize> Noise<NU> {
         for (block, four) in normals[..self.room()].as_chunks_mut::<4>().0.iter_mut().enumerate() {
             let counter = [index, [iteration; N], [block as u32; N], [stream.id(); N]];
             let [a, b, c, d] = philox(counter, stream.key());
-            let even = normal_pair(one - unit(a), unit(b));
-            let odd = normal_pair(one - unit(c), unit(d));
-            *four = [even[0], even[1], odd[0], odd[1]];
+            *four = [one - unit(a), unit(b), one - unit(c), unit(d)];
+            for at in (0..N).step_by(V::WIDTH) {
+                let [a, b, c, d] = load_rows::<V, N, 4>(four, at);
+                let (even, odd) = (normal_pair(a, b), normal_pair(c, d));
+                store_rows([even[0], even[1], odd[0], odd[1]], four, at);
+            }
             if self.antithetic {
                 for z in four {
                     *z = *z * sign;
@@ -190,7 +194,7 @@ impl<const NU: usize> Noise<NU> {
     pub fn sample(&self, stream: Stream, iteration: u32, sample: u32) -> Vec<[f32; NU]> {
         let mut normals = vec![Lanes([0.0; 1]); self.room()];
         let mut noise = vec![[Lanes([0.0; 1]); NU]; self.horizon];
-        self.fill((stream, iteration), sample, &mut normals, &mut noise);
+        self.fill::<Lanes<1>, 1>((stream, iteration), sample, &mut normals, &mut noise);
         noise.into_iter().map(|e| e.map(|lane| lane.0[0])).collect()
     }
 }

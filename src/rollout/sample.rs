@@ -153,7 +153,8 @@ pub(super) fn unit<const N: usize>(words: [u32; N]) -> Lanes<N> {
 pub fn normal_pair<R: Real>(magnitude: R, turn: R) -> [R; 2] {
     let radius = (R::lit(-2.0) * magnitude.ln_unit()).sqrt();
     let angle = R::lit(std::f32::consts::TAU) * (turn - R::lit(0.5));
-    [radius * angle.cos(), radius * angle.sin()]
+    let [sin, cos] = angle.principal_sin_cos();
+    [radius * cos, radius * sin]
 }
 
 /// A set of states with the uniform distribution on it.

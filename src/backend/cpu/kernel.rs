@@ -1,6 +1,7 @@
 //! Dense-layer kernels: a panel of neurons times a block of trajectories, summed in registers.
 
 use super::dispatch::Body;
+use crate::real::{Lanes, Vector};
 
 /// Smallest number of trajectories that a kernel computes at once; blocks are multiples of it.
 pub(super) const GRANULE: usize = 16;
@@ -27,6 +28,9 @@ pub(super) trait Kernel: Copy + Send + Sync {
     /// Trajectories of a block, a multiple of [`GRANULE`].
     const BLOCK: usize;
 
+    /// What its bodies evaluate formulas in; a divisor of the lanes per group.
+    type Vector: Vector;
+
     /// Calls `body`, compiled for these instructions, with the lanes per group that the compiler
     /// vectorises best.
     fn call<B: Body>(self, body: B) -> B::Output;
@@ -48,6 +52,7 @@ impl Kernel for Portable {
     // 16 vector registers of 4 lanes hold 2 rows of sums beside the inputs, 32 hold 4.
     const ROWS: usize = if FUSED { 4 } else { 2 };
     const BLOCK: usize = GRANULE;
+    type Vector = Lanes<GRANULE>;
 
     #[inline(never)]
     fn call<B: Body>(self, body: B) -> B::Output {

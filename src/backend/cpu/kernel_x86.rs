@@ -2,6 +2,7 @@
 
 use super::dispatch::Body;
 use super::kernel::{Kernel, Panel};
+use super::vector_x86::{Vector256, Vector512};
 
 /// Rows of inputs that are fetched ahead of their use.
 const AHEAD: usize = 8;
@@ -149,6 +150,7 @@ mod kernels {
         // 24 of 32 registers hold sums.
         const ROWS: usize = 8;
         const BLOCK: usize = 48;
+        type Vector = Vector512;
 
         fn call<B: Body>(self, body: B) -> B::Output {
             // SAFETY: `self` proves that the processor has the instructions.
@@ -168,6 +170,7 @@ mod kernels {
         // 12 of 16 registers hold sums.
         const ROWS: usize = 6;
         const BLOCK: usize = 16;
+        type Vector = Vector256;
 
         fn call<B: Body>(self, body: B) -> B::Output {
             // SAFETY: `self` proves that the processor has the instructions.

@@ -18,6 +18,8 @@ mod spread;
 #[cfg(test)]
 mod tests;
 mod tile;
+#[cfg(target_arch = "x86_64")]
+mod vector_x86;
 
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
 //! MPPI on the CPU: samples of one problem rolled out tile by tile, their costs added up.
 
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::dispatch::{Body, Unit};
@@ -9,7 +10,7 @@ use super::mppi_update::Softmin;
 use super::tile::is_finite;
 use crate::backend::softmin::Partial;
 use crate::cost::{Cost, CostMap};
-use crate::real::{Lanes, Real, per_lane};
+use crate::real::{Lanes, Real, Vector, load_rows, store_rows};
 use crate::rollout::{HUGE, MppiProblem, MppiSpec, MppiTask, Noise, Stream};
 use crate::system::System;
 
@@ -127,7 +128,8 @@ impl<'a, K: Kernel, const N: usize, const NX: usize, const NU: usize> Tile<'a, K
     ) {
         let groups = self.controls.chunks_mut(self.horizon).take(live.div_ceil(N));
         for (group, controls) in groups.enumerate() {
-            self.kernel.call(Draw {
+            self.kernel.call(Draw::<K, N, NU> {
+                kernel: PhantomData,
                 noise: task.spec.noise(),
                 source: (problem.stream, task.iteration),
                 first: first + (group * N) as u32,
@@ -155,7 +157,8 @@ impl<'a, K: Kernel, const N: usize, const NX: usize, const NU: usize> Tile<'a, K
         for t in (0..self.horizon).step_by(stride) {
             self.evaluate(task, live);
             for group in 0..groups {
-                self.kernel.call(Advance {
+                self.kernel.call(Advance::<K, S, C, N, NX, NU, NC> {
+                    kernel: PhantomData,
                     system,
                     cost,
                     spec: task.spec,
@@ -195,7 +198,8 @@ impl<'a, K: Kernel, const N: usize, const NX: usize, const NU: usize> Tile<'a, K
 }
 
 /// The noise of a group.
-struct Draw<'a, const N: usize, const NU: usize> {
+struct Draw<'a, K, const N: usize, const NU: usize> {
+    kernel: PhantomData<K>,
     noise: &'a Noise<NU>,
     source: (Stream, u32),
     first: u32,
@@ -203,17 +207,18 @@ struct Draw<'a, const N: usize, const NU: usize> {
     out: &'a mut [[Lanes<N>; NU]],
 }
 
-impl<const N: usize, const NU: usize> Body for Draw<'_, N, NU> {
+impl<K: Kernel, const N: usize, const NU: usize> Body for Draw<'_, K, N, NU> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        self.noise.fill(self.source, self.first, self.normals, self.out);
+        self.noise.fill::<K::Vector, N>(self.source, self.first, self.normals, self.out);
     }
 }
 
 /// Some steps of a group: noise becomes controls, states and costs move on.
-struct Advance<'a, S, C, const N: usize, const NX: usize, const NU: usize, const NC: usize> {
+struct Advance<'a, K, S, C, const N: usize, const NX: usize, const NU: usize, const NC: usize> {
+    kernel: PhantomData<K>,
     system: &'a S,
     cost: &'a C,
     spec: &'a MppiSpec<NU>,
@@ -224,9 +229,10 @@ struct Advance<'a, S, C, const N: usize, const NX: usize, const NU: usize, const
     controls: &'a mut [[Lanes<N>; NU]],
 }
 
-impl<S, C, const N: usize, const NX: usize, const NU: usize, const NC: usize> Body
-    for Advance<'_, S, C, N, NX, NU, NC>
+impl<K, S, C, const N: usize, const NX: usize, const NU: usize, const NC: usize> Body
+    for Advance<'_, K, S, C, N, NX, NU, NC>
 where
+    K: Kernel,
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
@@ -234,49 +240,68 @@ where
 
     #[inline(always)]
     fn run(self) {
-        let bounds = &self.spec.settings().bounds;
-        let (mut x, mut total) = (*self.x, *self.total);
-        for t in self.steps {
-            let plan = &self.problem.plan[t];
-            let mut u = self.controls[t];
-            for i in 0..NU {
-                let noisy = Lanes::lit(plan[i]) + u[i];
-                u[i] = noisy.clamp(Lanes::lit(bounds[i][0]), Lanes::lit(bounds[i][1]));
+        for at in (0..N).step_by(K::Vector::WIDTH) {
+            let mut x: [K::Vector; NX] = load_rows(self.x, at);
+            let mut total = K::Vector::load(&self.total.0[at..]);
+            for t in self.steps.clone() {
+                let controls = &mut self.controls[t];
+                let plan = lit(&self.problem.plan[t]);
+                let u = bounded(load_rows(controls, at), &plan, &self.spec.settings().bounds);
+                store_rows(u, controls, at);
+                total = total + self.cost.stage(x, u, lit(&self.problem.context[t]));
+                if let Some(penalty) = self.spec.penalty() {
+                    total = total + noise_cost(penalty, &self.problem.plan[t], &u);
+                }
+                if let Some((map, place)) = self.cost.map(x) {
+                    total = total + map_cost(map, place);
+                }
+                x = self.system.step(x, u);
             }
-            self.controls[t] = u;
-            let mut context = [Lanes([0.0; N]); NC];
-            for (lanes, number) in context.iter_mut().zip(&self.problem.context[t]) {
-                *lanes = Lanes::lit(*number);
-            }
-            total = total + self.cost.stage(x, u, context);
-            if let Some(penalty) = self.spec.penalty() {
-                total = total + noise_cost(penalty, plan, &u);
-            }
-            if let Some((map, place)) = self.cost.map(x) {
-                total = total + map_cost(map, place);
-            }
-            // Cost and step as one block are more than the vectoriser takes in: lanes apart, and 14 %
-            // more time for a plan of the race.
-            x = self.system.step(std::hint::black_box(x), u);
+            store_rows(x, self.x, at);
+            total.store(&mut self.total.0[at..]);
         }
-        (*self.x, *self.total) = (x, total);
     }
+}
+
+/// Numbers that are the same for all samples.
+#[inline(always)]
+fn lit<V: Vector, const R: usize>(numbers: &[f32; R]) -> [V; R] {
+    let mut vectors = [V::lit(0.0); R];
+    for (vector, number) in vectors.iter_mut().zip(numbers) {
+        *vector = V::lit(*number);
+    }
+    vectors
+}
+
+/// The plan with noise, within its bounds.
+#[inline(always)]
+fn bounded<V: Vector, const NU: usize>(
+    noise: [V; NU],
+    plan: &[V; NU],
+    bounds: &[[f32; 2]; NU],
+) -> [V; NU] {
+    let mut u = noise;
+    for i in 0..NU {
+        let [low, high] = bounds[i];
+        u[i] = (plan[i] + noise[i]).clamp(V::lit(low), V::lit(high));
+    }
+    u
 }
 
 /// `lambda plan' Sigma^-1 (u - plan)`.
 #[inline(always)]
-fn noise_cost<const N: usize, const NU: usize>(
+fn noise_cost<V: Vector, const NU: usize>(
     penalty: &[[f32; NU]; NU],
     plan: &[f32; NU],
-    u: &[Lanes<N>; NU],
-) -> Lanes<N> {
-    let mut cost = Lanes([0.0; N]);
+    u: &[V; NU],
+) -> V {
+    let mut cost = V::lit(0.0);
     for i in 0..NU {
         let mut row = 0.0;
         for j in 0..NU {
             row += penalty[j][i] * plan[j];
         }
-        cost = cost + Lanes::lit(row) * (u[i] - Lanes::lit(plan[i]));
+        cost = cost + V::lit(row) * (u[i] - V::lit(plan[i]));
     }
     cost
 }
@@ -290,13 +315,12 @@ const WHOLE_MASK: u32 = 0x7f_ffff;
 /// The costs of the cells at `place`; of NaN, whose mantissa is above any cell's number, that of the
 /// last cell, one of the border.
 #[inline(always)]
-fn map_cost<const N: usize>(map: &CostMap, place: [Lanes<N>; 2]) -> Lanes<N> {
+fn map_cost<V: Vector>(map: &CostMap, place: [V; 2]) -> V {
     let cells = map.cells();
     // Lets the compiler leave out the test of each index.
     assert!(!cells.is_empty(), "a map has cells");
-    let cell = map.cell(place) + Lanes::lit(WHOLE);
-    let number = |i: usize| (cell.0[i].to_bits() & WHOLE_MASK) as usize;
-    Lanes(per_lane!(N, i => cells[number(i).min(cells.len() - 1)]))
+    let number = map.cell(place) + V::lit(WHOLE);
+    number.each(|number| cells[((number.to_bits() & WHOLE_MASK) as usize).min(cells.len() - 1)])
 }
 
 /// What the networks, evaluated at the state before the step, add to cost and state.
