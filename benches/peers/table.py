@@ -13,7 +13,7 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", HERE.parent.parent / "target"))
 PROGRAM = TARGET / "release" / "reachcast"
-PEERS = {"JAX": "jax_peer.py", "PyTorch": "torch_peer.py"}
+PEERS = {"JAX vmap": "jax_vmap_peer.py", "JAX": "jax_peer.py", "PyTorch": "torch_peer.py"}
 WORKLOADS = [
     *(f"rollout/{net}/{n}" for net in ("3x64", "3x128", "4x512") for n in (158, 4096, 65536)),
     "sign/race/65536",

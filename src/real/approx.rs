@@ -172,6 +172,30 @@ mod tests {
         assert!(largest < 3e-7, "{largest}");
     }
 
+    /// Every turn that a uniform number can be.
+    #[test]
+    fn angles_within_a_turn_need_no_reduction() {
+        for word in 0..1 << 23_u32 {
+            let turn = f32::from_bits(word | 0x3f80_0000) - 1.0;
+            let angle = std::f32::consts::TAU * (turn - 0.5);
+            assert_eq!(super::principal(angle).to_bits(), angle.to_bits(), "{turn}");
+        }
+        for angle in [-1.0_f32, 0.0, 2.5] {
+            let [sin, cos] = angle.principal_sin_cos();
+            assert_eq!([sin, cos], [Real::sin(angle), Real::cos(angle)]);
+        }
+    }
+
+    #[test]
+    fn parts_of_a_unit_make_it_again() {
+        for u in (1..=1 << 23).step_by(7).map(|k| k as f32 / 8_388_608.0) {
+            let [mantissa, exponent] = u.unit_parts();
+            let root = std::f32::consts::FRAC_1_SQRT_2;
+            assert!((root..2.0 * root).contains(&mantissa), "{u}: {mantissa}");
+            assert_eq!(mantissa * exponent.exp2(), u);
+        }
+    }
+
     #[test]
     fn ends_of_the_ranges() {
         assert_eq!(<f32 as Real>::ln_unit(1.0), 0.0);

@@ -5,3 +5,4 @@ mod fixture;
 mod kernels;
 mod oracle;
 mod same_bits;
+mod vectors;

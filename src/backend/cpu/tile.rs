@@ -1,10 +1,12 @@
 //! A tile of trajectories in groups of lanes: their controls and their scores.
 
+use std::marker::PhantomData;
+
 use super::dispatch::Body;
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use crate::policy::Policy;
-use crate::real::{Lanes, Real, per_lane};
+use crate::real::{Lanes, Real, Vector, load_rows, per_lane, store_rows};
 use crate::rollout::{Fold, HUGE, NON_FINITE, Plant, Tightening};
 use crate::system::System;
 
@@ -65,7 +67,7 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
     {
         let system = self.plant.system;
         for (x, u) in x.iter_mut().zip(&self.controls) {
-            self.kernel.call(Step { system, x, u });
+            self.kernel.call(Step::<S, K, N, NX, NU> { kernel: PhantomData, system, x, u });
         }
     }
 
@@ -79,7 +81,14 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
     ) where
         S: System<NX, NU>,
     {
-        self.kernel.call(Judge { system: self.plant.system, x, score, loss, gamma });
+        self.kernel.call(Judge::<S, K, N, NX, NU> {
+            kernel: PhantomData,
+            system: self.plant.system,
+            x,
+            score,
+            loss,
+            gamma,
+        });
     }
 
     /// The kernel, for other bodies.
@@ -107,25 +116,32 @@ impl<P: Policy<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
 }
 
 /// The system's dynamics for a group.
-struct Step<'a, S, const N: usize, const NX: usize, const NU: usize> {
+struct Step<'a, S, K, const N: usize, const NX: usize, const NU: usize> {
+    kernel: PhantomData<K>,
     system: &'a S,
     x: &'a mut [Lanes<N>; NX],
     u: &'a [Lanes<N>; NU],
 }
 
-impl<S: System<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
-    for Step<'_, S, N, NX, NU>
+impl<S, K, const N: usize, const NX: usize, const NU: usize> Body for Step<'_, S, K, N, NX, NU>
+where
+    S: System<NX, NU>,
+    K: Kernel,
 {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        *self.x = self.system.step(*self.x, *self.u);
+        for at in (0..N).step_by(K::Vector::WIDTH) {
+            let x: [K::Vector; NX] = load_rows(self.x, at);
+            store_rows(self.system.step(x, load_rows(self.u, at)), self.x, at);
+        }
     }
 }
 
 /// The system's margins for a group, folded.
-struct Judge<'a, S, const N: usize, const NX: usize, const NU: usize> {
+struct Judge<'a, S, K, const N: usize, const NX: usize, const NU: usize> {
+    kernel: PhantomData<K>,
     system: &'a S,
     x: &'a [Lanes<N>; NX],
     score: &'a mut Score<N>,
@@ -133,16 +149,24 @@ struct Judge<'a, S, const N: usize, const NX: usize, const NU: usize> {
     gamma: f32,
 }
 
-impl<S: System<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
-    for Judge<'_, S, N, NX, NU>
+impl<S, K, const N: usize, const NX: usize, const NU: usize> Body for Judge<'_, S, K, N, NX, NU>
+where
+    S: System<NX, NU>,
+    K: Kernel,
 {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Loss([target_loss, constraint_loss]) = *self.loss;
-        let target = self.system.target(*self.x) - target_loss;
-        let constraint = self.system.constraint(*self.x) - constraint_loss;
+        let mut margins = [Lanes([0.0; N]); 2];
+        for at in (0..N).step_by(K::Vector::WIDTH) {
+            let x: [K::Vector; NX] = load_rows(self.x, at);
+            let [target_loss, constraint_loss] = load_rows(&self.loss.0, at);
+            let target = self.system.target(x) - target_loss;
+            let constraint = self.system.constraint(x) - constraint_loss;
+            store_rows([target, constraint], &mut margins, at);
+        }
+        let [target, constraint] = margins;
         let mut largest = [0; N];
         for values in self.x.iter().chain([&target, &constraint]) {
             largest = per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]));
