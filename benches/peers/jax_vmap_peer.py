@@ -39,7 +39,7 @@ def rollout(work, network, count):
     one = partial(measure, layers, work.settings["horizon"], work.settings["gamma"])
     starts = jnp.asarray(work.starts[:count])
     each = jax.jit(jax.vmap(one)).lower(starts).compile()
-    peer.check("measure", work.array(f"{network}_measures")[:count], each(starts))
+    peer.check_measures(work, network, count, each(starts))
     return lambda: each(starts).block_until_ready()
 
 

@@ -110,6 +110,11 @@ def check(name, ours, theirs, tolerance=TOLERANCE, exempt=0.0):
         raise ValueError(f"{name} {worst} is {theirs[worst]}, expected {ours[worst]}")
 
 
+def check_measures(work, network, count, theirs):
+    """A steep policy makes more of a rounding: one measure in a thousand may be farther off."""
+    check("measure", work.array(f"{network}_measures")[:count], theirs, exempt=0.001)
+
+
 def check_plan(work, costs, plan):
     """The cost jumps where a sample crosses the centre line: a rounding may move it to a neighbour."""
     check("cost", work.array("mppi_costs"), costs, exempt=0.01)

@@ -61,7 +61,7 @@ def ways(function, arguments):
 def rollout(work, network, count):
     layers = [(torch.tensor(w), torch.tensor(b[:, None])) for w, b in work.network(network)]
     starts = torch.tensor(work.starts[:count].T).contiguous()
-    accept = partial(peer.check, "measure", work.array(f"{network}_measures")[:count])
+    accept = partial(peer.check_measures, work, network, count)
     forms = ways(judge, lambda n: (torch.ones(12, n), torch.tensor(1.0), *torch.ones(2, n)))
     calls = [partial(measures, layers, work.settings, form, starts) for form in forms]
     return peer.fastest([(call, accept) for call in calls])
