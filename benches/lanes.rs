@@ -41,13 +41,13 @@ struct Floors {
 
 /// The floors of an instruction set, as [`Cpu::instructions`] names it: two thirds to three quarters
 /// of what an AMD EPYC (Zen 4) does with it, where repeats agree within a few per cent when both
-/// sides take turns. That is 1.6, 27 and 8.4 for AVX-512; 2.2, 28 and 6.3 for AVX2; 1.4, 9.4 and 3.7
+/// sides take turns. That is 3.6, 28 and 15.7 for AVX-512; 2.7, 28 and 12.1 for AVX2; 1.5, 9.5 and 4.1
 /// for the baseline of x86-64.
 fn floors(instructions: &str) -> Floors {
     match instructions {
-        "AVX-512" => Floors { physics: 1.2, dense: 18.0, plan: 5.6 },
-        "AVX2" => Floors { physics: 1.6, dense: 18.0, plan: 4.2 },
-        _ => Floors { physics: 1.05, dense: 6.0, plan: 2.5 },
+        "AVX-512" => Floors { physics: 2.5, dense: 18.0, plan: 10.5 },
+        "AVX2" => Floors { physics: 1.8, dense: 18.0, plan: 8.0 },
+        _ => Floors { physics: 1.05, dense: 6.0, plan: 2.8 },
     }
 }
 

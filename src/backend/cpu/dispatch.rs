@@ -21,6 +21,10 @@ pub(super) trait Unit {
     /// What it returns.
     type Output;
 
+    /// Whether it draws random words all the time. These are left to the compiler, which finds the
+    /// vectors of AVX-512 in loops of two of them alone.
+    const DRAWS: bool = false;
+
     /// Does the work, `N` trajectories per group.
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Self::Output;
 }
@@ -75,12 +79,13 @@ impl Instructions {
 
     /// Does `unit` with these instructions.
     ///
-    /// The lanes per group are those that the compiler vectorises best: 32 for AVX-512, where 16
-    /// were measured to be five times slower, else 16.
+    /// 16 lanes per group; for a unit that draws, 32 with AVX-512.
     pub(super) fn run<U: Unit>(self, unit: U) -> U::Output {
         match self {
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(kernel) => unit.run::<_, 32>(kernel),
+            Self::Avx512(kernel) if U::DRAWS => unit.run::<_, 32>(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(kernel) => unit.run::<_, 16>(kernel),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(kernel) => unit.run::<_, 16>(kernel),
             Self::Baseline => unit.run::<_, 16>(Portable),

@@ -41,6 +41,8 @@ where
 {
     type Output = Partial<NU>;
 
+    const DRAWS: bool = true;
+
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Partial<NU> {
         let settings = self.task.spec.settings();
         let horizon = settings.horizon as usize;

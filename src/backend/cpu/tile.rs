@@ -56,7 +56,7 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
         }
         let policy = self.plant.policy;
         for (u, x) in self.controls.iter_mut().zip(x) {
-            self.kernel.call(Control { policy, x, u });
+            self.kernel.call(Control::<P, K, N, NX, NU> { kernel: PhantomData, policy, x, u });
         }
     }
 
@@ -98,20 +98,26 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
 }
 
 /// The policy's formula for a group.
-struct Control<'a, P, const N: usize, const NX: usize, const NU: usize> {
+struct Control<'a, P, K, const N: usize, const NX: usize, const NU: usize> {
+    kernel: PhantomData<K>,
     policy: &'a P,
     x: &'a [Lanes<N>; NX],
     u: &'a mut [Lanes<N>; NU],
 }
 
-impl<P: Policy<NX, NU>, const N: usize, const NX: usize, const NU: usize> Body
-    for Control<'_, P, N, NX, NU>
+impl<P, K, const N: usize, const NX: usize, const NU: usize> Body for Control<'_, P, K, N, NX, NU>
+where
+    P: Policy<NX, NU>,
+    K: Kernel,
 {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        *self.u = self.policy.control(*self.x);
+        for at in (0..N).step_by(K::Vector::WIDTH) {
+            let x: [K::Vector; NX] = load_rows(self.x, at);
+            store_rows(self.policy.control(x), self.u, at);
+        }
     }
 }
 
