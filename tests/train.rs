@@ -9,7 +9,7 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use burn_tensor::{Tensor, TensorData, activation};
+use burn_tensor::{Tensor, activation};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
@@ -24,8 +24,9 @@ use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
+use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::{Curve, layer};
-use reachcast::train::network::{Device, Differentiable, Network, Shape};
+use reachcast::train::network::{Network, Shape};
 use reachcast::train::physics::apply;
 use reachcast::train::record::{Origin, TrainRecord};
 use reachcast::train::run::{Learner, Run};
@@ -75,6 +76,7 @@ fn learner<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
     let task = Task {
         system,
         backend,
+        device: Device::cpu(),
         spec: config.spec().unwrap(),
         losses,
         mixture: config.mixture(&system.states()).unwrap(),
@@ -166,10 +168,10 @@ fn slopes_of_the_softened_measure_are_central_differences_in_f64() {
     let lost = losses(&spec);
     let learner = learner(&system, &backend, &config, network.clone(), Some(lost.clone()));
     let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::TrainStart, 3, 6);
-    let bound = network.bind();
+    let bound = network.bind(&Device::cpu());
     let measures = learner.measures(&bound, &starts, tau);
     let found = bound.gradient(&measures.clone().sum().backward());
-    let values: Vec<f32> = measures.into_data().to_vec().unwrap();
+    let values = floats(measures);
 
     let widths = [12, hidden[0], hidden[1], 3];
     let exact = |parameters: &[f64], start: &[f32; 12], lost: &Tightening| {
@@ -218,8 +220,7 @@ fn an_exported_network_measures_as_on_tensors() {
     let network = random(&system, &[64, 64], 1.0);
     let learner = learner(&system, &backend, &config, network.clone(), None);
     let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::HeldOut, 0, 500);
-    let told: Vec<f32> =
-        learner.measures(&network.bind(), &starts, 1e-7).into_data().to_vec().unwrap();
+    let told = floats(learner.measures(&network.bind(&Device::cpu()), &starts, 1e-7));
     let policy = network.export(order(&system)).unwrap();
     let measured = measures(&backend, Plant { system: &system, policy: &policy }, &starts, &config);
     let apart = told.iter().zip(&measured).map(|(told, measured)| (told - measured).abs());
@@ -452,6 +453,7 @@ fn a_value_network_learns_the_measure() {
         order: order(&system),
         samples: source.values::<1>(Purpose::TrainStart, 20_000).unwrap(),
         held_out: source.values::<1>(Purpose::HeldOut, 2000).unwrap(),
+        device: Device::cpu(),
         seed: 5,
     };
     let inputs = system.states().iter().map(|axis| [axis.low, axis.high]).collect();
@@ -513,11 +515,8 @@ fn the_loss_is_the_mean_gain() {
     let next = config.mixture(&system.states()).unwrap().draw(5, Purpose::TrainStart, 1, batch);
     assert!(starts.iter().all(|start| !next.contains(start)), "fresh starts");
     let AnalyticSettings { scale, slope, temperature, .. } = settings(&config).analytic;
-    let measures: Vec<f32> = learner
-        .measures(&network.bind(), &starts, temperature[0] as f32)
-        .into_data()
-        .to_vec()
-        .unwrap();
+    let bound = network.bind(&Device::cpu());
+    let measures = floats(learner.measures(&bound, &starts, temperature[0] as f32));
     let gain = |g: f32| (f64::from(g) / scale).tanh() + slope * f64::from(g) / scale;
     let gains = measures.chunks(2).map(|pair| gain(pair[0]) + 0.25 * gain(pair[1]));
     let expected = -gains.sum::<f64>() / batch as f64;
@@ -526,9 +525,9 @@ fn the_loss_is_the_mean_gain() {
 }
 
 /// A graph on tensors, one operation of burn per node: what one operation per graph stands for.
-fn node_by_node(graph: &Graph, inputs: &Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2> {
+fn node_by_node(graph: &Graph, inputs: &Tensor<2>) -> Tensor<2> {
     let rows = inputs.dims()[0];
-    let mut values: Vec<Tensor<Differentiable, 2>> = Vec::new();
+    let mut values: Vec<Tensor<2>> = Vec::new();
     for node in &graph.nodes {
         let at = |i: u32| values[i as usize].clone();
         let value = match *node {
@@ -569,17 +568,13 @@ fn one_operation_per_graph_is_one_per_node() {
     };
     let rows: Vec<f32> = (0..37).flat_map(row).collect();
     let tape = Arc::new(Tape::hard(&graph));
-    let weights = Tensor::<Differentiable, 2>::from_data(
-        TensorData::new((0..14).map(|i| 1.0 + 0.1 * i as f32).collect(), [1, 14]),
-        &Device::Cpu,
-    );
-    let run = |of: &dyn Fn(Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2>| {
-        let data = TensorData::new(rows.clone(), [37, 15]);
-        let inputs = Tensor::from_data(data, &Device::Cpu).require_grad();
+    let device = Device::cpu();
+    let weights = device.tensor((0..14).map(|i| 1.0 + 0.1 * i as f32).collect(), [1, 14]);
+    let run = |of: &dyn Fn(Tensor<2>) -> Tensor<2>| {
+        let inputs = device.tensor(rows.clone(), [37, 15]).require_grad();
         let outputs = of(inputs.clone());
         let grads = (outputs.clone() * weights.clone()).sum().backward();
-        let floats = |data: TensorData| data.to_vec::<f32>().unwrap();
-        (floats(outputs.into_data()), floats(inputs.grad(&grads).unwrap().into_data()))
+        (floats(outputs), floats(inputs.grad(&grads).unwrap()))
     };
     let (values, slopes) = run(&|inputs| apply(&tape, 1.0, [inputs]));
     let (expected, steeps) = run(&|inputs| node_by_node(&graph, &inputs));
@@ -600,10 +595,7 @@ fn a_layer_is_burns_own_operations() {
             0,
         );
         let values: Vec<f32> = lanes.iter().map(|lane| lane.0[0]).collect();
-        Tensor::<Differentiable, 2>::from_data(
-            TensorData::new(values, [rows, columns]),
-            &Device::Cpu,
-        )
+        Device::cpu().tensor(values, [rows, columns])
     };
     let (hidden, last) = (Curve::Hidden, Curve::Last);
     for curve in [
@@ -629,9 +621,12 @@ fn a_layer_is_burns_own_operations() {
                 }
             };
             let grads = (outputs.clone() * drawn(7, [5, 3])).sum().backward();
-            let slopes = [x, w, b].map(|t| t.grad(&grads).unwrap().into_data());
-            let all = [&[outputs.into_data()][..], &slopes].concat();
-            all.into_iter().flat_map(|data| data.to_vec::<f32>().unwrap()).collect::<Vec<f32>>()
+            let slopes = [x, w, b].map(|t| t.grad(&grads).unwrap());
+            [vec![outputs], slopes.to_vec()]
+                .concat()
+                .into_iter()
+                .flat_map(floats)
+                .collect::<Vec<f32>>()
         };
         for (found, expected) in run(true).into_iter().zip(run(false)) {
             let error = (found - expected).abs();

@@ -41,6 +41,7 @@ fn record() -> TrainRecord {
             sha256: words("ccc333"),
             widths: vec![2, 32, 1],
         }],
+        events: vec![],
     }
 }
 

@@ -21,6 +21,7 @@ use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
 use reachcast::train::analytic::Task;
 use reachcast::train::backup::Margins;
 use reachcast::train::ddpg::{Ddpg, Game};
+use reachcast::train::device::Device;
 use reachcast::train::disturbed::{Disturbed, pushed};
 use reachcast::train::environments::Environments;
 use reachcast::train::gae::{Step, advantages};
@@ -54,6 +55,7 @@ fn task<'a>(
     Task {
         system,
         backend,
+        device: Device::cpu(),
         spec: config.spec().unwrap(),
         losses: None,
         mixture: config.mixture(&system.states()).unwrap(),

@@ -23,11 +23,12 @@ pub fn train_html(record: &TrainRecord) -> String {
          <div class=\"gallery\">\n{figures}</div></section>\n\
          <section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <div class=\"tables\">\n{numbers}</div>\n{configuration}</section>\n\
-         </main>\n{footer}</body>\n</html>\n",
+         {adapter}</main>\n{footer}</body>\n</html>\n",
         head = shell::head("training", "", Scripts::None),
         header = header(record),
         numbers = numbers(record),
         configuration = shell::configuration(provenance),
+        adapter = shell::failures(&record.events),
         footer = shell::footer(provenance, "a second run on such a machine gives the same page"),
     )
 }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use burn_tensor::Tensor;
 
 use super::adam::Adam;
-use super::network::{Bound, Differentiable, Network};
-use super::physics::{apply, floats, tensor};
+use super::device::{Device, number};
+use super::network::{Bound, Network};
+use super::physics::apply;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::AnalyticSettings;
@@ -29,6 +30,8 @@ pub struct Task<'a, S, const NX: usize> {
     pub system: &'a S,
     /// Who runs the rollouts that the policy is scored by.
     pub backend: &'a Backend,
+    /// Where its tensors lie.
+    pub device: Device,
     /// Length and discount of a rollout.
     pub spec: RolloutSpec,
     /// What the margins lose in `V_check`; none if it has no part in the objective.
@@ -69,13 +72,8 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX
     }
 
     /// The softened measures `[starts, 1 or 2]` of rollouts under `network`: G and `V_check`.
-    pub fn measures(
-        &self,
-        network: &Bound,
-        starts: &[[f32; NX]],
-        temperature: f32,
-    ) -> Tensor<Differentiable, 2> {
-        let mut x = tensor(starts.as_flattened().to_vec(), [starts.len(), NX]);
+    pub fn measures(&self, network: &Bound, starts: &[[f32; NX]], temperature: f32) -> Tensor<2> {
+        let mut x = self.task.device.tensor(starts.as_flattened().to_vec(), [starts.len(), NX]);
         let mut states = vec![x.clone()];
         for _ in 0..self.task.spec.horizon {
             let u = network.forward(x.clone());
@@ -86,13 +84,13 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX
     }
 
     /// Mean gain `tanh(g / scale) + slope g / scale` of the measures, the certified one weighted.
-    fn gain(&self, measures: Tensor<Differentiable, 2>) -> Tensor<Differentiable, 1> {
+    fn gain(&self, measures: Tensor<2>) -> Tensor<1> {
         let AnalyticSettings { scale, slope, certified, .. } = self.settings;
         let [rows, columns] = measures.dims();
         let scaled = measures.div_scalar(scale);
         let gains = scaled.clone().tanh() + scaled.mul_scalar(slope);
         let weights = [1.0, certified as f32][..columns].to_vec();
-        (gains * tensor(weights, [1, columns])).sum().div_scalar(rows as f64)
+        (gains * self.task.device.tensor(weights, [1, columns])).sum().div_scalar(rows as f64)
     }
 
     /// The temperature of an iteration.
@@ -113,14 +111,14 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Analytic<'
     fn update(&mut self, iteration: u64) -> Result<f64> {
         let (seed, batch) = (self.task.seed, self.settings.batch);
         let starts = self.task.mixture.draw(seed, Purpose::TrainStart, iteration, batch);
-        let bound = self.network.bind();
+        let bound = self.network.bind(&self.task.device);
         let measures = self.measures(&bound, &starts, self.temperature(iteration));
         let loss = self.gain(measures).neg();
         let gradient = bound.gradient(&loss.backward());
         let progress = [iteration, self.settings.iterations];
         let optimiser = &self.settings.optimiser;
         self.adam.update(&mut self.network.parameters, &gradient, optimiser, progress);
-        Ok(floats(loss.inner()).iter().map(|loss| f64::from(*loss)).sum())
+        Ok(number(loss))
     }
 
     fn score_names(&self) -> Vec<String> {

@@ -8,10 +8,10 @@ use burn_tensor::Tensor;
 use super::agent::Agent;
 use super::analytic::{LAST, Task};
 use super::backup::Margins;
+use super::device::{floats, number};
 use super::disturbed::{Disturbed, pushed};
 use super::environments::Environments;
-use super::network::{Differentiable, Network, Shape};
-use super::physics::{floats, tensor};
+use super::network::{Network, Shape};
 use super::replay::Replay;
 use super::run::Learner;
 use super::score::{share, successes};
@@ -110,9 +110,10 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
     /// with noise, or for a share of the plants any act.
     fn tried(&self, first: u64, states: &[[f32; NX]]) -> Vec<Vec<f32>> {
         let size = NU + self.entries.len();
-        let rows = tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let device = &self.task.device;
+        let rows = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
         let [u, d] = [&self.control, &self.disturbance]
-            .map(|actor| actor.network.fixed().forward(rows.clone()));
+            .map(|actor| actor.network.fixed(device).forward(rows.clone()));
         let own = floats(Tensor::cat(vec![u, d], 1).inner());
         let noise = Stream::new(self.task.seed, Purpose::TrainNoise, 0);
         let uniform = Stream::new(self.task.seed, Purpose::TrainControl, 0);
@@ -167,33 +168,37 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
         [control, disturbance, critic]: [&Network; 3],
         states: &[[f32; NX]],
     ) -> Vec<f32> {
-        let x = tensor(states.as_flattened().to_vec(), [states.len(), NX]);
-        let joint = joint(&x, [control, disturbance].map(|actor| actor.fixed().forward(x.clone())));
-        floats(critic.fixed().forward(joint).inner())
+        let device = &self.task.device;
+        let x = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let acts = [control, disturbance].map(|actor| actor.fixed(device).forward(x.clone()));
+        floats(critic.fixed(device).forward(joint(&x, acts)).inner())
     }
 
     /// One update of the critic on `rows`; returns its loss, `mean(td^2 |td|)`.
     fn criticise(&mut self, rows: &[f32], progress: [u64; 2]) -> f64 {
         let wanted = self.wanted(rows);
         let (count, columns) = (wanted.len(), rows.len() / wanted.len());
-        let critic = self.critic.network.bind();
-        let told = critic.forward(tensor(rows.to_vec(), [count, columns]));
-        let apart = (told - tensor(wanted, [count, 1])).abs();
+        let device = &self.task.device;
+        let critic = self.critic.network.bind(device);
+        let told = critic.forward(device.tensor(rows.to_vec(), [count, columns]));
+        let apart = (told - device.tensor(wanted, [count, 1])).abs();
         let loss = (apart.clone() * apart.clone() * apart).mean();
         let gradient = critic.gradient(&loss.backward());
         let DdpgSettings { critic, polyak, .. } = &self.settings;
         self.critic.follow(&gradient, critic, progress, *polyak);
-        floats(loss.inner()).iter().map(|loss| f64::from(*loss)).sum()
+        number(loss)
     }
 
     /// One update of both players at the states of `rows`, from one reverse sweep.
     fn play(&mut self, rows: &[f32], progress: [u64; 2]) {
         let columns = NX + NU + self.entries.len();
         let states = rows.chunks_exact(columns).flat_map(|row| &row[..NX]).copied().collect();
-        let x = tensor(states, [rows.len() / columns, NX]);
-        let [control, disturbance] = [&self.control, &self.disturbance].map(|a| a.network.bind());
+        let device = &self.task.device;
+        let x = device.tensor(states, [rows.len() / columns, NX]);
+        let [control, disturbance] =
+            [&self.control, &self.disturbance].map(|actor| actor.network.bind(device));
         let acts = [&control, &disturbance].map(|actor| actor.forward(x.clone()));
-        let worth = self.critic.network.fixed().forward(joint(&x, acts)).mean();
+        let worth = self.critic.network.fixed(device).forward(joint(&x, acts)).mean();
         let slopes = worth.backward();
         let rises: Vec<f32> = control.gradient(&slopes).into_iter().map(|slope| -slope).collect();
         let falls = disturbance.gradient(&slopes);
@@ -220,10 +225,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
 }
 
 /// States and acts side by side.
-fn joint(
-    x: &Tensor<Differentiable, 2>,
-    [u, d]: [Tensor<Differentiable, 2>; 2],
-) -> Tensor<Differentiable, 2> {
+fn joint(x: &Tensor<2>, [u, d]: [Tensor<2>; 2]) -> Tensor<2> {
     Tensor::cat(vec![x.clone(), u, d], 1)
 }
 

@@ -1,15 +1,18 @@
-//! A dense layer with its activation as one operation on tensors.
+//! A dense layer with its activation: one operation on the processor, several on an adapter.
 
 use std::sync::Arc;
 
+use burn_autodiff::Autodiff;
 use burn_autodiff::checkpoint::base::Checkpointer;
 use burn_autodiff::checkpoint::strategy::NoCheckpointing;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
-use burn_tensor::{Tensor, TensorPrimitive};
+use burn_backend::TensorMetadata;
+use burn_backend::ops::FloatTensorOps;
+use burn_backend::tensor::FloatTensor;
+use burn_tensor::{Tensor, activation};
 
-use super::network::{Differentiable, Plain};
-use super::physics::{floats, tensor};
+use super::device::{Host, on_host, parts, primitive, values};
 use crate::policy::{Activation, OutputActivation};
 use crate::real::Real;
 
@@ -23,33 +26,46 @@ pub enum Curve {
 }
 
 /// `curve(x W + b)` `[rows, outputs]` for `x` `[rows, inputs]`, `W` `[inputs, outputs]` and `b`
-/// `[1, outputs]`, with derivatives.
+/// `[1, outputs]`, with derivatives, on the device of `x`.
+pub fn layer(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, curve: Curve) -> Tensor<2> {
+    match on_host(&x) {
+        true => fused(x, weight, bias, curve),
+        false => curved(x.matmul(weight) + bias, curve),
+    }
+}
+
+/// The activation of `sums` as operations of the library: nothing leaves the device.
+fn curved(sums: Tensor<2>, curve: Curve) -> Tensor<2> {
+    match curve {
+        Curve::Last(OutputActivation::Identity) => sums,
+        Curve::Hidden(Activation::Relu) => activation::relu(sums),
+        Curve::Hidden(Activation::Tanh) | Curve::Last(OutputActivation::Tanh) => sums.tanh(),
+        Curve::Hidden(Activation::Silu) => activation::silu(sums),
+    }
+}
+
+/// A layer on the processor.
 ///
 /// The products are the library's; bias and activation are one pass over them, and so are both
 /// derivatives. As operations of their own they took a third of the time of a training.
-pub fn layer(
-    x: Tensor<Differentiable, 2>,
-    weight: Tensor<Differentiable, 2>,
-    bias: Tensor<Differentiable, 2>,
-    curve: Curve,
-) -> Tensor<Differentiable, 2> {
-    let parents = [&x, &weight, &bias].map(|t| t.clone().into_primitive().tensor().node);
-    let (x, weight) = (x.inner(), weight.inner());
-    let products = x.clone().matmul(weight.clone());
-    let [rows, columns] = products.dims();
-    let (mut outputs, bias) = (floats(products), floats(bias.inner()));
-    for row in outputs.chunks_exact_mut(columns) {
+fn fused(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, curve: Curve) -> Tensor<2> {
+    let [(x, of_x), (weight, of_weight), (bias, of_bias)] = [x, weight, bias].map(parts::<Host>);
+    let products = Host::float_matmul(x.clone(), weight.clone());
+    let (device, shape) = (products.device(), products.shape().dims());
+    let (mut outputs, bias) = (values::<Host>(products), values::<Host>(bias));
+    for row in outputs.chunks_exact_mut(shape[1]) {
         row.iter_mut().zip(&bias).for_each(|(sum, bias)| *sum += bias);
     }
     let slopes = bend(&mut outputs, curve);
-    let outputs = tensor::<Plain>(outputs, [rows, columns]).into_primitive().tensor();
-    let outputs = match Dense.prepare::<NoCheckpointing>(parents).compute_bound().stateful() {
+    let outputs = primitive::<Host>(outputs, shape, &device);
+    let nodes = [of_x, of_weight, of_bias];
+    let outputs = match Dense.prepare::<NoCheckpointing>(nodes).compute_bound().stateful() {
         OpsKind::Tracked(prep) => {
             prep.finish(Layered { x, weight, slopes: slopes.into() }, outputs)
         }
         OpsKind::UnTracked(prep) => prep.finish(outputs),
     };
-    Tensor::from_primitive(TensorPrimitive::Float(outputs))
+    Tensor::from_primitive::<Autodiff<Host>>(outputs)
 }
 
 /// Puts the activation of each sum in its place; the derivatives there.
@@ -89,34 +105,37 @@ struct Dense;
 /// What they need.
 #[derive(Clone, Debug)]
 struct Layered {
-    x: Tensor<Plain, 2>,
-    weight: Tensor<Plain, 2>,
+    x: FloatTensor<Host>,
+    weight: FloatTensor<Host>,
     /// Derivatives of the activation.
     slopes: Arc<[f32]>,
 }
 
-impl Backward<Plain, 3> for Dense {
+impl Backward<Host, 3> for Dense {
     type State = Layered;
 
     fn backward(self, ops: Ops<Layered, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
         let Layered { x, weight, slopes } = ops.state;
-        let seeds = grads.consume::<Plain>(&ops.node);
-        let seeds = Tensor::<Plain, 2>::from_primitive(TensorPrimitive::Float(seeds));
-        let shape = seeds.dims();
-        let mut seeds = floats(seeds);
+        let seeds = grads.consume::<Host>(&ops.node);
+        let (device, shape) = (seeds.device(), seeds.shape().dims());
+        let mut seeds = values::<Host>(seeds);
         seeds.iter_mut().zip(&*slopes).for_each(|(seed, slope)| *seed *= slope);
         let mut sums = vec![0.0; shape[1]];
         for row in seeds.chunks_exact(shape[1]) {
             sums.iter_mut().zip(row).for_each(|(sum, seed)| *sum += seed);
         }
-        let seeds = tensor::<Plain>(seeds, shape);
-        let mut register = |parent: usize, slopes: &dyn Fn() -> Tensor<Plain, 2>| {
-            if let Some(parent) = &ops.parents[parent] {
-                grads.register::<Plain>(parent.id, slopes().into_primitive().tensor());
-            }
-        };
-        register(0, &|| seeds.clone().matmul(weight.clone().transpose()));
-        register(1, &|| x.clone().transpose().matmul(seeds.clone()));
-        register(2, &|| tensor(sums.clone(), [1, shape[1]]));
+        let seeds = primitive::<Host>(seeds, shape, &device);
+        let [to_x, to_weight, to_bias] = ops.parents;
+        if let Some(node) = to_x {
+            let slopes = Host::float_matmul(seeds.clone(), Host::float_transpose(weight));
+            grads.register::<Host>(node.id, slopes);
+        }
+        if let Some(node) = to_weight {
+            grads.register::<Host>(node.id, Host::float_matmul(Host::float_transpose(x), seeds));
+        }
+        if let Some(node) = to_bias {
+            let sums = primitive::<Host>(sums, [1, shape[1]], &device);
+            grads.register::<Host>(node.id, sums);
+        }
     }
 }

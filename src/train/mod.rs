@@ -9,6 +9,8 @@ pub mod backup;
 pub mod checkpoint;
 #[cfg(feature = "train")]
 pub mod ddpg;
+#[cfg(feature = "train")]
+pub mod device;
 pub mod disturbed;
 pub mod environments;
 pub mod gae;

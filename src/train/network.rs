@@ -1,22 +1,12 @@
 //! Networks under training: flat parameters, their forward pass on tensors, and export as [`Mlp`].
 
-use burn_autodiff::Autodiff;
-use burn_autodiff::grads::Gradients;
-use burn_ndarray::{NdArray, NdArrayDevice};
-use burn_tensor::Tensor;
+use burn_tensor::{Gradients, Tensor};
 
+use super::device::{Device, floats};
 use super::layer::{Curve, layer};
-use super::physics::{floats, tensor};
 use crate::error::Result;
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
 use crate::rollout::Stream;
-
-/// Tensors without derivatives.
-pub type Plain = NdArray<f32>;
-/// Tensors with derivatives.
-pub type Differentiable = Autodiff<Plain>;
-/// Where they lie.
-pub type Device = NdArrayDevice;
 
 /// What a network looks like.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,46 +73,40 @@ impl Network {
         Self { shape, parameters: drawn.into_iter().map(|lane| lane.0[0]).collect() }
     }
 
-    /// The network as tensors whose derivatives are wanted.
-    pub fn bind(&self) -> Bound {
-        self.bound(Tensor::require_grad)
+    /// The network as tensors on `device` whose derivatives are wanted.
+    pub fn bind(&self, device: &Device) -> Bound {
+        self.bound(device, Tensor::require_grad)
     }
 
-    /// The network as tensors that nothing is derived by; its inputs may be.
-    pub fn fixed(&self) -> Bound {
-        self.bound(|leaf| leaf)
+    /// The network as tensors on `device` that nothing is derived by; its inputs may be.
+    pub fn fixed(&self, device: &Device) -> Bound {
+        self.bound(device, |leaf| leaf)
     }
 
     /// The network as tensors, each leaf as `mark` makes it.
-    fn bound(
-        &self,
-        mark: impl Fn(Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2>,
-    ) -> Bound {
+    fn bound(&self, device: &Device, mark: impl Fn(Tensor<2>) -> Tensor<2>) -> Bound {
         let mut rest = self.parameters.as_slice();
         let mut leaves = Vec::new();
         for [inputs, outputs] in self.shape.layers() {
             for rows in [inputs, 1] {
                 let (values, after) = rest.split_at(rows * outputs);
-                leaves.push(mark(tensor(values.to_vec(), [rows, outputs])));
+                leaves.push(mark(device.tensor(values.to_vec(), [rows, outputs])));
                 rest = after;
             }
         }
-        let mut layers: Vec<[Tensor<Differentiable, 2>; 2]> =
+        let mut layers: Vec<[Tensor<2>; 2]> =
             leaves.chunks(2).map(|pair| [pair[0].clone(), pair[1].clone()]).collect();
-        layers[0] = self.normalised(&layers[0]);
+        layers[0] = self.normalised(device, &layers[0]);
         Bound { leaves, layers, activation: self.shape.activation, output: self.shape.output }
     }
 
     /// The first layer for inputs as they are: `W (x - middle) scale + b`.
-    fn normalised(
-        &self,
-        [weight, bias]: &[Tensor<Differentiable, 2>; 2],
-    ) -> [Tensor<Differentiable, 2>; 2] {
+    fn normalised(&self, device: &Device, [weight, bias]: &[Tensor<2>; 2]) -> [Tensor<2>; 2] {
         let count = self.shape.inputs.len();
         let scale = (0..count).map(|i| self.shape.scale(i)).collect();
         let shift = (0..count).map(|i| -self.shape.middle(i)).collect();
-        let weight = weight.clone() * tensor(scale, [count, 1]);
-        let bias = bias.clone() + tensor(shift, [1, count]).matmul(weight.clone());
+        let weight = weight.clone() * device.tensor(scale, [count, 1]);
+        let bias = bias.clone() + device.tensor(shift, [1, count]).matmul(weight.clone());
         [weight, bias]
     }
 
@@ -131,7 +115,7 @@ impl Network {
     /// # Errors
     /// [`crate::Error::Invalid`] if a parameter is not finite.
     pub fn export(&self, order: Vec<String>) -> Result<Mlp> {
-        let bound = self.bind();
+        let bound = self.fixed(&Device::cpu());
         let layers = bound.layers.into_iter().map(|[weight, bias]| {
             let [inputs, outputs] = weight.dims();
             let weight = floats(weight.inner().transpose());
@@ -145,15 +129,15 @@ impl Network {
 /// A network as tensors.
 #[derive(Clone, Debug)]
 pub struct Bound {
-    leaves: Vec<Tensor<Differentiable, 2>>,
-    layers: Vec<[Tensor<Differentiable, 2>; 2]>,
+    leaves: Vec<Tensor<2>>,
+    layers: Vec<[Tensor<2>; 2]>,
     activation: Activation,
     output: OutputActivation,
 }
 
 impl Bound {
     /// The outputs `[rows, outputs]` for `inputs` `[rows, inputs]`.
-    pub fn forward(&self, inputs: Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2> {
+    pub fn forward(&self, inputs: Tensor<2>) -> Tensor<2> {
         let mut x = inputs;
         for (i, [weight, bias]) in self.layers.iter().enumerate() {
             let curve = match i + 1 == self.layers.len() {
@@ -168,7 +152,7 @@ impl Bound {
     /// The derivatives by the parameters, in the order of [`Network::parameters`]; 0 for those
     /// that the loss does not depend on.
     pub fn gradient(&self, grads: &Gradients) -> Vec<f32> {
-        let one = |leaf: &Tensor<Differentiable, 2>| match leaf.grad(grads) {
+        let one = |leaf: &Tensor<2>| match leaf.grad(grads) {
             Some(slopes) => floats(slopes),
             None => vec![0.0; leaf.dims().iter().product()],
         };

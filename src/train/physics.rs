@@ -2,14 +2,18 @@
 
 use std::sync::Arc;
 
+use burn_autodiff::Autodiff;
 use burn_autodiff::checkpoint::base::Checkpointer;
 use burn_autodiff::checkpoint::strategy::NoCheckpointing;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
-use burn_tensor::backend::Backend;
-use burn_tensor::{Tensor, TensorData, TensorPrimitive};
+use burn_backend::{Backend, TensorMetadata};
+use burn_dispatch::{DispatchKindConversion, DispatchTensor};
+use burn_tensor::Tensor;
 
-use super::network::{Device, Differentiable, Plain};
+use super::device::{Host, parts, primitive, values};
+#[cfg(feature = "train-gpu")]
+use super::device::{Remote, on_host};
 use super::tape::Tape;
 use crate::real::Lanes;
 
@@ -17,34 +21,50 @@ use crate::real::Lanes;
 const WIDTH: usize = 16;
 
 /// The outputs `[rows, outputs]` of `tape` for inputs that stand side by side, `[rows, columns]`
-/// each, with derivatives.
+/// each, with derivatives, on their device.
 ///
 /// One operation for the whole graph: node by node, each of a few thousand small tensors would
-/// cost more to book than to compute.
+/// cost more to book than to compute. It runs in lanes of the processor wherever the tensors are:
+/// what crosses to an adapter and back is a few numbers per row.
 ///
 /// # Panics
 /// If the columns are not the tape's inputs, or the tensors have not the same rows.
 pub fn apply<const N: usize>(
     tape: &Arc<Tape>,
     temperature: f32,
-    inputs: [Tensor<Differentiable, 2>; N],
-) -> Tensor<Differentiable, 2> {
+    inputs: [Tensor<2>; N],
+) -> Tensor<2> {
     let rows = inputs[0].dims()[0];
     assert!(inputs.iter().all(|input| input.dims()[0] == rows), "rows of the inputs");
-    let nodes = inputs.each_ref().map(|input| input.clone().into_primitive().tensor().node);
-    let state = Swept {
-        tape: tape.clone(),
-        temperature,
-        inputs: Batch::new(rows, inputs.map(Tensor::inner)).into(),
-    };
-    let outputs = tensor::<Plain>(state.forward(), [rows, tape.outputs()]);
-    let outputs = outputs.into_primitive().tensor();
-    let sweep = Backward::<Plain, N>::prepare::<NoCheckpointing>(Sweep, nodes);
+    #[cfg(feature = "train-gpu")]
+    if !on_host(&inputs[0]) {
+        return swept::<Remote, N>(tape, temperature, inputs);
+    }
+    swept::<Host, N>(tape, temperature, inputs)
+}
+
+/// The same for tensors of the backend `B`.
+fn swept<B: Backend, const N: usize>(
+    tape: &Arc<Tape>,
+    temperature: f32,
+    inputs: [Tensor<2>; N],
+) -> Tensor<2>
+where
+    DispatchTensor: DispatchKindConversion<Autodiff<B>>,
+{
+    let [rows, _] = inputs[0].dims();
+    let (inputs, nodes): (Vec<_>, Vec<_>) = inputs.map(parts::<B>).into_iter().unzip();
+    let device = inputs[0].device();
+    let state =
+        Swept { tape: tape.clone(), temperature, inputs: Batch::new::<B>(rows, inputs).into() };
+    let outputs = primitive::<B>(state.forward(), [rows, tape.outputs()], &device);
+    let nodes = nodes.try_into().expect("one for each input");
+    let sweep = Backward::<B, N>::prepare::<NoCheckpointing>(Sweep, nodes);
     let outputs = match sweep.compute_bound().stateful() {
         OpsKind::Tracked(prep) => prep.finish(state, outputs),
         OpsKind::UnTracked(prep) => prep.finish(outputs),
     };
-    Tensor::from_primitive(TensorPrimitive::Float(outputs))
+    Tensor::from_primitive::<Autodiff<B>>(outputs)
 }
 
 /// The reverse sweep of a tape over a batch.
@@ -60,18 +80,17 @@ struct Swept {
     inputs: Arc<Batch>,
 }
 
-impl<const N: usize> Backward<Plain, N> for Sweep {
+impl<B: Backend, const N: usize> Backward<B, N> for Sweep {
     type State = Swept;
 
     fn backward(self, ops: Ops<Swept, N>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let seeds = grads.consume::<Plain>(&ops.node);
-        let seeds = floats::<2>(Tensor::from_primitive(TensorPrimitive::Float(seeds)));
-        let slopes = ops.state.backward(&seeds);
+        let seeds = grads.consume::<B>(&ops.node);
+        let device = seeds.device();
+        let slopes = ops.state.backward(values::<B>(seeds));
         let rows = ops.state.inputs.rows;
         for (parent, (slopes, columns)) in ops.parents.into_iter().zip(slopes) {
             if let Some(parent) = parent {
-                let slopes = tensor::<Plain>(slopes, [rows, columns]).into_primitive().tensor();
-                grads.register::<Plain>(parent.id, slopes);
+                grads.register::<B>(parent.id, primitive::<B>(slopes, [rows, columns], &device));
             }
         }
     }
@@ -92,9 +111,9 @@ impl Swept {
     }
 
     /// The derivatives by each of the inputs, row by row, with their columns.
-    fn backward(&self, seeds: &[f32]) -> Vec<(Vec<f32>, usize)> {
+    fn backward(&self, seeds: Vec<f32>) -> Vec<(Vec<f32>, usize)> {
         let (tape, inputs) = (&self.tape, &self.inputs);
-        let seeds = Batch { rows: inputs.rows, parts: vec![(seeds.to_vec(), tape.outputs())] };
+        let seeds = Batch { rows: inputs.rows, parts: vec![(seeds, tape.outputs())] };
         let empty = |(_, columns): &(Vec<f32>, usize)| (vec![0.0; inputs.rows * columns], *columns);
         let mut slopes: Vec<_> = inputs.parts.iter().map(empty).collect();
         let (mut lanes, mut seeded) = (Vec::new(), Vec::new());
@@ -124,12 +143,13 @@ struct Batch {
 }
 
 impl Batch {
-    fn new<const N: usize>(rows: usize, parts: [Tensor<Plain, 2>; N]) -> Self {
-        let part = |part: Tensor<Plain, 2>| {
-            let columns = part.dims()[1];
-            (floats(part), columns)
+    /// The numbers of tensors of `rows` rows.
+    fn new<B: Backend>(rows: usize, parts: Vec<B::FloatTensorPrimitive>) -> Self {
+        let part = |part: B::FloatTensorPrimitive| {
+            let [_, columns] = part.shape().dims();
+            (values::<B>(part), columns)
         };
-        Self { rows, parts: parts.map(part).into() }
+        Self { rows, parts: parts.into_iter().map(part).collect() }
     }
 
     /// The rows of tile number `tile` as columns of lanes; lanes without a row hold zeros.
@@ -155,20 +175,4 @@ fn store(lanes: impl Iterator<Item = Lanes<WIDTH>>, rows: &mut [f32], columns: u
             row[i] = value;
         }
     }
-}
-
-/// A tensor from its numbers, row by row.
-pub(super) fn tensor<B: Backend<Device = Device>>(
-    values: Vec<f32>,
-    shape: [usize; 2],
-) -> Tensor<B, 2> {
-    Tensor::from_data(TensorData::new(values, shape), &Device::Cpu)
-}
-
-/// The numbers of a tensor, row by row.
-///
-/// # Panics
-/// If they are not f32, which no tensor here is.
-pub(super) fn floats<const D: usize>(tensor: Tensor<Plain, D>) -> Vec<f32> {
-    tensor.into_data().into_vec().expect("tensors are of f32")
 }

@@ -6,10 +6,10 @@ use burn_tensor::Tensor;
 
 use super::adam::Adam;
 use super::analytic::{LAST, Task};
+use super::device::{floats, number};
 use super::environments::Environments;
 use super::gae::{Step, advantages};
-use super::network::{Differentiable, Network, Shape};
-use super::physics::{floats, tensor};
+use super::network::{Network, Shape};
 use super::reward::Reward;
 use super::run::Learner;
 use super::score::{share, successes};
@@ -116,9 +116,10 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
             }
             after.extend_from_slice(next.as_flattened());
         }
+        let device = &self.task.device;
         let told = |rows: &[f32]| {
-            let rows = tensor(rows.to_vec(), [count * steps, NX]);
-            floats(self.value.fixed().forward(rows).inner())
+            let rows = device.tensor(rows.to_vec(), [count * steps, NX]);
+            floats(self.value.fixed(device).forward(rows).inner())
         };
         let values = told(&seen.states).into_iter().zip(told(&after));
         let steps: Vec<Step> = flown
@@ -138,8 +139,9 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
     /// One step of all plants, number `number`: draws their controls, notes them, and returns the
     /// next states.
     fn step(&self, number: u64, states: &[[f32; NX]], seen: &mut Experience) -> Vec<[f32; NX]> {
-        let rows = tensor(states.as_flattened().to_vec(), [states.len(), NX]);
-        let means = floats(self.policy.fixed().forward(rows).inner());
+        let device = &self.task.device;
+        let rows = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let means = floats(self.policy.fixed(device).forward(rows).inner());
         let noise = Stream::new(self.task.seed, Purpose::TrainNoise, 0);
         let first = number * states.len() as u64;
         let next = |(i, (x, mean)): (usize, (&[f32; NX], &[f32]))| {
@@ -170,14 +172,14 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
 
     /// One update of policy, spread and value on the rows `chosen`; returns the loss.
     fn improve(&mut self, seen: &Experience, chosen: &[usize], progress: [u64; 2]) -> f64 {
-        let rows = chosen.len();
+        let (device, rows) = (&self.task.device, chosen.len());
         let take = |from: &[f32], columns: usize| {
             let row = |&i: &usize| from[i * columns..(i + 1) * columns].iter().copied();
-            tensor(chosen.iter().flat_map(row).collect(), [rows, columns])
+            device.tensor(chosen.iter().flat_map(row).collect(), [rows, columns])
         };
-        let states: Tensor<Differentiable, 2> = take(&seen.states, NX);
-        let (policy, value) = (self.policy.bind(), self.value.bind());
-        let spread = tensor(self.spread.clone(), [1, NU]).require_grad();
+        let states = take(&seen.states, NX);
+        let (policy, value) = (self.policy.bind(device), self.value.bind(device));
+        let spread = device.tensor(self.spread.clone(), [1, NU]).require_grad();
         let apart = take(&seen.controls, NU) - policy.forward(states.clone());
         let density = density(apart, &spread);
         let ratio = (density - take(&seen.densities, 1)).exp();
@@ -194,7 +196,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         for ((parameters, gradient), moments) in fitted {
             moments.update(parameters, &gradient, &self.settings.optimiser, progress);
         }
-        floats(loss.inner()).iter().map(|loss| f64::from(*loss)).sum()
+        number(loss)
     }
 
     /// The numbers below `count` in the random order number `number`.
@@ -209,26 +211,19 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
 
 /// Logarithm of the density `[rows, 1]` of normal numbers that lie `apart` from their means, but
 /// for a constant; `spread` has the logarithms of the standard deviations.
-fn density(
-    apart: Tensor<Differentiable, 2>,
-    spread: &Tensor<Differentiable, 2>,
-) -> Tensor<Differentiable, 2> {
+fn density(apart: Tensor<2>, spread: &Tensor<2>) -> Tensor<2> {
     let z = apart / spread.clone().exp();
     ((z.clone() * z).mul_scalar(-0.5) - spread.clone()).sum_dim(1)
 }
 
 /// Mean gain of probabilities that change by `ratio`, where a change beyond `clip` gains nothing.
-fn clipped(
-    ratio: Tensor<Differentiable, 2>,
-    advantages: Tensor<Differentiable, 2>,
-    clip: f64,
-) -> Tensor<Differentiable, 1> {
+fn clipped(ratio: Tensor<2>, advantages: Tensor<2>, clip: f64) -> Tensor<1> {
     let held = ratio.clone().clamp(1.0 - clip, 1.0 + clip) * advantages.clone();
     (ratio * advantages).min_pair(held).mean()
 }
 
 /// Advantages with mean 0 and variance 1.
-fn scaled(advantages: Tensor<Differentiable, 2>) -> Tensor<Differentiable, 2> {
+fn scaled(advantages: Tensor<2>) -> Tensor<2> {
     let centred = advantages.clone() - advantages.mean_dim(0);
     let variance = (centred.clone() * centred.clone()).mean_dim(0);
     centred / variance.sqrt().add_scalar(1e-8)

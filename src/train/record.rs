@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::settings::Method;
+use crate::backend::Event;
 use crate::files::{Column, Table};
 use crate::scenario::record::Provenance;
 
@@ -29,6 +30,9 @@ pub struct TrainRecord {
     pub curve: Vec<CurvePoint>,
     /// The networks.
     pub networks: Vec<NetworkRecord>,
+    /// What failed on the adapter and was worked around.
+    #[serde(default)]
+    pub events: Vec<Event>,
 }
 
 impl TrainRecord {

@@ -184,6 +184,7 @@ impl Run<'_> {
             scores: learner.score_names(),
             curve: progress.curve,
             networks,
+            events: Vec::new(),
         };
         Ok(Trained { record, files })
     }

@@ -1,8 +1,8 @@
 //! Value networks by regression on the measures of the engine's own rollouts.
 
 use super::adam::Adam;
+use super::device::{Device, floats, number};
 use super::network::Network;
-use super::physics::{floats, tensor};
 use super::run::Learner;
 use super::samples::Samples;
 use super::settings::ValueSettings;
@@ -19,6 +19,7 @@ pub struct Value {
     choice: Stream,
     samples: Samples,
     held_out: Samples,
+    device: Device,
     network: Network,
     adam: Adam,
 }
@@ -34,6 +35,8 @@ pub struct Lesson {
     pub samples: Samples,
     /// What it is scored on.
     pub held_out: Samples,
+    /// Where tensors lie.
+    pub device: Device,
     /// Seed of the choice of batches.
     pub seed: u64,
 }
@@ -44,14 +47,14 @@ impl Value {
     /// # Errors
     /// [`Error::Invalid`] if no sample has a finite measure.
     pub fn new(lesson: Lesson, network: Network, settings: ValueSettings) -> Result<Self> {
-        let Lesson { name, order, samples, held_out, seed } = lesson;
+        let Lesson { name, order, samples, held_out, device, seed } = lesson;
         if samples.is_empty() || held_out.is_empty() {
             let problem = "every rollout meets a state that is not finite: nothing to learn from";
             return Err(Error::invalid("train.value", problem));
         }
         let choice = Stream::new(seed, Purpose::TrainChoice, 0);
         let adam = Adam::new(network.parameters.len());
-        Ok(Self { name, order, settings, choice, samples, held_out, network, adam })
+        Ok(Self { name, order, settings, choice, samples, held_out, device, network, adam })
     }
 }
 
@@ -65,9 +68,9 @@ impl Learner for Value {
             inputs.extend_from_slice(self.samples.row(chosen));
             measures.push(self.samples.measures[chosen]);
         }
-        let bound = self.network.bind();
-        let outputs = bound.forward(tensor(inputs, [rows, self.samples.columns]));
-        let apart = (outputs - tensor(measures, [rows, 1])).abs();
+        let bound = self.network.bind(&self.device);
+        let outputs = bound.forward(self.device.tensor(inputs, [rows, self.samples.columns]));
+        let apart = (outputs - self.device.tensor(measures, [rows, 1])).abs();
         // Smooth L1: quadratic up to 1, then linear.
         let near = apart.clone().clamp_max(1.0);
         let loss = (near.clone() * (apart - near.mul_scalar(0.5))).mean();
@@ -75,7 +78,7 @@ impl Learner for Value {
         let progress = [iteration, self.settings.iterations];
         let optimiser = &self.settings.optimiser;
         self.adam.update(&mut self.network.parameters, &gradient, optimiser, progress);
-        Ok(floats(loss.inner()).iter().map(|loss| f64::from(*loss)).sum())
+        Ok(number(loss))
     }
 
     fn score_names(&self) -> Vec<String> {
@@ -87,8 +90,9 @@ impl Learner for Value {
 
     fn scores(&self) -> Result<Vec<f64>> {
         let held_out = &self.held_out;
-        let inputs = tensor(held_out.inputs.clone(), [held_out.len(), held_out.columns]);
-        let told = floats(self.network.bind().forward(inputs).inner());
+        let inputs =
+            self.device.tensor(held_out.inputs.clone(), [held_out.len(), held_out.columns]);
+        let told = floats(self.network.bind(&self.device).forward(inputs).inner());
         let pairs = || told.iter().zip(&held_out.measures);
         let right = pairs().filter(|(told, measure)| (**told > 0.0) == (**measure > 0.0)).count();
         let mean =

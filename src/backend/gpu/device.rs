@@ -116,7 +116,7 @@ pub enum Choice {
 
 /// The adapters of this machine, best first; empty where there is no driver.
 pub fn adapters() -> Vec<Adapter> {
-    found().into_iter().map(|(adapter, _)| adapter).collect()
+    found(&instance()).into_iter().map(|(adapter, _)| adapter).collect()
 }
 
 /// What is asked for where the adapter has it; nothing depends on it.
@@ -143,7 +143,7 @@ pub(super) struct Device {
 impl Device {
     /// Opens the adapter that `choice` names.
     pub(super) fn open(choice: &Choice) -> Result<Self> {
-        let all = found();
+        let all = found(&instance());
         let names: Vec<String> = all.iter().map(|(adapter, _)| adapter.to_string()).collect();
         let fits = |adapter: &Adapter| match choice {
             Choice::Hardware => adapter.kind != AdapterKind::Software,
@@ -162,7 +162,7 @@ impl Device {
     /// # Errors
     /// [`Error::Device`] if it is gone or does not open.
     pub(super) fn reopened(&self) -> Result<Self> {
-        let same = found().into_iter().find(|(adapter, _)| *adapter == self.adapter);
+        let same = found(&instance()).into_iter().find(|(adapter, _)| *adapter == self.adapter);
         let gone = || Error::Device(format!("{} is not there any more", self.adapter));
         let (adapter, handle) = same.ok_or_else(gone)?;
         let injector = Arc::clone(&self.injector);
@@ -285,23 +285,27 @@ impl Device {
     }
 }
 
-/// What `poll` returns, or what it panics with: wgpu does where a device is lost while it waits.
-fn contained<T>(poll: impl FnOnce() -> T) -> std::result::Result<T, String> {
+/// What `work` returns, or what it panics with: wgpu does where a device is lost while it waits.
+pub(crate) fn contained<T>(work: impl FnOnce() -> T) -> std::result::Result<T, String> {
     // The device is given up after that, so nobody sees what the panic left behind.
-    std::panic::catch_unwind(AssertUnwindSafe(poll)).map_err(|panic| {
+    std::panic::catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
         text.unwrap_or("the driver gave no reason").to_owned()
     })
 }
 
-/// Adapters that can run compute kernels, best first.
-fn found() -> Vec<(Adapter, wgpu::Adapter)> {
+/// Access to the drivers of this machine.
+pub(super) fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     // No validation layers and no debug messages: the listing stays silent.
     descriptor.flags = wgpu::InstanceFlags::empty();
     descriptor.backends = wgpu::Backends::PRIMARY;
-    let instance = wgpu::Instance::new(descriptor);
+    wgpu::Instance::new(descriptor)
+}
+
+/// Adapters that can run compute kernels, best first.
+pub(super) fn found(instance: &wgpu::Instance) -> Vec<(Adapter, wgpu::Adapter)> {
     let handles = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     let mut all: Vec<_> = handles
         .into_iter()

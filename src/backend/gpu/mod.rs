@@ -8,6 +8,8 @@ mod device;
 mod drive;
 mod fault;
 mod kernel;
+#[cfg(feature = "train-gpu")]
+mod lent;
 mod limits;
 mod mppi;
 mod mppi_plan;
@@ -35,6 +37,8 @@ use opened::{Opened, Setup};
 use recover::State;
 
 pub use buffer::Params;
+#[cfg(feature = "train")]
+pub(crate) use device::contained;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
 pub use fault::Injection;
 pub use limits::DeviceLimits;
@@ -76,6 +80,15 @@ impl Gpu {
     #[must_use]
     pub fn with_fallback(self, cpu: Cpu) -> Self {
         Self { fallback: Some(cpu), ..self }
+    }
+
+    /// The same adapter, opened once more for a library with kernels of its own.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if it is gone or does not open.
+    #[cfg(feature = "train-gpu")]
+    pub(crate) fn lend(&self) -> Result<lent::Lent> {
+        lent::Lent::open(&self.adapter)
     }
 
     /// What failed so far and was worked around, in order.

@@ -29,6 +29,6 @@ pub(super) fn run(global: &Global, config: &Path, method: Option<Method>) -> Res
 #[cfg(not(feature = "train"))]
 fn refused(_: &Path) -> Result<Outcome> {
     let problem = "this program was built without training; build it with `cargo build --release \
-                   --features train`";
+                   --features train`, or with `--features train-gpu` to train on a GPU too";
     Err(crate::error::Error::invalid("train", problem))
 }

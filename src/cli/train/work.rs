@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::backend::Backend;
-use crate::cli::args::Global;
+use crate::cli::args::{BackendName, Global};
 use crate::cli::progress::Progress;
 use crate::cli::{Outcome, devices, report};
 use crate::config::{Config, Job, SystemJob};
@@ -19,6 +19,7 @@ use crate::rollout::{Plant, Purpose, Stream};
 use crate::scenario::{Context, provenance, tightened};
 use crate::system::System;
 use crate::train::analytic::{Analytic, LAST, Task};
+use crate::train::device::Device;
 use crate::train::network::{Network, Shape};
 use crate::train::record::{Origin, TrainRecord};
 use crate::train::run::{Learner, Run, Trained};
@@ -37,20 +38,33 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
     let begun = Instant::now();
     keep_memory();
     let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let (backend, progress) = (Backend::Cpu(devices::cpu(global)?), Progress::new(global));
+    let (backend, progress) = (opened(global)?, Progress::new(global));
+    let device = Device::of(&backend)?;
     let settings = config.train_settings()?;
-    let training = Training { config, settings, backend: &backend, watch: &progress, out: &out };
-    let trained = match settings.method {
+    let training =
+        Training { config, settings, backend: &backend, device, watch: &progress, out: &out };
+    let mut trained = match settings.method {
         Method::Analytic | Method::Ddpg | Method::Ppo => config.with_system(training)?,
         Method::Value | Method::ActionValue => {
             config.with_plant(&config.policy_source(folder)?, training)?
         }
     };
     progress.finish();
+    devices::note_events(global, &backend);
+    trained.record.events = backend.events();
     let files = write(&out, &trained)?;
     let seconds = begun.elapsed().as_secs_f64();
     report(global, &trained.record, || text(&trained.record, &files, seconds))?;
     Ok(Outcome::Done)
+}
+
+/// The backend that the flags ask for; of a program without tensors on adapters, `auto` is the CPU.
+fn opened(global: &Global) -> Result<Backend> {
+    let unasked = global.backend == BackendName::Auto && global.device.is_none();
+    match unasked && cfg!(not(feature = "train-gpu")) {
+        true => devices::cpu(global).map(Backend::Cpu),
+        false => devices::open(global),
+    }
 }
 
 /// Keeps the C library from handing memory back to the system after each iteration, only to ask for
@@ -64,6 +78,7 @@ struct Training<'a> {
     config: &'a Config,
     settings: &'a TrainSettings,
     backend: &'a Backend,
+    device: Device,
     watch: &'a Progress,
     out: &'a Path,
 }
@@ -97,7 +112,8 @@ impl Training<'_> {
         let provenance = provenance(self.backend, plant, self.config.seed, config);
         let origin = Origin { method: self.settings.method, provenance };
         let TrainSettings { interval, patience, .. } = *self.settings;
-        Run { folder: self.out, origin, total, interval, patience }.train(learner, self.watch)
+        let run = Run { folder: self.out, origin, total, interval, patience };
+        self.device.contained(|| run.train(learner, self.watch))
     }
 }
 
@@ -130,6 +146,7 @@ impl SystemJob for Training<'_> {
         let task = Task {
             system,
             backend,
+            device: self.device.clone(),
             spec: checked.spec,
             losses,
             mixture: config.mixture(&axes)?,
@@ -176,6 +193,7 @@ impl Job for Training<'_> {
             order,
             samples: samples(Purpose::TrainStart, settings.value.states)?,
             held_out: samples(Purpose::HeldOut, settings.held_out)?,
+            device: self.device.clone(),
             seed: config.seed,
         };
         let network = self.network(inputs, 1, OutputActivation::Identity, 1.0);

@@ -56,6 +56,7 @@ impl Training<'_> {
         Ok(Task {
             system,
             backend: self.backend,
+            device: self.device.clone(),
             spec: self.config.settings(&axes)?.spec,
             losses: None,
             mixture: self.config.mixture(&axes)?,
