@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod common;
+mod training;
 
 use std::cell::Cell;
 use std::path::Path;
@@ -12,12 +13,12 @@ use std::sync::Arc;
 use burn_tensor::{Tensor, activation};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
-use reachcast::config::{Config, Overrides};
+use reachcast::config::Config;
 use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::real::record::{Graph, Node, record};
 use reachcast::rollout::{
-    Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening, reach_avoid,
+    Plant, Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, reach_avoid,
 };
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
@@ -35,30 +36,7 @@ use reachcast::train::settings::{AnalyticSettings, Method, TrainSettings};
 use reachcast::train::tape::Tape;
 use reachcast::train::value::{Lesson, Value};
 use reachcast::{Error, Result};
-
-/// The configuration of a system with its defaults.
-fn config(system: &str, set: &[&str]) -> Config {
-    let text = format!("seed = 5\nsystem.name = '{system}'\n[train]\nmethod = 'analytic'\n");
-    let set = set.iter().map(ToString::to_string).collect();
-    let overrides = Overrides { set, ..Overrides::default() };
-    Config::from_table(toml::from_str(&text).unwrap(), "test", &overrides).unwrap()
-}
-
-fn settings(config: &Config) -> &TrainSettings {
-    config.train_settings().unwrap()
-}
-
-/// A random policy, its last layer `last` times as large as the others.
-fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-    hidden: &[usize],
-    last: f32,
-) -> Network {
-    let inputs = system.states().iter().map(|axis| [axis.low, axis.high]).collect();
-    let (activation, output) = (Activation::Relu, OutputActivation::Tanh);
-    let shape = Shape { inputs, hidden: hidden.to_vec(), outputs: NU, activation, output };
-    Network::random(shape, Stream::new(5, Purpose::TrainWeight, 0), last)
-}
+use training::{config, losses, random, settings, task};
 
 /// Names of the states.
 fn order<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Vec<String> {
@@ -73,23 +51,8 @@ fn learner<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
     network: Network,
     losses: Option<Tightening>,
 ) -> Analytic<'a, S, NX, NU> {
-    let task = Task {
-        system,
-        backend,
-        device: Device::cpu(),
-        spec: config.spec().unwrap(),
-        losses,
-        mixture: config.mixture(&system.states()).unwrap(),
-        held_out: settings(config).held_out,
-        seed: config.seed,
-    };
+    let task = Task { losses, ..task(system, backend, &Device::cpu(), config) };
     Analytic::new(task, network, settings(config).analytic)
-}
-
-/// Losses that grow over the steps.
-fn losses(spec: &RolloutSpec) -> Tightening {
-    let grown = |rate: f32| (0..=spec.horizon).map(|t| rate * (t as f32).sqrt()).collect();
-    Tightening { target: grown(0.3), constraint: grown(0.2) }
 }
 
 /// `-tau ln(sum of exp(-x / tau))` in f64, from its definition.
@@ -161,7 +124,8 @@ fn control(parameters: &[f64], widths: &[usize], x: &[f64]) -> Vec<f64> {
 /// definition.
 #[test]
 fn slopes_of_the_softened_measure_are_central_differences_in_f64() {
-    let (system, backend, config) = (DroneRace::default(), cpu(1), config("drone-race", &[]));
+    let (system, backend, config) =
+        (DroneRace::default(), cpu(1), config("drone-race", "analytic", &[]));
     let (hidden, tau) = ([7, 5], 0.37_f32);
     let network = random(&system, &hidden, 1.0);
     let spec = config.spec().unwrap();
@@ -216,7 +180,8 @@ fn slopes_of_the_softened_measure_are_central_differences_in_f64() {
 /// where soft and hard choices agree.
 #[test]
 fn an_exported_network_measures_as_on_tensors() {
-    let (system, backend, config) = (DroneRace::default(), cpu(1), config("drone-race", &[]));
+    let (system, backend, config) =
+        (DroneRace::default(), cpu(1), config("drone-race", "analytic", &[]));
     let network = random(&system, &[64, 64], 1.0);
     let learner = learner(&system, &backend, &config, network.clone(), None);
     let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::HeldOut, 0, 500);
@@ -274,7 +239,7 @@ fn short(
     set: &[&str],
 ) -> Result<(TrainRecord, Mlp)> {
     let few = ["train.analytic.iterations=60", "train.interval=20", "train.held_out=512"];
-    let config = config("double-integrator", &[&few[..], set].concat());
+    let config = config("double-integrator", "analytic", &[&few[..], set].concat());
     let (system, backend) = (DoubleIntegrator::default(), cpu(threads));
     let network = random(&system, &settings(&config).hidden, LAST);
     let provenance = Provenance {
@@ -339,7 +304,7 @@ fn training_improves_and_ends_early() {
     let (record, policy) = short(folder.path(), 2, &Unwatched, &longer).unwrap();
     let scores: Vec<f64> = record.curve.iter().map(|point| point.scores[0]).collect();
     let best = scores.iter().copied().fold(0.0, f64::max);
-    let config = config("double-integrator", &[]);
+    let config = config("double-integrator", "analytic", &[]);
     let system = DoubleIntegrator::default();
     let held_out = config.mixture(&system.states()).unwrap().draw(5, Purpose::HeldOut, 0, 512);
     let share = |measures: Vec<f32>| {
@@ -365,7 +330,8 @@ fn training_improves_and_ends_early() {
 /// much of it the policy covers, and how often V(x) has the sign of the truth.
 #[test]
 fn carried_networks_know_the_set_in_closed_form() {
-    let (system, config) = (DoubleIntegrator::default(), config("double-integrator", &[]));
+    let (system, config) =
+        (DoubleIntegrator::default(), config("double-integrator", "analytic", &[]));
     let form = ClosedForm::of(&system);
     let loss = vec![0.0; config.spec().unwrap().horizon as usize + 1];
     let carried = |name: &str| {
@@ -396,7 +362,7 @@ fn carried_networks_know_the_set_in_closed_form() {
 fn samples_are_measures_in_f64() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
     // Few steps, so that the last one matters.
-    let config = config("double-integrator", &["rollout.horizon=6"]);
+    let config = config("double-integrator", "analytic", &["rollout.horizon=6"]);
     let policy = &BangBang { acceleration: 1.0 };
     let source = Source {
         plant: Plant { system: &system, policy },
@@ -439,7 +405,7 @@ fn samples_are_measures_in_f64() {
 #[test]
 fn a_value_network_learns_the_measure() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
-    let config = config("double-integrator", &["train.value.iterations=400"]);
+    let config = config("double-integrator", "analytic", &["train.value.iterations=400"]);
     let source = Source {
         plant: Plant { system: &system, policy: &BangBang { acceleration: 1.0 } },
         backend: &backend,
@@ -493,7 +459,7 @@ fn wrong_settings_name_their_key() {
             "train.starts[0].box.position: empty interval",
         ),
     ] {
-        let config = config("double-integrator", &[set]);
+        let config = config("double-integrator", "analytic", &[set]);
         let states = DoubleIntegrator::default().states();
         let refused = config.mixture(&states).map(|_| ()).unwrap_err();
         assert_eq!(refused.exit_code(), 2);
@@ -506,7 +472,7 @@ fn wrong_settings_name_their_key() {
 #[test]
 fn the_loss_is_the_mean_gain() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(1));
-    let config = config("double-integrator", &["train.analytic.certified=0.25"]);
+    let config = config("double-integrator", "analytic", &["train.analytic.certified=0.25"]);
     let network = random(&system, &[8], 1.0);
     let spec = config.spec().unwrap();
     let mut learner = learner(&system, &backend, &config, network.clone(), Some(losses(&spec)));
@@ -559,7 +525,7 @@ fn one_operation_per_graph_is_one_per_node() {
         let margins = [system.target(next), system.constraint(next)];
         next.into_iter().chain(margins).collect()
     });
-    let config = config("drone-race", &[]);
+    let config = config("drone-race", "analytic", &[]);
     let states = config.mixture(&system.states()).unwrap().draw(9, Purpose::TrainStart, 0, 37);
     let controls = Stream::new(9, Purpose::TrainControl, 0);
     let row = |i: usize| -> Vec<f32> {

@@ -7,6 +7,7 @@
 
 mod command;
 mod common;
+mod training;
 
 use std::ops::Range;
 
@@ -14,9 +15,8 @@ use burn_tensor::Tensor;
 use command::{Folder, document, refused};
 use common::{adapter, cpu};
 use reachcast::backend::Backend;
-use reachcast::config::{Config, Overrides};
 use reachcast::policy::{Activation, OutputActivation};
-use reachcast::rollout::{Plant, Purpose, Stream, Tightening};
+use reachcast::rollout::{Plant, Purpose, Stream};
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::ddpg::{Ddpg, Game};
@@ -27,9 +27,9 @@ use reachcast::train::ppo::{self, Ppo};
 use reachcast::train::reward::Reward;
 use reachcast::train::run::Learner;
 use reachcast::train::samples::Source;
-use reachcast::train::settings::TrainSettings;
 use reachcast::train::value::{self, Value};
 use reachcast::{Error, Result};
+use training::{config, intervals, losses, random, settings, task};
 
 /// Most rows and neurons that settings take.
 const MOST: usize = 1 << 15;
@@ -186,62 +186,14 @@ fn large_products_are_whole() {
     assert!(error < 1e-5, "{error}");
 }
 
-/// The configuration of a system with its defaults.
-fn config(system: &str, set: &[&str]) -> Config {
-    let text = format!("seed = 5\nsystem.name = '{system}'\n[train]\nmethod = 'analytic'\n");
-    let set = set.iter().map(ToString::to_string).collect();
-    let overrides = Overrides { set, ..Overrides::default() };
-    Config::from_table(toml::from_str(&text).unwrap(), "test", &overrides).unwrap()
-}
-
-fn settings(config: &Config) -> &TrainSettings {
-    config.train_settings().unwrap()
-}
-
-/// The intervals of the states.
-fn intervals<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Vec<[f32; 2]> {
-    system.states().iter().map(|axis| [axis.low, axis.high]).collect()
-}
-
-/// A random policy.
-fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-    hidden: Vec<usize>,
-    last: f32,
-) -> Network {
-    let (activation, output) = (Activation::Relu, OutputActivation::Tanh);
-    let shape = Shape { inputs: intervals(system), hidden, outputs: NU, activation, output };
-    Network::random(shape, Stream::new(5, Purpose::TrainWeight, 0), last)
-}
-
-/// What is trained on `system`.
-fn task<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &'a S,
-    backend: &'a Backend,
-    device: &Device,
-    config: &Config,
-) -> Task<'a, S, NX> {
-    Task {
-        system,
-        backend,
-        device: device.clone(),
-        spec: config.spec().unwrap(),
-        losses: None,
-        mixture: config.mixture(&system.states()).unwrap(),
-        held_out: settings(config).held_out,
-        seed: config.seed,
-    }
-}
-
 /// The slopes of both softened measures of the race by all parameters are the CPU's.
 #[test]
 fn slopes_of_the_softened_measure_are_the_cpus() {
     let Some(devices) = devices() else { return };
-    let (system, backend, config) = (DroneRace::default(), cpu(1), config("drone-race", &[]));
-    let network = random(&system, vec![64, 64], 1.0);
-    let spec = config.spec().unwrap();
-    let grown = |rate: f32| (0..=spec.horizon).map(|t| rate * (t as f32).sqrt()).collect();
-    let losses = Some(Tightening { target: grown(0.3), constraint: grown(0.2) });
+    let (system, backend, config) =
+        (DroneRace::default(), cpu(1), config("drone-race", "analytic", &[]));
+    let network = random(&system, &[64, 64], 1.0);
+    let losses = Some(losses(&config.spec().unwrap()));
     let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::TrainStart, 3, 100);
     let [expected, found] = devices.map(|device| {
         let task = Task { losses: losses.clone(), ..task(&system, &backend, &device, &config) };
@@ -287,9 +239,9 @@ fn agree<L: Learner>(make: impl Fn(&Device) -> L) {
 #[test]
 fn a_policy_through_the_dynamics_is_updated_as_on_the_cpu() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(1));
-    let config = config("double-integrator", &["train.held_out=256"]);
+    let config = config("double-integrator", "analytic", &["train.held_out=256"]);
     agree(|device| {
-        let network = random(&system, vec![32, 32], LAST);
+        let network = random(&system, &[32, 32], LAST);
         Analytic::new(task(&system, &backend, device, &config), network, settings(&config).analytic)
     });
 }
@@ -297,7 +249,7 @@ fn a_policy_through_the_dynamics_is_updated_as_on_the_cpu() {
 #[test]
 fn a_value_is_updated_as_on_the_cpu() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(1));
-    let config = config("double-integrator", &[]);
+    let config = config("double-integrator", "analytic", &[]);
     let source = Source {
         plant: Plant { system: &system, policy: &BangBang { acceleration: 1.0 } },
         backend: &backend,
@@ -328,7 +280,7 @@ fn a_value_is_updated_as_on_the_cpu() {
 fn the_players_of_a_game_are_updated_as_on_the_cpu() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(1));
     let set = ["train.ddpg.batch=64", "train.ddpg.replay=300", "train.held_out=256"];
-    let config = config("double-integrator", &set);
+    let config = config("double-integrator", "analytic", &set);
     agree(|device| {
         let game = Game {
             entries: config.disturbed(&system.states()).unwrap(),
@@ -350,7 +302,7 @@ fn a_policy_on_a_reward_is_updated_as_on_the_cpu() {
         "train.ppo.batch=200",
         "train.held_out=256",
     ];
-    let config = config("double-integrator", &set);
+    let config = config("double-integrator", "analytic", &set);
     agree(|device| {
         let ppo = settings(&config).ppo.clone();
         let goal = config.goal(&system.states()).unwrap();

@@ -5,6 +5,7 @@
 
 mod command;
 mod common;
+mod training;
 
 use std::cell::Cell;
 use std::path::Path;
@@ -12,13 +13,12 @@ use std::path::Path;
 use command::{Folder, document};
 use common::cpu;
 use reachcast::backend::Backend;
-use reachcast::config::{Config, Overrides};
+use reachcast::config::Config;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::rollout::{Plant, Purpose, RolloutSpec, Stream, Tightening, measure};
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
-use reachcast::train::analytic::Task;
 use reachcast::train::backup::Margins;
 use reachcast::train::ddpg::{Ddpg, Game};
 use reachcast::train::device::Device;
@@ -33,41 +33,7 @@ use reachcast::train::run::{Learner, Run};
 use reachcast::train::score::{share, successes};
 use reachcast::train::settings::TrainSettings;
 use reachcast::{Error, Result};
-
-/// The configuration of a system with its defaults.
-fn config(system: &str, set: &[&str]) -> Config {
-    let text = format!("seed = 5\nsystem.name = '{system}'\n[train]\nmethod = 'ddpg'\n");
-    let set = set.iter().map(ToString::to_string).collect();
-    let overrides = Overrides { set, ..Overrides::default() };
-    Config::from_table(toml::from_str(&text).unwrap(), "test", &overrides).unwrap()
-}
-
-fn settings(config: &Config) -> &TrainSettings {
-    config.train_settings().unwrap()
-}
-
-/// What is trained on the double integrator.
-fn task<'a>(
-    system: &'a DoubleIntegrator,
-    backend: &'a Backend,
-    config: &Config,
-) -> Task<'a, DoubleIntegrator, 2> {
-    Task {
-        system,
-        backend,
-        device: Device::cpu(),
-        spec: config.spec().unwrap(),
-        losses: None,
-        mixture: config.mixture(&system.states()).unwrap(),
-        held_out: settings(config).held_out,
-        seed: config.seed,
-    }
-}
-
-/// The box of the double integrator.
-fn intervals() -> Vec<[f32; 2]> {
-    DoubleIntegrator::default().states().iter().map(|axis| [axis.low, axis.high]).collect()
-}
+use training::{config, intervals, settings, task};
 
 /// The players of the double integrator and their critic.
 fn players<'a>(
@@ -77,10 +43,10 @@ fn players<'a>(
 ) -> Ddpg<'a, DoubleIntegrator, 2, 1> {
     let game = Game {
         entries: config.disturbed(&system.states()).unwrap(),
-        states: intervals(),
+        states: intervals(system),
         hidden: settings(config).hidden.clone(),
     };
-    Ddpg::new(task(system, backend, config), game, settings(config).ddpg.clone())
+    Ddpg::new(task(system, backend, &Device::cpu(), config), game, settings(config).ddpg.clone())
 }
 
 /// The policy of the double integrator on its ordinary reward.
@@ -92,8 +58,8 @@ fn pupil<'a>(
     let TrainSettings { ppo, hidden, .. } = settings(config);
     let goal = config.goal(&system.states()).unwrap();
     let reward = Reward { goal, weights: ppo.reward.clone() };
-    let lesson = Lesson { reward, states: intervals(), hidden: hidden.clone() };
-    Ppo::new(task(system, backend, config), lesson, ppo.clone())
+    let lesson = Lesson { reward, states: intervals(system), hidden: hidden.clone() };
+    Ppo::new(task(system, backend, &Device::cpu(), config), lesson, ppo.clone())
 }
 
 /// Stops the work after so many updates.
@@ -234,7 +200,7 @@ fn both_players_come_near_the_solution_of_the_game() {
         "train.ddpg.batch=128",
         "train.held_out=2048",
     ];
-    let config = config("double-integrator", &set);
+    let config = config("double-integrator", "ddpg", &set);
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
     let mut learner = players(&system, &backend, &config);
     let before = learner.scores().unwrap();
@@ -267,7 +233,7 @@ fn a_game_that_was_interrupted_comes_to_the_same() {
         "train.interval=20",
         "train.held_out=256",
     ];
-    let config = config("double-integrator", &set);
+    let config = config("double-integrator", "ddpg", &set);
     let system = DoubleIntegrator::default();
     let run = |folder: &Path, threads: usize, watch: &dyn Watch| {
         let backend = cpu(threads);
@@ -283,7 +249,7 @@ fn a_game_that_was_interrupted_comes_to_the_same() {
     assert!(run(&parts, 2, &Unwatched).unwrap() == whole);
     let names: Vec<&str> = whole.1.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["critic.safetensors", "disturbance.safetensors", "policy.safetensors"]);
-    let other = self::config("double-integrator", &[&set[..], &["seed=6"]].concat());
+    let other = self::config("double-integrator", "ddpg", &[&set[..], &["seed=6"]].concat());
     let backend = cpu(1);
     let mut learner = players(&system, &backend, &other);
     let others = trained(&mut learner, &folder.path().join("other"), &other, 60, &Unwatched);
@@ -309,7 +275,7 @@ fn a_replay_holds_the_latest_rows() {
 /// Plants start again at the horizon, where they are told to, and where a state is not finite.
 #[test]
 fn plants_start_again_when_an_episode_is_over() {
-    let config = config("double-integrator", &[]);
+    let config = config("double-integrator", "ddpg", &[]);
     let mixture = config.mixture(&DoubleIntegrator::default().states()).unwrap();
     let mut plants = Environments::new(mixture, 3, 4, 3);
     assert_eq!(plants.ages, [0.0, 1.0, 2.0]);
@@ -381,7 +347,7 @@ fn advantages_are_their_sums() {
 /// through the gate costs what leaving the target does.
 #[test]
 fn a_step_earns_progress_and_the_target() {
-    let config = config("drone-race", &[]);
+    let config = config("drone-race", "ddpg", &[]);
     let system = DroneRace::default();
     let weights = settings(&config).ppo.reward.clone();
     let (target, violation) = (weights.target as f32, weights.violation as f32);
@@ -407,7 +373,7 @@ fn a_step_earns_progress_and_the_target() {
 #[test]
 fn ppo_learns_to_reach() {
     let set = ["train.ppo.iterations=60", "train.held_out=2048"];
-    let config = config("double-integrator", &set);
+    let config = config("double-integrator", "ddpg", &set);
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
     let mut learner = pupil(&system, &backend, &config);
     let before = learner.scores().unwrap()[0];
@@ -428,7 +394,7 @@ fn ppo_learns_to_reach() {
 fn ppo_that_was_interrupted_comes_to_the_same() {
     let set = ["train.method=ppo", "train.ppo.environments=8", "train.ppo.batch=50"];
     let more = ["train.ppo.iterations=8", "train.interval=3", "train.held_out=256"];
-    let config = config("double-integrator", &[&set[..], &more].concat());
+    let config = config("double-integrator", "ddpg", &[&set[..], &more].concat());
     let system = DoubleIntegrator::default();
     let run = |folder: &Path, threads: usize, watch: &dyn Watch| {
         let backend = cpu(threads);
@@ -486,7 +452,7 @@ fn wrong_settings_name_their_key() {
         ("train.ppo.reward.violation=-1", "train.ppo.reward.violation: -1"),
         ("train.ppo.optimiser.rate=0", "train.ppo.optimiser.rate: 0"),
     ] {
-        let config = config("double-integrator", &[set]);
+        let config = config("double-integrator", "ddpg", &[set]);
         let refused = config.train_settings().map(|_| ()).unwrap_err();
         assert_eq!(refused.exit_code(), 2);
         assert!(refused.to_string().contains(words), "{set}: {refused}");

@@ -73,6 +73,14 @@ def improved(mppi, controls):
     return controls @ weights
 
 
+def keyed(drawn):
+    """Calls of `drawn(key)`, each with another key."""
+    # Making keys is no part of the work.
+    keys = itertools.cycle(list(jax.random.split(jax.random.key(1), 1000)))
+    drawn = jax.jit(drawn).lower(next(keys)).compile()
+    return lambda: drawn(next(keys)).block_until_ready()
+
+
 def plan(work, samples):
     mppi = work.settings["mppi"]
     shape = (mppi["horizon"], 3, samples)
@@ -83,16 +91,8 @@ def plan(work, samples):
 
     ours = work.array("mppi_controls").reshape(-1, mppi["horizon"], 3).transpose(1, 2, 0)
     peer.check_plan(work, jax.jit(partial(costs, mppi))(ours), jax.jit(partial(improved, mppi))(ours))
-    # Making keys is no part of the work.
-    keys = itertools.cycle(list(jax.random.split(jax.random.key(1), 1000)))
-    drawn = jax.jit(drawn).lower(next(keys)).compile()
-    return lambda: drawn(next(keys)).block_until_ready()
-
-
-def prepare(work, workload):
-    kind, network, size = workload.split("/")
-    return plan(work, int(size)) if kind == "mppi" else rollout(work, network, int(size))
+    return keyed(drawn)
 
 
 if __name__ == "__main__":
-    peer.serve(f"JAX {jax.__version__}", prepare)
+    peer.serve(f"JAX {jax.__version__}", rollout, plan)

@@ -1,6 +1,5 @@
 """The workloads in JAX as they are usually written: one trajectory, scan over its steps, vmap, jit."""
 
-import itertools
 from functools import partial
 
 import peer
@@ -10,6 +9,8 @@ try:
     import jax.numpy as jnp
 except ImportError as error:
     peer.absent("JAX vmap", error)
+
+from jax_peer import keyed
 
 
 def control(layers, x):
@@ -73,16 +74,8 @@ def plan(work, samples):
     ours = jnp.asarray(work.array("mppi_controls").reshape(-1, mppi["horizon"], 3))
     costs = jax.jit(jax.vmap(partial(cost, mppi)))(ours)
     peer.check_plan(work, costs, jax.jit(partial(improved, mppi))(ours))
-    # Making keys is no part of the work.
-    keys = itertools.cycle(list(jax.random.split(jax.random.key(1), 1000)))
-    drawn = jax.jit(drawn).lower(next(keys)).compile()
-    return lambda: drawn(next(keys)).block_until_ready()
-
-
-def prepare(work, workload):
-    kind, network, size = workload.split("/")
-    return plan(work, int(size)) if kind == "mppi" else rollout(work, network, int(size))
+    return keyed(drawn)
 
 
 if __name__ == "__main__":
-    peer.serve(f"JAX {jax.__version__} vmap", prepare)
+    peer.serve(f"JAX {jax.__version__} vmap", rollout, plan)

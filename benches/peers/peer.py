@@ -152,17 +152,21 @@ def fastest(ways):
     return chosen
 
 
-def serve(title, prepare):
-    """Answers requests on standard input; `prepare(work, workload)` checks, then gives the call."""
+def serve(title, rollout, plan):
+    """Answers requests on standard input.
+
+    `rollout(work, network, count)` and `plan(work, samples)` check, then give the call.
+    """
     work, calls = Work(sys.argv[1]), {}
     print(json.dumps({"title": title}), flush=True)
     for line in sys.stdin:
         asked = json.loads(line)
         name = asked.pop("workload")
+        kind, network, size = name.split("/")
+        units = int(size)
         try:
             if name not in calls:
-                calls[name] = prepare(work, name)
-            units = int(name.rsplit("/", 1)[1])
+                calls[name] = plan(work, units) if kind == "mppi" else rollout(work, network, units)
             answer = {"rate": units / float(np.median(seconds_of(calls[name], **asked)[0]))}
         except Exception as error:  # Whatever it is, it belongs into the table.
             answer = {"refused": f"{type(error).__name__}: {error}".splitlines()[0]}

@@ -102,13 +102,16 @@ def plan(work, samples):
     return peer.fastest(calls)
 
 
-def prepare(work, workload):
-    kind, network, size = workload.split("/")
-    with torch.inference_mode():
-        call = plan(work, int(size)) if kind == "mppi" else rollout(work, network, int(size))
-    return torch.inference_mode()(call)
+def at_inference(prepare):
+    """The same, preparation and call without records for derivatives."""
+
+    def prepared(*asked):
+        with torch.inference_mode():
+            return torch.inference_mode()(prepare(*asked))
+
+    return prepared
 
 
 if __name__ == "__main__":
     torch.manual_seed(1)
-    peer.serve(f"PyTorch {torch.__version__}", prepare)
+    peer.serve(f"PyTorch {torch.__version__}", at_inference(rollout), at_inference(plan))

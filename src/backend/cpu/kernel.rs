@@ -31,8 +31,7 @@ pub(super) trait Kernel: Copy + Send + Sync {
     /// What its bodies evaluate formulas in; a divisor of the lanes per group.
     type Vector: Vector;
 
-    /// Calls `body`, compiled for these instructions, with the lanes per group that the compiler
-    /// vectorises best.
+    /// Calls `body`, compiled for these instructions.
     fn call<B: Body>(self, body: B) -> B::Output;
 
     /// Writes `max(floor, W x + b)`, `[rows, BLOCK]`, of the inputs `[inputs, BLOCK]`; NaN stays.

@@ -162,11 +162,13 @@ impl Device {
     /// # Errors
     /// [`Error::Device`] if it is gone or does not open.
     pub(super) fn reopened(&self) -> Result<Self> {
-        let same = found(&instance()).into_iter().find(|(adapter, _)| *adapter == self.adapter);
-        let gone = || Error::Device(format!("{} is not there any more", self.adapter));
-        let (adapter, handle) = same.ok_or_else(gone)?;
+        let handle = found_again(&instance(), &self.adapter)?;
         let injector = Arc::clone(&self.injector);
-        Ok(Self { injector, patience: self.patience, ..Self::request(adapter, &handle)? })
+        Ok(Self {
+            injector,
+            patience: self.patience,
+            ..Self::request(self.adapter.clone(), &handle)?
+        })
     }
 
     fn request(adapter: Adapter, handle: &wgpu::Adapter) -> Result<Self> {
@@ -304,8 +306,18 @@ pub(super) fn instance() -> wgpu::Instance {
     wgpu::Instance::new(descriptor)
 }
 
+/// The handle of `adapter`, listed before.
+///
+/// # Errors
+/// [`Error::Device`] if it is gone.
+pub(super) fn found_again(instance: &wgpu::Instance, adapter: &Adapter) -> Result<wgpu::Adapter> {
+    let same = found(instance).into_iter().find(|(found, _)| found == adapter);
+    let gone = || Error::Device(format!("{adapter} is not there any more"));
+    same.map(|(_, handle)| handle).ok_or_else(gone)
+}
+
 /// Adapters that can run compute kernels, best first.
-pub(super) fn found(instance: &wgpu::Instance) -> Vec<(Adapter, wgpu::Adapter)> {
+fn found(instance: &wgpu::Instance) -> Vec<(Adapter, wgpu::Adapter)> {
     let handles = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     let mut all: Vec<_> = handles
         .into_iter()

@@ -1,6 +1,6 @@
 //! An adapter opened for a library with kernels of its own.
 
-use super::device::{Adapter, found, instance};
+use super::device::{Adapter, found_again, instance};
 use crate::error::{Error, Result};
 
 /// What such a library takes over, failures of the device included.
@@ -18,9 +18,7 @@ impl Lent {
     /// [`Error::Device`] if it is gone or does not open.
     pub(super) fn open(adapter: &Adapter) -> Result<Self> {
         let instance = instance();
-        let same = found(&instance).into_iter().find(|(found, _)| found == adapter);
-        let gone = || Error::Device(format!("{adapter} is not there any more"));
-        let (_, handle) = same.ok_or_else(gone)?;
+        let handle = found_again(&instance, adapter)?;
         // Experimental features need leave, and buffers that are mapped while kernels see them
         // cost speed on cards with memory of their own.
         let left_out =

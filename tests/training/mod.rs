@@ -1,0 +1,71 @@
+//! What the tests of training share: configurations, and what is trained on them.
+
+#![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+
+use reachcast::backend::Backend;
+use reachcast::config::{Config, Overrides};
+use reachcast::policy::{Activation, OutputActivation};
+use reachcast::rollout::{Purpose, RolloutSpec, Stream, Tightening};
+use reachcast::system::System;
+use reachcast::train::analytic::Task;
+use reachcast::train::device::Device;
+use reachcast::train::network::{Network, Shape};
+use reachcast::train::settings::TrainSettings;
+
+/// The configuration of a system with its defaults.
+pub(crate) fn config(system: &str, method: &str, set: &[&str]) -> Config {
+    let text = format!("seed = 5\nsystem.name = '{system}'\n[train]\nmethod = '{method}'\n");
+    let set = set.iter().map(ToString::to_string).collect();
+    let overrides = Overrides { set, ..Overrides::default() };
+    Config::from_table(toml::from_str(&text).unwrap(), "test", &overrides).unwrap()
+}
+
+/// What `config` says about training.
+pub(crate) fn settings(config: &Config) -> &TrainSettings {
+    config.train_settings().unwrap()
+}
+
+/// The intervals of the states.
+pub(crate) fn intervals<S: System<NX, NU>, const NX: usize, const NU: usize>(
+    system: &S,
+) -> Vec<[f32; 2]> {
+    system.states().iter().map(|axis| [axis.low, axis.high]).collect()
+}
+
+/// A random policy, its last layer `last` times as large as the others.
+pub(crate) fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
+    system: &S,
+    hidden: &[usize],
+    last: f32,
+) -> Network {
+    let (inputs, hidden) = (intervals(system), hidden.to_vec());
+    let (activation, output) = (Activation::Relu, OutputActivation::Tanh);
+    let shape = Shape { inputs, hidden, outputs: NU, activation, output };
+    Network::random(shape, Stream::new(5, Purpose::TrainWeight, 0), last)
+}
+
+/// What is trained on `system`, its tensors on `device`.
+pub(crate) fn task<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
+    system: &'a S,
+    backend: &'a Backend,
+    device: &Device,
+    config: &Config,
+) -> Task<'a, S, NX> {
+    Task {
+        system,
+        backend,
+        device: device.clone(),
+        spec: config.spec().unwrap(),
+        losses: None,
+        mixture: config.mixture(&system.states()).unwrap(),
+        held_out: settings(config).held_out,
+        seed: config.seed,
+    }
+}
+
+/// Losses that grow over the steps.
+pub(crate) fn losses(spec: &RolloutSpec) -> Tightening {
+    let grown = |rate: f32| (0..=spec.horizon).map(|t| rate * (t as f32).sqrt()).collect();
+    Tightening { target: grown(0.3), constraint: grown(0.2) }
+}
