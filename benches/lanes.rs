@@ -84,7 +84,7 @@ fn rollouts<P: Policy<12, 3>>(backend: &Backend, policy: &P, data: &Data) -> f64
     let plant = Plant { system: &system, policy };
     let spec: RolloutSpec = data::rollout_spec().expect("a valid specification");
     let task = ReachAvoidTask {
-        starts: Starts::Listed(starts),
+        starts: Starts::listed(starts),
         range: 0..starts.len() as u64,
         spec,
         tightening: &Tightening::none(&spec),

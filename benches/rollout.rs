@@ -76,7 +76,7 @@ impl Bench {
         let system = DroneRace::default();
         let plant = Plant { system: &system, policy };
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&self.data.starts),
+            starts: Starts::listed(&self.data.starts),
             range: 0..count,
             spec: self.spec,
             tightening: &self.tightening,
@@ -107,7 +107,7 @@ impl Bench {
         let plant = Plant { system: &system, policy };
         let task = DeviationTask {
             pairs: Pairs {
-                nominal: Starts::Listed(&self.data.starts),
+                nominal: Starts::listed(&self.data.starts),
                 radius: 0.1,
                 stream: Stream::new(1, Purpose::User, 0),
             },

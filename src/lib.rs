@@ -16,6 +16,8 @@ pub mod digest;
 pub mod error;
 pub mod experiment;
 pub mod files;
+pub mod formula;
+pub mod model;
 pub mod policy;
 pub mod real;
 pub mod report;

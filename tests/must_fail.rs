@@ -76,7 +76,7 @@ fn fused_parity(gpu: Gpu) -> bool {
 fn measures_agree<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
     plant: Plant<'_, S, P>,
-    region: Region<NX>,
+    region: Region,
 ) -> bool
 where
     S: System<NX, NU>,
@@ -111,7 +111,7 @@ where
 fn pairs_agree<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
     plant: Plant<'_, S, P>,
-    region: Region<NX>,
+    region: Region,
     control: PairControl,
 ) -> bool
 where

@@ -135,7 +135,7 @@ fn measures<P: Policy<1, 1>>(
     let starts = starts();
     let spec = spec(tightening);
     let range = 0..starts.len() as u64;
-    let task = ReachAvoidTask { starts: Starts::Listed(&starts), range, spec, tightening, query };
+    let task = ReachAvoidTask { starts: Starts::listed(&starts), range, spec, tightening, query };
     let mut all = Vec::new();
     let system = Line(motion);
     let plant = Plant { system: &system, policy };

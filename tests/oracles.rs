@@ -505,7 +505,7 @@ fn compare_farthest(
 fn compare_measures<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
     plant: Plant<'_, S, P>,
-    starts: &Starts<'_, NX>,
+    starts: &Starts<'_>,
     spec: &RolloutSpec,
     tightening: &Tightening,
     oracle: &[ScalarPair],

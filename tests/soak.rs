@@ -59,7 +59,7 @@ fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
         let results = planner.improve(backend, &system, &mut problems).expect("a plan");
         plan.clone_from(&results[0].plan);
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&[x]),
+            starts: Starts::listed(&[x]),
             range: 0..1,
             spec,
             tightening: &tightening,

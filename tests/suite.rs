@@ -14,8 +14,8 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::backend::Backend;
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid};
+use reachcast::formula::record;
 use reachcast::policy::Policy;
-use reachcast::real::record::record;
 use reachcast::real::{Lanes, Real};
 use reachcast::rollout::{
     Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening, normal_pair,
@@ -179,7 +179,7 @@ fn recorded(formula: Formula, inputs: &[[f32; 16]]) -> Vec<f32> {
 fn on_backend(backend: &Backend, formula: Formula, inputs: &[[f32; 16]]) -> Vec<f32> {
     let spec = RolloutSpec::new(1, 1.0).expect("spec");
     let task = ReachAvoidTask {
-        starts: Starts::Listed(inputs),
+        starts: Starts::listed(inputs),
         range: 0..inputs.len() as u64,
         spec,
         tightening: &Tightening::none(&spec),

@@ -14,9 +14,9 @@ use burn_tensor::{Tensor, activation};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
 use reachcast::config::Config;
+use reachcast::formula::{Graph, Node, record};
 use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
-use reachcast::real::record::{Graph, Node, record};
 use reachcast::rollout::{
     Plant, Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, reach_avoid,
 };
@@ -204,7 +204,7 @@ fn measures<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usi
 ) -> Vec<f32> {
     let spec = config.spec().unwrap();
     let task = ReachAvoidTask {
-        starts: Starts::Listed(starts),
+        starts: Starts::listed(starts),
         range: 0..starts.len() as u64,
         spec,
         tightening: &Tightening::none(&spec),

@@ -69,7 +69,7 @@ impl Backend {
     pub fn reach_avoid<S, P, const NX: usize, const NU: usize>(
         &self,
         plant: Plant<'_, S, P>,
-        task: &ReachAvoidTask<'_, NX>,
+        task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()>
     where
@@ -90,7 +90,7 @@ impl Backend {
     pub fn deviation<S, P, const NX: usize, const NU: usize>(
         &self,
         plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_, NX>,
+        task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>>
     where

@@ -2,9 +2,9 @@
 
 use std::array::from_fn;
 
+use crate::formula::record;
+use crate::formula::wgsl::function;
 use crate::policy::Policy;
-use crate::real::record::record;
-use crate::real::wgsl::function;
 use crate::rollout::Plant;
 use crate::system::System;
 

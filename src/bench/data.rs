@@ -95,7 +95,7 @@ fn random_network(widths: &[usize], seed: u64, number: u32) -> Result<Mlp> {
         let uniform = Region::new_box([-scale], [scale])?;
         let first = drawn;
         drawn += (inputs * outputs) as u64;
-        let weight = |index| uniform.sample::<1>(stream, index)[0].0[0];
+        let weight = |index| uniform.point(stream, index)[0];
         Ok(Layer {
             weight: (first..drawn).map(weight).collect(),
             bias: vec![0.1; outputs],

@@ -102,7 +102,7 @@ fn settings(seed: u64, networks: Vec<String>) -> Settings {
 fn measures(backend: &Backend, data: &Data, network: &Mlp) -> Result<Vec<f32>> {
     let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
     let task = ReachAvoidTask {
-        starts: Starts::Listed(&data.starts),
+        starts: Starts::listed(&*data.starts),
         range: 0..MEASURES as u64,
         spec,
         tightening: &Tightening::none(&spec),

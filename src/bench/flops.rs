@@ -7,9 +7,9 @@
 use std::array::from_fn;
 
 use crate::cost::Cost;
+use crate::formula::{Graph, Node, record};
 use crate::policy::{Mlp, Policy};
 use crate::real::Real;
-use crate::real::record::{Graph, Node, record};
 use crate::rollout::{Plant, normal_pair};
 use crate::system::System;
 

@@ -182,7 +182,7 @@ impl AdapterLimits {
         let (system, policy) = (DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
         let spec = RolloutSpec::new(1, 1.0)?;
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&[[0.5, 0.0]]),
+            starts: Starts::listed(&[[0.5, 0.0]]),
             range: 0..1,
             spec,
             tightening: &Tightening::none(&spec),

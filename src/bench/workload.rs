@@ -119,7 +119,7 @@ fn reach_avoid(
     let flops = flops::rollout(Plant { system: &system, policy: &*policy }, steps);
     let tightening = Tightening::none(&spec);
     let call = move |backend: &Backend| {
-        let starts = Starts::Listed(&starts);
+        let starts = Starts::listed(&*starts);
         let task = ReachAvoidTask { starts, range: 0..count, spec, tightening: &tightening, query };
         let plant = Plant { system: &system, policy: &*policy };
         backend.reach_avoid(plant, &task, &mut |_, measures| {
@@ -158,7 +158,7 @@ fn pairs(name: String, data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Wo
     let stream = Stream::new(data.seed, Purpose::User, 0);
     let call = move |backend: &Backend| {
         let task = DeviationTask {
-            pairs: Pairs { nominal: Starts::Listed(&starts), radius: RADIUS, stream },
+            pairs: Pairs { nominal: Starts::listed(&*starts), radius: RADIUS, stream },
             range: 0..count,
             spec,
             tightening: &tightening,

@@ -167,5 +167,5 @@ fn drawn(race: &RaceSettings, count: u64, seed: u64) -> Result<(Vec<[f32; 12]>, 
     let region = region.map_err(|error| Error::invalid(place, error.to_string()))?;
     let starts = Starts::Drawn { region, stream: Stream::new(seed, Purpose::RaceStart, 0) };
     let source = format!("{count} drawn from the start box with seed {seed}");
-    Ok(((0..count).map(|i| starts.start(i)).collect(), source))
+    Ok(((0..count).map(|i| starts.start_array(i)).collect(), source))
 }

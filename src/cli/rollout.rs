@@ -127,7 +127,7 @@ where
     P: Policy<NX, NU>,
 {
     let task = ReachAvoidTask {
-        starts: Starts::Listed(starts),
+        starts: Starts::listed(starts),
         range: 0..starts.len() as u64,
         spec,
         tightening: &Tightening::none(&spec),

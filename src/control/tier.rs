@@ -74,7 +74,7 @@ pub struct Standing<const NX: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LocalGrowth<const NX: usize> {
     /// The ball: verified, or the last one tried.
-    pub ball: Ball<NX>,
+    pub ball: Ball,
     /// Whether it passed clean.
     pub verified: bool,
     /// Rounds taken.
@@ -265,8 +265,8 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
             let (ball, verified) = match grown.outcome {
                 Growth::Verified(ball) => (ball, true),
                 Growth::Exhausted { last_radius: radius } => {
-                    let varies = self.settings.growth.varies;
-                    (Ball { center: request.center, radius, varies }, false)
+                    let varies = self.settings.growth.varies.to_vec();
+                    (Ball { center: request.center.to_vec(), radius, varies }, false)
                 }
             };
             if verified && ball.contains(&cases[i].state) {

@@ -3,10 +3,8 @@
 mod approx;
 pub mod bound;
 mod lanes;
-pub mod record;
 mod scalar;
 mod vector;
-pub mod wgsl;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -17,7 +15,7 @@ pub(crate) use vector::{Vector, load_rows, store_rows};
 /// A real number as far as a system, cost or policy formula may know it.
 ///
 /// One formula over `Real` is evaluated as f32, as f64 (the oracle), as SIMD [`Lanes`], as a
-/// sound bound ([`bound::Bound`]) and recorded as a graph ([`record::Expr`]) that is printed as
+/// sound bound ([`bound::Bound`]) and recorded as a graph ([`crate::formula::Expr`]) that is printed as
 /// WGSL. There is no `if` on values: both branches of [`Real::if_lt`] are evaluated. The
 /// elementary functions are polynomials in the primitives, so that f32, lanes and recorded
 /// expressions give equal bits wherever the device rounds correctly and does not contract.
@@ -31,6 +29,12 @@ pub trait Real:
 {
     /// The number `value`; an f64 instance gets exactly the f32.
     fn lit(value: f32) -> Self;
+    /// The parameter `name` of a system, whose value is `value`: an input where the system declares
+    /// it ([`crate::system::System::parameters`]) and is recorded, elsewhere the number itself.
+    #[inline(always)]
+    fn parameter(_name: &str, value: f32) -> Self {
+        Self::lit(value)
+    }
     /// Absolute value.
     fn abs(self) -> Self;
     /// Square root.

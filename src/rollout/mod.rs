@@ -17,7 +17,7 @@ pub use noise::{Noise, NoiseShape, SPLINE_SUPPORT, SplineRow};
 pub use philox::philox;
 pub use reference::{measure, pair_measures, trajectory};
 pub use sample::{
-    Ball, GENERATOR, Pairs, Purpose, Region, Starts, Stream, normal_pair, sample_ball,
+    Ball, GENERATOR, Pairs, Purpose, Region, Starts, States, Stream, normal_pair, sample_ball,
 };
 pub use spec::{
     DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Plant, Query, ReachAvoidTask,

@@ -1,7 +1,5 @@
 //! Random starts: every sample is a function of seed, stream and index, on every backend.
 
-use std::array::from_fn;
-
 use super::philox::philox;
 use crate::error::{Error, Result};
 use crate::real::{Lanes, Real, per_lane};
@@ -98,20 +96,30 @@ impl Stream {
     }
 
     /// The samples `first..first + N` of the uniform distribution in a box: those of
-    /// [`Region::Box`], for any number of coordinates.
+    /// [`Region::Box`].
     ///
     /// # Panics
     /// If the corners have not the same number of coordinates.
     pub fn in_box<const N: usize>(&self, low: &[f32], high: &[f32], first: u64) -> Vec<Lanes<N>> {
         assert_eq!(low.len(), high.len(), "both corners have the same coordinates");
-        let mut words = [[0; N]; 4];
-        let coordinate = |i: usize| {
-            if i.is_multiple_of(4) {
-                words = self.words(first, (i / 4) as u32);
-            }
-            Lanes::lit(low[i]) + unit(words[i % 4]) * Lanes::lit(high[i] - low[i])
-        };
-        (0..low.len()).map(coordinate).collect()
+        let mut x = vec![Lanes([0.0; N]); low.len()];
+        self.uniform_in(low, high, first, &mut x);
+        x
+    }
+
+    /// The same, written to a row for each coordinate.
+    #[inline(always)]
+    fn uniform_in<const N: usize>(
+        &self,
+        low: &[f32],
+        high: &[f32],
+        first: u64,
+        x: &mut [Lanes<N>],
+    ) {
+        self.uniforms(first, x);
+        for (x, (low, high)) in x.iter_mut().zip(low.iter().zip(high)) {
+            *x = Lanes::lit(*low) + *x * Lanes::lit(high - low);
+        }
     }
 
     /// `count` independent standard normal numbers of the sample `index`.
@@ -124,19 +132,17 @@ impl Stream {
         (0..count.div_ceil(2)).flat_map(pair).take(count).collect()
     }
 
-    /// Number `word` of the uniform draws in `[0, 1)` of each sample `first..first + N`.
+    /// Uniform draws in `[0, 1)` of the samples `first..first + N`, a number for each of `out`.
     ///
     /// 23 bits, exactly representable: the bits do not depend on the device.
     #[inline(always)]
-    fn uniforms<const N: usize, const K: usize>(&self, first: u64) -> [Lanes<N>; K] {
-        let mut out = [Lanes([0.0; N]); K];
+    fn uniforms<const N: usize>(&self, first: u64, out: &mut [Lanes<N>]) {
         for (block, four) in out.chunks_mut(4).enumerate() {
             let words = self.words::<N>(first, block as u32);
             for (lanes, word) in four.iter_mut().zip(words) {
                 *lanes = unit(word);
             }
         }
-        out
     }
 }
 
@@ -159,59 +165,64 @@ pub fn normal_pair<R: Real>(magnitude: R, turn: R) -> [R; 2] {
 
 /// A set of states with the uniform distribution on it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Region<const NX: usize> {
+pub enum Region {
     /// An axis-parallel box.
     Box {
         /// Lower corner.
-        low: [f32; NX],
+        low: Vec<f32>,
         /// Upper corner; a coordinate with `low == high` is frozen.
-        high: [f32; NX],
+        high: Vec<f32>,
     },
     /// A Euclidean ball in some coordinates, the others frozen.
-    Ball(Ball<NX>),
+    Ball(Ball),
 }
 
 /// A Euclidean ball in the coordinates that are not frozen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ball<const NX: usize> {
+pub struct Ball {
     /// Centre; also the value of the frozen coordinates.
-    pub center: [f32; NX],
+    pub center: Vec<f32>,
     /// Radius.
     pub radius: f32,
     /// Whether each coordinate varies.
-    pub varies: [bool; NX],
+    pub varies: Vec<bool>,
 }
 
-impl<const NX: usize> Ball<NX> {
+impl Ball {
     /// Number of coordinates that vary.
     pub fn dimension(&self) -> usize {
         self.varies.iter().filter(|varies| **varies).count()
     }
 
     /// Distance of `x` from the centre in the coordinates that vary.
-    pub fn distance(&self, x: &[f32; NX]) -> f64 {
+    pub fn distance(&self, x: &[f32]) -> f64 {
         let square = |i: usize| (f64::from(x[i]) - f64::from(self.center[i])).powi(2);
-        (0..NX).filter(|&i| self.varies[i]).map(square).sum::<f64>().sqrt()
+        (0..x.len()).filter(|&i| self.varies[i]).map(square).sum::<f64>().sqrt()
     }
 
     /// Whether `x` lies in the ball, its frozen coordinates equal to the centre's.
-    pub fn contains(&self, x: &[f32; NX]) -> bool {
-        let frozen = (0..NX).all(|i| self.varies[i] || x[i] == self.center[i]);
+    pub fn contains(&self, x: &[f32]) -> bool {
+        let frozen = (0..x.len()).all(|i| self.varies[i] || x[i] == self.center[i]);
         frozen && self.distance(x) <= f64::from(self.radius)
     }
 }
 
-impl<const NX: usize> Region<NX> {
+impl Region {
     /// A box, checked.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if a bound is not finite, `low > high`, or no coordinate varies.
-    pub fn new_box(low: [f32; NX], high: [f32; NX]) -> Result<Self> {
+    /// [`Error::Invalid`] if the corners have not the same number of coordinates, a bound is not
+    /// finite, `low > high`, or no coordinate varies.
+    pub fn new_box(low: impl Into<Vec<f32>>, high: impl Into<Vec<f32>>) -> Result<Self> {
         let place = "box";
-        for i in 0..NX {
-            if !(low[i].is_finite() && high[i].is_finite() && low[i] <= high[i]) {
-                let problem =
-                    format!("coordinate {i} has the empty interval [{}, {}]", low[i], high[i]);
+        let (low, high) = (low.into(), high.into());
+        if low.len() != high.len() {
+            let problem = format!("corners of {} and {} coordinates", low.len(), high.len());
+            return Err(Error::invalid(place, problem));
+        }
+        for (i, (low, high)) in low.iter().zip(&high).enumerate() {
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                let problem = format!("coordinate {i} has the empty interval [{low}, {high}]");
                 return Err(Error::invalid(place, problem));
             }
         }
@@ -221,11 +232,19 @@ impl<const NX: usize> Region<NX> {
         Ok(Self::Box { low, high })
     }
 
-    /// Whether each coordinate varies.
-    pub fn varies(&self) -> [bool; NX] {
+    /// Number of coordinates.
+    pub fn size(&self) -> usize {
         match self {
-            Self::Box { low, high } => from_fn(|i| low[i] < high[i]),
-            Self::Ball(ball) => ball.varies,
+            Self::Box { low, .. } => low.len(),
+            Self::Ball(ball) => ball.center.len(),
+        }
+    }
+
+    /// Whether each coordinate varies.
+    pub fn varies(&self) -> Vec<bool> {
+        match self {
+            Self::Box { low, high } => low.iter().zip(high).map(|(low, high)| low < high).collect(),
+            Self::Ball(ball) => ball.varies.clone(),
         }
     }
 
@@ -233,7 +252,8 @@ impl<const NX: usize> Region<NX> {
     pub fn volume(&self) -> f64 {
         match self {
             Self::Box { low, high } => {
-                let widths = (0..NX).map(|i| f64::from(high[i]) - f64::from(low[i]));
+                let sides = low.iter().zip(high);
+                let widths = sides.map(|(low, high)| f64::from(*high) - f64::from(*low));
                 widths.filter(|width| *width > 0.0).product()
             }
             Self::Ball(ball) => {
@@ -249,44 +269,46 @@ impl<const NX: usize> Region<NX> {
         }
     }
 
-    /// The samples `first..first + N` of the uniform distribution, one per lane.
+    /// The samples `first..first + N` of the uniform distribution, one per lane; `x` has a row for
+    /// each coordinate.
     #[inline(always)]
-    pub fn sample<const N: usize>(&self, stream: Stream, first: u64) -> [Lanes<N>; NX] {
+    pub fn sample<const N: usize>(&self, stream: Stream, first: u64, x: &mut [Lanes<N>]) {
         match self {
-            Self::Box { low, high } => {
-                let mut x = stream.uniforms::<N, NX>(first);
-                for (i, x) in x.iter_mut().enumerate() {
-                    *x = Lanes::lit(low[i]) + *x * Lanes::lit(high[i] - low[i]);
-                }
-                x
-            }
+            Self::Box { low, high } => stream.uniform_in(low, high, first, x),
             Self::Ball(ball) => {
-                let mut x = sample_ball::<N, NX>(stream, first, &ball.varies);
-                for (x, center) in x.iter_mut().zip(ball.center) {
-                    *x = Lanes::lit(center) + Lanes::lit(ball.radius) * *x;
+                sample_ball(stream, first, |i| ball.varies[i], x);
+                for (x, center) in x.iter_mut().zip(&ball.center) {
+                    *x = Lanes::lit(*center) + Lanes::lit(ball.radius) * *x;
                 }
-                x
             }
         }
     }
+
+    /// The sample number `index`.
+    pub fn point(&self, stream: Stream, index: u64) -> Vec<f32> {
+        let mut x = vec![Lanes([0.0]); self.size()];
+        self.sample::<1>(stream, index, &mut x);
+        x.into_iter().map(|lane| lane.0[0]).collect()
+    }
 }
 
-/// Uniform offsets in the unit ball of the coordinates that vary, 0 in the others.
+/// Uniform offsets in the unit ball of the coordinates that vary, 0 in the others; `x` has a row
+/// for each coordinate.
 ///
 /// With `z` standard normal and `E` exponential, `z / sqrt(|z|^2 + 2 E)` is uniform in the ball
 /// (Barthe, Guedon, Mendelson and Naor 2005): the distribution of a random direction times
 /// `u^(1/n)`, without the root. Coordinates `2k` and `2k + 1` take the words `2k` and `2k + 1`
 /// of the sample, `E` takes the next word after the last pair.
 #[inline(always)]
-pub fn sample_ball<const N: usize, const NX: usize>(
+pub fn sample_ball<const N: usize>(
     stream: Stream,
     first: u64,
-    varies: &[bool; NX],
-) -> [Lanes<N>; NX] {
+    varies: impl Fn(usize) -> bool,
+    x: &mut [Lanes<N>],
+) {
     let one = Lanes::<N>::lit(1.0);
     let zero = Lanes::<N>::lit(0.0);
-    let pairs = NX.div_ceil(2);
-    let mut normal = [zero; NX];
+    let pairs = x.len().div_ceil(2);
     let mut square = zero;
     let mut words = [[0; N]; 4];
     for pair in 0..=pairs {
@@ -300,80 +322,176 @@ pub fn sample_ball<const N: usize, const NX: usize>(
             break;
         }
         let both = normal_pair(magnitude, unit(words[at % 4 + 1]));
-        for (i, z) in (at..NX).zip(both) {
-            if varies[i] {
-                normal[i] = z;
+        for (i, z) in (at..x.len()).zip(both) {
+            x[i] = zero;
+            if varies(i) {
+                x[i] = z;
                 square = square + z * z;
             }
         }
     }
     let scale = one / square.sqrt();
-    for z in &mut normal {
+    for z in x {
         *z = *z * scale;
     }
-    normal
+}
+
+/// States one after the other: `[count, size]`, borrowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct States<'a> {
+    size: usize,
+    numbers: &'a [f32],
+}
+
+impl<'a> States<'a> {
+    /// States of `size` numbers each.
+    ///
+    /// # Panics
+    /// If `size` is 0, or the numbers are no whole number of states.
+    pub fn new(numbers: &'a [f32], size: usize) -> Self {
+        assert!(numbers.len().is_multiple_of(size), "states of {size} numbers");
+        Self { size, numbers }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.numbers.len() / self.size
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.numbers.is_empty()
+    }
+
+    /// Numbers of a state.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The state number `index`.
+    pub fn row(&self, index: usize) -> &'a [f32] {
+        &self.numbers[index * self.size..][..self.size]
+    }
+
+    /// One after the other.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &'a [f32]> + use<'a> {
+        self.numbers.chunks_exact(self.size)
+    }
+}
+
+impl<'a, const NX: usize> From<&'a [[f32; NX]]> for States<'a> {
+    fn from(list: &'a [[f32; NX]]) -> Self {
+        Self::new(list.as_flattened(), NX)
+    }
+}
+
+impl<'a, const NX: usize> From<&'a Vec<[f32; NX]>> for States<'a> {
+    fn from(list: &'a Vec<[f32; NX]>) -> Self {
+        list.as_slice().into()
+    }
+}
+
+impl<'a, const NX: usize, const COUNT: usize> From<&'a [[f32; NX]; COUNT]> for States<'a> {
+    fn from(list: &'a [[f32; NX]; COUNT]) -> Self {
+        list.as_slice().into()
+    }
 }
 
 /// Where the starts of a batch come from.
 #[derive(Clone, Debug)]
-pub enum Starts<'a, const NX: usize> {
+pub enum Starts<'a> {
     /// Drawn uniformly from a region.
     Drawn {
         /// The region.
-        region: Region<NX>,
+        region: Region,
         /// The stream.
         stream: Stream,
     },
     /// Given one by one.
-    Listed(&'a [[f32; NX]]),
+    Listed(States<'a>),
 }
 
-impl<const NX: usize> Starts<'_, NX> {
-    /// The starts `first..first + N`, one per lane; past the end of a list its last one.
-    #[inline(always)]
-    pub fn load<const N: usize>(&self, first: u64) -> [Lanes<N>; NX] {
+impl<'a> Starts<'a> {
+    /// The starts of a list.
+    pub fn listed(list: impl Into<States<'a>>) -> Self {
+        Self::Listed(list.into())
+    }
+
+    /// Numbers of a start.
+    pub fn size(&self) -> usize {
         match self {
-            Self::Drawn { region, stream } => region.sample(*stream, first),
+            Self::Drawn { region, .. } => region.size(),
+            Self::Listed(list) => list.size(),
+        }
+    }
+
+    /// The starts `first..first + N`, one per lane, past the end of a list its last one; `x` has a
+    /// row for each coordinate.
+    #[inline(always)]
+    pub fn load<const N: usize>(&self, first: u64, x: &mut [Lanes<N>]) {
+        match self {
+            Self::Drawn { region, stream } => region.sample(*stream, first, x),
             Self::Listed(list) => {
-                let mut x = [Lanes([0.0; N]); NX];
                 for i in 0..N {
-                    let row = &list[(first as usize + i).min(list.len() - 1)];
+                    let row = list.row((first as usize + i).min(list.len() - 1));
                     for (x, value) in x.iter_mut().zip(row) {
                         x.0[i] = *value;
                     }
                 }
-                x
             }
         }
     }
 
     /// The start number `index`.
-    pub fn start(&self, index: u64) -> [f32; NX] {
-        self.load::<1>(index).map(|lane| lane.0[0])
+    pub fn start(&self, index: u64) -> Vec<f32> {
+        let mut x = vec![Lanes([0.0]); self.size()];
+        self.load::<1>(index, &mut x);
+        x.into_iter().map(|lane| lane.0[0]).collect()
+    }
+
+    /// The start number `index`, of `NX` numbers.
+    ///
+    /// # Panics
+    /// If a start has fewer.
+    pub fn start_array<const NX: usize>(&self, index: u64) -> [f32; NX] {
+        let start = self.start(index);
+        std::array::from_fn(|i| start[i])
     }
 }
 
 /// Pairs of a nominal and a perturbed start, `docs/method.md` section 3.
 #[derive(Clone, Debug)]
-pub struct Pairs<'a, const NX: usize> {
+pub struct Pairs<'a> {
     /// Nominal starts.
-    pub nominal: Starts<'a, NX>,
+    pub nominal: Starts<'a>,
     /// Radius of the ball around each nominal start.
     pub radius: f32,
     /// Stream of the perturbations.
     pub stream: Stream,
 }
 
-impl<const NX: usize> Pairs<'_, NX> {
-    /// The pairs `first..first + N`: nominal, then perturbed.
+impl Pairs<'_> {
+    /// The pairs `first..first + N`: rows of the nominal starts, then of the perturbed ones.
     #[inline(always)]
-    pub fn load<const N: usize>(&self, first: u64) -> [[Lanes<N>; NX]; 2] {
-        let nominal = self.nominal.load::<N>(first);
-        let mut perturbed = sample_ball::<N, NX>(self.stream, first, &[true; NX]);
-        for (x, nominal) in perturbed.iter_mut().zip(&nominal) {
+    pub fn load<const N: usize>(
+        &self,
+        first: u64,
+        nominal: &mut [Lanes<N>],
+        perturbed: &mut [Lanes<N>],
+    ) {
+        self.nominal.load(first, nominal);
+        sample_ball(self.stream, first, |_| true, perturbed);
+        for (x, nominal) in perturbed.iter_mut().zip(nominal) {
             *x = *nominal + Lanes::lit(self.radius) * *x;
         }
-        [nominal, perturbed]
+    }
+
+    /// The pair number `index`: nominal, then perturbed.
+    pub fn pair(&self, index: u64) -> [Vec<f32>; 2] {
+        let mut rows = [(); 2].map(|()| vec![Lanes([0.0]); self.nominal.size()]);
+        let [nominal, perturbed] = &mut rows;
+        self.load::<1>(index, nominal, perturbed);
+        rows.map(|rows| rows.into_iter().map(|lane| lane.0[0]).collect())
     }
 }
 

@@ -82,9 +82,9 @@ pub enum Query {
 
 /// Reach-avoid measures of a range of starts.
 #[derive(Clone, Debug)]
-pub struct ReachAvoidTask<'a, const NX: usize> {
+pub struct ReachAvoidTask<'a> {
     /// The starts.
-    pub starts: Starts<'a, NX>,
+    pub starts: Starts<'a>,
     /// Which of them, by index.
     pub range: Range<u64>,
     /// Horizon and discount.
@@ -107,9 +107,9 @@ pub enum PairControl {
 
 /// Rollouts of a range of pairs.
 #[derive(Clone, Debug)]
-pub struct DeviationTask<'a, const NX: usize> {
+pub struct DeviationTask<'a> {
     /// The pairs.
-    pub pairs: Pairs<'a, NX>,
+    pub pairs: Pairs<'a>,
     /// Which of them, by index.
     pub range: Range<u64>,
     /// Horizon and discount.

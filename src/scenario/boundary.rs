@@ -6,6 +6,7 @@ use super::settings::Settings;
 use super::{Context, settings::BoundarySearch};
 use crate::error::Result;
 use crate::policy::Policy;
+use crate::real::Lanes;
 use crate::rollout::{Purpose, Query, Stream, Tightening, sample_ball};
 use crate::system::System;
 
@@ -155,7 +156,8 @@ fn directions<const NX: usize>(
 ) -> Vec<[f32; NX]> {
     let stream = Stream::new(settings.seed, Purpose::Direction, sweep);
     let draw = |index: u64| {
-        let offset = sample_ball::<1, NX>(stream, index, &settings.growth.varies);
+        let mut offset = [Lanes([0.0]); NX];
+        sample_ball::<1>(stream, index, |i| settings.growth.varies[i], &mut offset);
         let mut direction = unit(offset.map(|lane| lane.0[0]));
         if let Some((center, spread)) = around {
             direction = unit(std::array::from_fn(|i| center[i] + spread * direction[i]));

@@ -30,7 +30,7 @@ const WIDER: f32 = 10.0;
 /// Names and number of the coordinates that vary and of those that are frozen.
 pub(super) fn coordinates<S, const NX: usize, const NU: usize>(
     system: &S,
-    varies: &[bool; NX],
+    varies: &[bool],
 ) -> (usize, Vec<String>)
 where
     S: System<NX, NU>,
@@ -328,14 +328,14 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let region = Region::Box { low: settings.low, high: settings.high };
+    let region = Region::Box { low: settings.low.to_vec(), high: settings.high.to_vec() };
     let stream = Stream::new(settings.seed, Purpose::Picture, 0);
     let sampled = growth.samples.iter().take(PICTURED).map(|sample| sample.x.clone());
     let mut starts: Vec<Vec<f32>> =
         std::iter::once(settings.state.to_vec()).chain(sampled).collect();
     let missing = (PICTURED + 1).saturating_sub(starts.len()) as u64;
     for index in 0..missing {
-        starts.push(region.sample::<1>(stream, index).map(|lane| lane.0[0]).to_vec());
+        starts.push(region.point(stream, index));
     }
     let none = Tightening::none(&settings.spec);
     let rollouts = starts.into_iter().map(|start| {

@@ -1,5 +1,7 @@
 //! The certified set: `V_check` of any states, over a slice, and its conditional failure.
 
+use std::array::from_fn;
+
 use rayon::prelude::*;
 
 use super::Context;
@@ -40,7 +42,7 @@ where
         return Ok(margins);
     }
     let task = ReachAvoidTask {
-        starts: Starts::Listed(states),
+        starts: Starts::listed(states),
         range: 0..states.len() as u64,
         spec: *spec,
         tightening,
@@ -235,7 +237,7 @@ impl Count {
     fn add<S, P, const NX: usize, const NU: usize>(
         &mut self,
         plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_, NX>,
+        task: &DeviationTask<'_>,
         first: u64,
         pairs: &[PairMeasure],
     ) where
@@ -261,14 +263,14 @@ impl Count {
 /// The measures of pair `index` in f64.
 fn pair_f64<S, P, const NX: usize, const NU: usize>(
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     index: u64,
 ) -> (f64, f64)
 where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let pair = task.pairs.load::<1>(index).map(|start| start.map(|lane| lane.0[0]));
+    let pair = task.pairs.pair(index).map(|start| from_fn(|i| start[i]));
     pair_measures(plant, pair, &task.spec, task.tightening, task.control)
 }
 
@@ -310,7 +312,7 @@ where
 /// The largest distance of an f32 measure from f64 over the first pairs, those that are finite.
 fn f32_error<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
 ) -> Result<f64>
 where
     S: System<NX, NU>,

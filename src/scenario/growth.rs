@@ -22,7 +22,7 @@ const KEPT_SAMPLES: u64 = 400;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Growth<const NX: usize> {
     /// The ball passed clean.
-    Verified(Ball<NX>),
+    Verified(Ball),
     /// Every round had failures.
     Exhausted {
         /// Radius of the last round.
@@ -64,7 +64,11 @@ where
 {
     let asked = &settings.growth;
     check_scenarios(asked)?;
-    let mut ball = Ball { center: boundary.point, radius: asked.radius, varies: asked.varies };
+    let mut ball = Ball {
+        center: boundary.point.to_vec(),
+        radius: asked.radius,
+        varies: asked.varies.to_vec(),
+    };
     let mut rounds = Vec::new();
     let mut samples = Vec::new();
     context.watch.begin("local growth", asked.scenarios * u64::from(asked.rounds));
@@ -116,7 +120,7 @@ pub(crate) fn check_scenarios<const NX: usize>(asked: &GrowthSettings<NX>) -> Re
 fn round<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
     settings: &Settings<NX>,
-    ball: &Ball<NX>,
+    ball: &Ball,
     stream: Stream,
     band: f64,
 ) -> Result<Round>
@@ -144,7 +148,7 @@ where
     let mut samples = Vec::new();
     context.backend.reach_avoid(context.plant, &task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let start = task.starts.start(index);
+            let start: [f32; NX] = task.starts.start_array(index);
             let mut value = f64::from(*value);
             if value.abs() <= band {
                 value = measure(context.plant, start, &settings.spec, &tightening);
@@ -187,7 +191,8 @@ where
     let Some(center) = center else { return Ok(record) };
     record.distance = Some(boundary::distance(&center, &settings.state));
     record.outcome = GrowthOutcome::Exhausted;
-    let mut ball = Ball { center, radius: asked.radius, varies: asked.varies };
+    let mut ball =
+        Ball { center: center.to_vec(), radius: asked.radius, varies: asked.varies.to_vec() };
     for (number, round) in (0..).zip(&mut record.rounds) {
         (round.radius, round.scenarios) = (f64::from(ball.radius), asked.scenarios);
         let next = round.nearest_failure.and_then(|far| next_radius(asked, number, far));
@@ -220,7 +225,7 @@ fn verified<S, const NX: usize, const NU: usize>(
     record: &mut GrowthRecord,
     system: &S,
     settings: &Settings<NX>,
-    ball: Ball<NX>,
+    ball: Ball,
 ) -> Result<()>
 where
     S: System<NX, NU>,
@@ -265,7 +270,7 @@ where
 fn claim<S, const NX: usize, const NU: usize>(
     system: &S,
     settings: &Settings<NX>,
-    ball: &Ball<NX>,
+    ball: &Ball,
 ) -> Result<Claim>
 where
     S: System<NX, NU>,

@@ -9,6 +9,7 @@ use super::growth::{Growth, check_scenarios, next_radius};
 use super::settings::Settings;
 use crate::error::Result;
 use crate::policy::Policy;
+use crate::real::Lanes;
 use crate::rollout::{
     Ball, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, measure,
 };
@@ -43,7 +44,7 @@ pub struct Grown<const NX: usize> {
 
 /// A ball under way.
 struct Open<const NX: usize> {
-    ball: Ball<NX>,
+    ball: Ball,
     /// The request that it answers.
     request: usize,
     rounds: u32,
@@ -68,7 +69,7 @@ where
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let open = |(request, center): (usize, [f32; NX])| Open {
-        ball: Ball { center, radius: asked.radius, varies: asked.varies },
+        ball: Ball { center: center.to_vec(), radius: asked.radius, varies: asked.varies.to_vec() },
         request,
         rounds: 0,
         f64_reruns: 0,
@@ -153,7 +154,7 @@ where
     let starts: Vec<[f32; NX]> = balls.par_iter().enumerate().flat_map_iter(draw).collect();
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
-        starts: Starts::Listed(&starts),
+        starts: Starts::listed(&starts),
         range: 0..starts.len() as u64,
         spec: settings.spec,
         tightening: &tightening,
@@ -177,14 +178,11 @@ where
 }
 
 /// The starts `range` of `stream` in `region`.
-fn drawn<const NX: usize>(
-    region: &Region<NX>,
-    stream: Stream,
-    range: Range<u64>,
-) -> Vec<[f32; NX]> {
+fn drawn<const NX: usize>(region: &Region, stream: Stream, range: Range<u64>) -> Vec<[f32; NX]> {
     let mut starts = Vec::with_capacity((range.end - range.start) as usize);
+    let mut lanes = [Lanes([0.0; GROUP]); NX];
     for first in range.clone().step_by(GROUP) {
-        let lanes = region.sample::<GROUP>(stream, first);
+        region.sample(stream, first, &mut lanes);
         let live = GROUP.min((range.end - first) as usize);
         starts.extend((0..live).map(|i| lanes.each_ref().map(|lane| lane.0[i])));
     }

@@ -78,7 +78,7 @@ pub(super) fn tier<const NX: usize>(
     growth: &GrowthRecord,
     x: &[f32; NX],
 ) -> u8 {
-    let local = || verified_ball::<NX>(growth).is_some_and(|ball| ball.contains(x));
+    let local = || verified_ball(growth).is_some_and(|ball| ball.contains(x));
     match () {
         () if target_margin > 0.0 => 0,
         () if check_margin > 0.0 => 1,
@@ -88,12 +88,12 @@ pub(super) fn tier<const NX: usize>(
 }
 
 /// The verified ball, where there is one.
-fn verified_ball<const NX: usize>(growth: &GrowthRecord) -> Option<Ball<NX>> {
+fn verified_ball(growth: &GrowthRecord) -> Option<Ball> {
     let center = growth.center.as_ref().filter(|_| growth.outcome == GrowthOutcome::Verified)?;
     Some(Ball {
-        center: center.as_slice().try_into().ok()?,
+        center: center.clone(),
         radius: growth.radius as f32,
-        varies: growth.varies.as_slice().try_into().ok()?,
+        varies: growth.varies.clone(),
     })
 }
 
@@ -230,7 +230,7 @@ where
     ));
     let share = global::share_overlaps(&record.global, &fresh);
     findings.push(share);
-    if let Some(ball) = verified_ball::<NX>(&record.growth) {
+    if let Some(ball) = verified_ball(&record.growth) {
         let failures = fresh_failures(context, settings, ball)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
         findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
@@ -312,7 +312,7 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
 fn fresh_failures<S, P, const NX: usize, const NU: usize>(
     context: Context<'_, S, P>,
     settings: &Settings<NX>,
-    ball: Ball<NX>,
+    ball: Ball,
 ) -> Result<u64>
 where
     S: System<NX, NU>,

@@ -61,6 +61,11 @@ pub trait System<const NX: usize, const NU: usize>: Sync {
     fn target<R: Real>(&self, x: [R; NX]) -> R;
     /// Constraint margin `c`: positive where safe.
     fn constraint<R: Real>(&self, x: [R; NX]) -> R;
+    /// The parameters that the formulas ask for by name ([`Real::parameter`]): inputs of the recorded
+    /// formulas, so that another value compiles nothing anew. What is not declared is a literal.
+    fn parameters(&self) -> Vec<Parameter> {
+        Vec::new()
+    }
     /// The bodies that a picture shows, by the indices of their two coordinates in the plane.
     fn bodies(&self) -> Vec<Body> {
         Vec::new()
@@ -95,5 +100,24 @@ impl Axis {
     /// An axis over `[low, high]`.
     pub fn new(name: &str, unit: &str, low: f32, high: f32) -> Self {
         Self { name: name.to_owned(), unit: unit.to_owned(), low, high }
+    }
+}
+
+/// A named number of a model that is fixed for a rollout: an input of its formulas, so that another
+/// value compiles nothing anew.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Parameter {
+    /// Name.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Value.
+    pub value: f32,
+}
+
+impl Parameter {
+    /// The parameter `name` with its value.
+    pub fn new(name: &str, unit: &str, value: f32) -> Self {
+        Self { name: name.to_owned(), unit: unit.to_owned(), value }
     }
 }

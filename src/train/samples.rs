@@ -106,7 +106,8 @@ impl<S, P, const NX: usize> Source<'_, S, P, NX> {
             let place = |i: usize| ((group * WIDTH + i) as f64 * stride) as usize;
             let list: Vec<[f32; NX]> =
                 (0..WIDTH).map(|i| starts[place(i).min(count - 1)]).collect();
-            let mut x = Starts::Listed(&list).load::<WIDTH>(0);
+            let mut x = [Lanes([0.0; WIDTH]); NX];
+            Starts::listed(&list).load(0, &mut x);
             for _ in 0..group as u32 % (self.spec.horizon + 1) {
                 x = self.plant.system.step(x, self.plant.policy.control(x));
             }
@@ -124,7 +125,7 @@ impl<S, P, const NX: usize> Source<'_, S, P, NX> {
         P: Policy<NX, NU>,
     {
         let task = ReachAvoidTask {
-            starts: Starts::Listed(states),
+            starts: Starts::listed(states),
             range: 0..states.len() as u64,
             spec,
             tightening: &Tightening::none(&spec),

@@ -1,8 +1,8 @@
 //! A system as tapes: its step, and the softened measures of a whole rollout.
 
 use super::tape::Tape;
+use crate::formula::{Expr, record};
 use crate::real::Real;
-use crate::real::record::{Expr, record};
 use crate::rollout::{RolloutSpec, Tightening, reach_avoid};
 use crate::system::System;
 

@@ -6,7 +6,7 @@ use crate::rollout::{Purpose, Region, Starts, Stream};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixture<const NX: usize> {
     /// Shares above 0, and boxes.
-    pub parts: Vec<(f64, Region<NX>)>,
+    pub parts: Vec<(f64, Region)>,
 }
 
 impl<const NX: usize> Mixture<NX> {
@@ -23,7 +23,7 @@ impl<const NX: usize> Mixture<NX> {
             // Each batch has `count` indices of each part's stream to itself.
             let first = batch * count as u64;
             let more =
-                (starts.len()..end.min(count)).map(|place| drawn.start(first + place as u64));
+                (starts.len()..end.min(count)).map(|place| drawn.start_array(first + place as u64));
             starts.extend(more.collect::<Vec<_>>());
         }
         starts

@@ -1,7 +1,7 @@
 //! A recorded graph with a reverse sweep: values forward, derivatives backward, in any [`Real`].
 
+use crate::formula::{Graph, Node};
 use crate::real::Real;
-use crate::real::record::{Graph, Node};
 
 /// A recorded graph whose constants are folded and whose choices at the top may be soft.
 #[derive(Clone, Debug)]
@@ -210,7 +210,7 @@ fn folded(nodes: &[Node]) -> Vec<Node> {
 #[cfg(test)]
 mod tests {
     use super::Tape;
-    use crate::real::record::{Expr, Graph, record};
+    use crate::formula::{Expr, Graph, record};
     use crate::real::{Lanes, Real};
 
     /// The output of the tape, and its slopes.

@@ -65,7 +65,7 @@ fn every_step_of_a_long_horizon_is_taken() {
     let tightening = Tightening::none(&spec);
     let plant = Plant { system: &Count, policy: &Idle };
     let task = ReachAvoidTask {
-        starts: Starts::Listed(&list),
+        starts: Starts::listed(&list),
         range: 0..10,
         spec,
         tightening: &tightening,
@@ -78,7 +78,7 @@ fn every_step_of_a_long_horizon_is_taken() {
     assert_eq!(found, expected);
     let task = DeviationTask {
         pairs: Pairs {
-            nominal: Starts::Listed(&list),
+            nominal: Starts::listed(&list),
             radius: 0.0,
             stream: Stream::new(1, Purpose::User, 0),
         },
@@ -107,7 +107,7 @@ fn every_step_under_a_network(mut gpu: Gpu) {
     let starts = [[-149.5, 0.5], [-150.5, 0.5]];
     for (query, expected) in [(Query::Measure, [0.5, -0.5]), (Query::Sign, [1.0, -1.0])] {
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&starts),
+            starts: Starts::listed(&starts),
             range: 0..2,
             spec,
             tightening: &tightening,
@@ -136,7 +136,7 @@ fn non_finite_states(mut gpu: Gpu) {
     let signs = [1.0, NON_FINITE, -1.0, NON_FINITE, NON_FINITE];
     for (query, expected) in [(Query::Measure, dense), (Query::Sign, signs)] {
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&starts),
+            starts: Starts::listed(&starts),
             range: 0..5,
             spec,
             tightening: &tightening,
@@ -152,7 +152,7 @@ fn non_finite_states(mut gpu: Gpu) {
     }
     let task = DeviationTask {
         pairs: Pairs {
-            nominal: Starts::Listed(&starts[..3]),
+            nominal: Starts::listed(&starts[..3]),
             radius: 0.01,
             stream: Stream::new(1, Purpose::User, 0),
         },

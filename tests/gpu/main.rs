@@ -57,7 +57,7 @@ fn each_way(test: impl Fn(Gpu)) {
 fn reach_avoid<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
     gpu: Gpu,
     plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
+    task: &ReachAvoidTask<'_>,
 ) -> (Gpu, Result<Vec<f32>>) {
     let backend = Backend::Gpu(gpu);
     let mut all = Vec::new();
@@ -73,7 +73,7 @@ fn reach_avoid<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: 
 fn measures<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
     gpu: Gpu,
     plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
+    task: &ReachAvoidTask<'_>,
 ) -> (Gpu, Vec<f32>) {
     let (gpu, all) = reach_avoid(gpu, plant, task);
     let all = all.expect("a batch that runs");
@@ -84,7 +84,7 @@ fn measures<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usi
 fn deviation<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
     gpu: Gpu,
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
 ) -> (Gpu, Vec<Farthest>, Vec<PairMeasure>) {
     let backend = Backend::Gpu(gpu);
     let mut all = Vec::new();
@@ -108,13 +108,13 @@ fn ramp(spec: &RolloutSpec) -> Tightening {
 }
 
 /// The box of a system's axes.
-fn whole_box<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Region<NX> {
+fn whole_box<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Region {
     let axes = system.states();
     let (low, high) = (axes.each_ref().map(|a| a.low), axes.each_ref().map(|a| a.high));
     Region::new_box(low, high).expect("the box of a system")
 }
 
-fn drawn<const NX: usize>(region: Region<NX>, seed: u64) -> Starts<'static, NX> {
+fn drawn<const NX: usize>(region: Region, seed: u64) -> Starts<'static> {
     Starts::Drawn { region, stream: Stream::new(seed, Purpose::User, 3) }
 }
 

@@ -41,7 +41,7 @@ pub(crate) fn assert_close_to_f64<
     const NU: usize,
 >(
     plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
+    task: &ReachAvoidTask<'_>,
     gpu: &[f32],
 ) {
     let starts = task.range.clone().map(|index| task.starts.start(index));

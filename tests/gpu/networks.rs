@@ -116,7 +116,7 @@ fn a_decided_sign_stays_when_the_state_overflows() {
         let tightening = Tightening { target: vec![0.0; 8], constraint };
         let policy = random_network(&[2, 4, 1], Activation::Tanh);
         let mut task = ReachAvoidTask {
-            starts: Starts::Listed(&[[-20.0, 2.1]]),
+            starts: Starts::listed(&[[-20.0, 2.1]]),
             range: 0..1,
             spec: RolloutSpec::new(7, 1.0).expect("a horizon"),
             tightening: &tightening,

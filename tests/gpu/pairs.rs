@@ -44,7 +44,7 @@ fn race_deviation(mut gpu: Gpu) {
 /// Both measures of a pair in f32 on the host.
 fn pair_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     [mut a, mut b]: [[f32; NX]; 2],
 ) -> [f32; 2] {
     let (system, policy) = (plant.system, plant.policy);
@@ -66,7 +66,7 @@ fn pair_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usi
 
 fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     found: &[PairMeasure],
 ) where
     S: System<NX, NU>,
@@ -91,7 +91,7 @@ fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
 /// Distances of a pair at each step.
 fn distances<R: Real, S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     pair: u64,
 ) -> Vec<R> {
     let [mut a, mut b] = task.pairs.load::<1>(pair).map(|x| x.map(|x| R::lit(x.0[0])));
@@ -111,7 +111,7 @@ fn distances<R: Real, S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, con
 
 fn assert_farthest_close_to_f64<S, P, const NX: usize, const NU: usize>(
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     farthest: &[Farthest],
 ) where
     S: System<NX, NU>,

@@ -13,7 +13,7 @@ fn bits(values: impl IntoIterator<Item = f32>) -> Vec<u32> {
     values.into_iter().map(f32::to_bits).collect()
 }
 
-fn revealed_starts<const NX: usize>(mut gpu: Gpu, starts: &Starts<'_, NX>, first: u64) -> Gpu {
+fn revealed_starts<const NX: usize>(mut gpu: Gpu, starts: &Starts<'_>, first: u64) -> Gpu {
     let spec = RolloutSpec::new(1, 0.5).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = ReachAvoidTask {
@@ -44,7 +44,7 @@ fn starts_have_the_host_bits() {
     let region = Region::new_box(low, high).expect("a box");
     gpu = revealed_starts(gpu, &drawn(region, 0x1234_5678_9abc_def0), first);
     let list: Vec<[f32; 5]> = (0..700).map(|i| [0.1 * i as f32, 1.0, -2.0, 3.0, 0.7]).collect();
-    gpu = revealed_starts(gpu, &Starts::Listed(&list), 123);
+    gpu = revealed_starts(gpu, &Starts::listed(&list), 123);
     for varies in [[true; 6], [true, false, true, true, false, true]] {
         let ball = Ball { center: [0.3, -0.2, 1.0, 0.0, 5.0, -0.7], radius: 0.55, varies };
         gpu = revealed_starts(gpu, &drawn(Region::Ball(ball), 7), first);

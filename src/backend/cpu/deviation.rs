@@ -1,24 +1,19 @@
 //! Pairs of rollouts side by side: the farthest pair of each step, and both measures.
 
 use super::dispatch::{Body, Unit};
+use super::frame::Frame;
 use super::kernel::Kernel;
-use super::load::LoadPairs;
-use super::mlp::Packed;
-use super::tile::{Driver, Loss, Score, is_finite};
-use crate::policy::Policy;
+use super::load::Loader;
+use super::tile::{Driven, Driver, Loss, Score, is_finite, lanes};
 use crate::real::{Lanes, Real, per_lane};
-use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure, Plant};
-use crate::system::System;
+use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure};
 
 /// Consecutive pairs for one thread; twin: `shaders/deviation.wgsl`.
-#[derive(Debug)]
-pub(super) struct Deviation<'a, S, P, const NX: usize, const NU: usize> {
-    /// System and policy.
-    pub(super) plant: Plant<'a, S, P>,
-    /// The policy's network, packed for the kernel.
-    pub(super) network: Option<&'a Packed>,
+pub(super) struct Deviation<'a> {
+    /// The plant.
+    pub(super) plant: Driven<'a>,
     /// The task.
-    pub(super) task: &'a DeviationTask<'a, NX>,
+    pub(super) task: &'a DeviationTask<'a>,
     /// Most pairs in lockstep.
     pub(super) width: usize,
     /// Index of the first pair.
@@ -27,139 +22,117 @@ pub(super) struct Deviation<'a, S, P, const NX: usize, const NU: usize> {
     pub(super) out: &'a mut [PairMeasure],
 }
 
-impl<S, P, const NX: usize, const NU: usize> Unit for Deviation<'_, S, P, NX, NU>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+impl Unit for Deviation<'_> {
     /// The farthest pair of each step, `[T + 1]`.
     type Output = Vec<Farthest>;
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Vec<Farthest> {
-        let Self { plant, task, width, .. } = self;
-        let mut driver = Driver::<S, P, K, N, NU>::new(plant, self.network, kernel, width);
+        let Self { task, width, .. } = self;
+        let mut driver = Driver::new(self.plant, kernel, width);
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
-        let mut pairs = Pairs::<N, NX>::new(width);
+        let mut pairs = Pairs::<K, N>::new(&driver, width);
         for (tile, out) in self.out.chunks_mut(width).enumerate() {
             let first = self.first + (tile * width) as u64;
-            pairs.load(kernel, task, first, out.len());
+            pairs.load(task, first, out.len());
             for (t, farthest) in farthest.iter_mut().enumerate() {
                 if t > 0 {
                     pairs.step(&mut driver, task.control);
                 }
                 pairs.judge(&driver, task, t, farthest);
             }
-            for (out, scores) in out.chunks_mut(N).zip(&pairs.scores) {
-                write(scores, out);
-            }
+            pairs.write(out);
         }
         farthest
     }
 }
 
-/// A tile of pairs, group by group.
-#[derive(Debug)]
-struct Pairs<const N: usize, const NX: usize> {
-    nominal: Vec<[Lanes<N>; NX]>,
-    perturbed: Vec<[Lanes<N>; NX]>,
-    /// Of the nominal and of the perturbed rollouts.
-    scores: Vec<[Score<N>; 2]>,
+/// A tile of pairs.
+struct Pairs<K, const N: usize> {
+    loader: Loader<K, N>,
+    nominal: Frame,
+    perturbed: Frame,
+    /// Of the nominal and of the perturbed rollouts, group by group.
+    scores: [Vec<Score<N>>; 2],
     first: u64,
     count: usize,
 }
 
-impl<const N: usize, const NX: usize> Pairs<N, NX> {
+impl<K: Kernel, const N: usize> Pairs<K, N> {
     /// Room for `width` pairs.
-    fn new(width: usize) -> Self {
-        let groups = width.div_ceil(N);
+    fn new(driver: &Driver<'_, K>, width: usize) -> Self {
+        let nominal = driver.frame();
         Self {
-            nominal: vec![[Lanes([0.0; N]); NX]; groups],
-            perturbed: vec![[Lanes([0.0; N]); NX]; groups],
-            scores: vec![[Score::new(); 2]; groups],
+            loader: Loader::new(driver.kernel(), nominal.states().len()),
+            nominal,
+            perturbed: driver.frame(),
+            scores: [(); 2].map(|()| vec![Score::new(); width.div_ceil(N)]),
             first: 0,
             count: 0,
         }
     }
 
     /// Takes the pairs `first..first + count` in.
-    fn load<K: Kernel>(
-        &mut self,
-        kernel: K,
-        task: &DeviationTask<'_, NX>,
-        first: u64,
-        count: usize,
-    ) {
+    fn load(&mut self, task: &DeviationTask<'_>, first: u64, count: usize) {
         (self.first, self.count) = (first, count);
-        let groups = self.nominal.iter_mut().zip(&mut self.perturbed);
-        for (group, (nominal, perturbed)) in groups.take(count.div_ceil(N)).enumerate() {
-            kernel.call(LoadPairs {
-                pairs: &task.pairs,
-                first: first + (group * N) as u64,
-                nominal,
-                perturbed,
-            });
-        }
-        self.scores.fill([Score::new(); 2]);
+        let frames = [&mut self.nominal, &mut self.perturbed];
+        self.loader.pairs(&task.pairs, first, count, frames);
+        self.scores.iter_mut().for_each(|scores| scores.fill(Score::new()));
     }
 
     /// Moves both rollouts of each pair one step on.
-    fn step<S, P, K, const NU: usize>(
-        &mut self,
-        driver: &mut Driver<'_, S, P, K, N, NU>,
-        control: PairControl,
-    ) where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-        K: Kernel,
-    {
-        let groups = self.count.div_ceil(N);
-        let (nominal, perturbed) = (&mut self.nominal[..groups], &mut self.perturbed[..groups]);
-        driver.decide(nominal, self.count);
-        driver.step(nominal);
+    fn step(&mut self, driver: &mut Driver<'_, K>, control: PairControl) {
+        driver.decide(&mut self.nominal, self.count);
         match control {
-            PairControl::Replay => {}
-            PairControl::ClosedLoop => driver.decide(perturbed, self.count),
+            PairControl::Replay => self.perturbed.copy_controls(&self.nominal),
+            PairControl::ClosedLoop => driver.decide(&mut self.perturbed, self.count),
         }
-        driver.step(perturbed);
+        driver.step(&mut self.nominal, self.count);
+        driver.step(&mut self.perturbed, self.count);
     }
 
     /// Adds the states of step `t` to the scores, and their distances to the farthest.
-    fn judge<S, P, K, const NU: usize>(
+    fn judge(
         &mut self,
-        driver: &Driver<'_, S, P, K, N, NU>,
-        task: &DeviationTask<'_, NX>,
+        driver: &Driver<'_, K>,
+        task: &DeviationTask<'_>,
         t: usize,
         farthest: &mut Farthest,
-    ) where
-        S: System<NX, NU>,
-        K: Kernel,
-    {
-        let (loss, gamma) = (Loss::at(task.tightening, t), task.spec.gamma);
-        let states = self.nominal.iter().zip(&self.perturbed);
-        let groups = self.scores.iter_mut().zip(states);
-        for (group, (scores, (x, y))) in groups.take(self.count.div_ceil(N)).enumerate() {
-            let [nominal, perturbed] = scores;
-            driver.judge(x, nominal, &loss, gamma);
-            driver.judge(y, perturbed, &Loss::NONE, gamma);
-            let live = N.min(self.count - group * N);
-            let first = self.first + (group * N) as u64;
-            driver.kernel().call(Gap { x, y, live, first, farthest });
+    ) {
+        let losses = [Loss::at(task.tightening, t), Loss::NONE];
+        let frames = [&mut self.nominal, &mut self.perturbed];
+        for ((frame, scores), loss) in frames.into_iter().zip(&mut self.scores).zip(losses) {
+            driver.at_step(frame, t);
+            let scores = scores.iter_mut().map(|score| (score, loss));
+            driver.judge(frame, self.count, task.spec.gamma, scores);
+        }
+        for at in (0..self.count).step_by(N) {
+            let live = N.min(self.count - at);
+            let first = self.first + at as u64;
+            let (x, y) = (&self.nominal, &self.perturbed);
+            driver.kernel().call(Gap::<N> { x, y, at, live, first, farthest });
         }
     }
-}
 
-/// Writes the measures of the first pairs of a group.
-fn write<const N: usize>([nominal, perturbed]: &[Score<N>; 2], out: &mut [PairMeasure]) {
-    let (nominal, perturbed) = (nominal.measure().0, perturbed.measure().0);
-    for (out, (nominal, perturbed)) in out.iter_mut().zip(nominal.into_iter().zip(perturbed)) {
-        *out = PairMeasure { nominal, perturbed };
+    /// Writes the measures of the pairs.
+    fn write(&self, out: &mut [PairMeasure]) {
+        let [nominal, perturbed] = &self.scores;
+        for (out, (nominal, perturbed)) in out.chunks_mut(N).zip(nominal.iter().zip(perturbed)) {
+            let (nominal, perturbed) = (nominal.measure().0, perturbed.measure().0);
+            for (out, (nominal, perturbed)) in
+                out.iter_mut().zip(nominal.into_iter().zip(perturbed))
+            {
+                *out = PairMeasure { nominal, perturbed };
+            }
+        }
     }
 }
 
 /// Merges the distances of a group of pairs into the farthest.
-struct Gap<'a, const N: usize, const NX: usize> {
-    x: &'a [Lanes<N>; NX],
-    y: &'a [Lanes<N>; NX],
+struct Gap<'a, const N: usize> {
+    x: &'a Frame,
+    y: &'a Frame,
+    /// The first of them in the tile.
+    at: usize,
     /// How many of the pairs there are.
     live: usize,
     /// Index of the first of them.
@@ -167,14 +140,14 @@ struct Gap<'a, const N: usize, const NX: usize> {
     farthest: &'a mut Farthest,
 }
 
-impl<const N: usize, const NX: usize> Body for Gap<'_, N, NX> {
+impl<const N: usize> Body for Gap<'_, N> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         let mut square = Lanes::<N>::lit(0.0);
-        for (x, y) in self.x.iter().zip(self.y) {
-            let gap = *y - *x;
+        for row in self.x.states() {
+            let gap = lanes(self.y, row, self.at) - lanes(self.x, row, self.at);
             square = square + gap * gap;
         }
         let root = square.sqrt().0;

@@ -1,8 +1,11 @@
 //! Which instructions the rollouts are compiled for: picked once, when the backend starts.
 
+use std::marker::PhantomData;
+
 use super::kernel::{Kernel, Portable};
 #[cfg(target_arch = "x86_64")]
 use super::kernel_x86::{Avx2, Avx512};
+use crate::real::Vector;
 
 /// Work on one group of lanes, compiled for each instruction set by itself.
 ///
@@ -27,6 +30,27 @@ pub(super) trait Unit {
 
     /// Does the work, `N` trajectories per group.
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Self::Output;
+}
+
+/// Formulas over the vectors of an instruction set.
+pub(super) trait Formulas {
+    /// Does the work. Must be `#[inline(always)]`, as for [`Body`].
+    fn run<V: Vector>(self);
+}
+
+/// Formulas as the body that a kernel calls.
+struct InVectors<K, F> {
+    kernel: PhantomData<K>,
+    formulas: F,
+}
+
+impl<K: Kernel, F: Formulas> Body for InVectors<K, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.formulas.run::<K::Vector>();
+    }
 }
 
 /// An instruction set that the processor has.
@@ -77,6 +101,17 @@ impl Instructions {
         }
     }
 
+    /// Evaluates `formulas` with these instructions.
+    pub(super) fn call<F: Formulas>(self, formulas: F) {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(kernel) => in_vectors(kernel, formulas),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(kernel) => in_vectors(kernel, formulas),
+            Self::Baseline => in_vectors(Portable, formulas),
+        }
+    }
+
     /// Does `unit` with these instructions.
     ///
     /// 16 lanes per group; for a unit that draws, 32 with AVX-512.
@@ -91,4 +126,9 @@ impl Instructions {
             Self::Baseline => unit.run::<_, 16>(Portable),
         }
     }
+}
+
+/// Calls `formulas` through `kernel`.
+fn in_vectors<K: Kernel, F: Formulas>(kernel: K, formulas: F) {
+    kernel.call(InVectors::<K, F> { kernel: PhantomData, formulas });
 }

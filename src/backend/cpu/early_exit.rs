@@ -1,51 +1,56 @@
 //! Signs of reach-avoid measures: a decided trajectory leaves the tile, and the next start takes
 //! its lane.
 
+use super::frame::Frame;
 use super::kernel::Kernel;
-use super::load::LoadStarts;
+use super::load::Loader;
 use super::reach_avoid::ReachAvoid;
 use super::tile::{Driver, Loss, Score};
-use crate::policy::Policy;
-use crate::real::{Lanes, Real, per_lane};
+use crate::real::per_lane;
 use crate::rollout::{NON_FINITE, ReachAvoidTask};
-use crate::system::System;
 
 /// The signs of the unit's measures.
 ///
 /// Each lane has a clock of its own, so the tile stays full until no start is left, and then
 /// shrinks. A trajectory does not see which lane it is in.
-pub(super) fn signs<S, P, K, const N: usize, const NX: usize, const NU: usize>(
-    unit: ReachAvoid<'_, S, P, NX, NU>,
-    mut driver: Driver<'_, S, P, K, N, NU>,
-) where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-    K: Kernel,
-{
-    let mut queue = Queue::<N, NX>::new(unit.task, unit.first, unit.out.len());
-    let mut x = vec![[Lanes([0.0; N]); NX]; unit.width.div_ceil(N)];
-    let mut groups = vec![Group::<N>::new(); x.len()];
+pub(super) fn signs<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver: Driver<'_, K>) {
+    let mut queue = Queue::<K, N>::new(&unit, &driver);
+    let mut frame = driver.frame();
+    let mut groups = vec![Group::<N>::new(); unit.width.div_ceil(N)];
     let mut live = 0;
     loop {
         while live < unit.width && queue.fill(&driver, unit.out) {
             queue.waiting -= 1;
-            let (to, lane) = (live / N, queue.waiting);
-            copy_lane(&mut x[to], live % N, &queue.x, lane);
-            groups[to].copy_lane(live % N, &queue.group, lane);
+            frame.copy_lane(live, &queue.frame, queue.waiting);
+            groups[live / N].copy_lane(live % N, &queue.group, queue.waiting);
             live += 1;
         }
         if live == 0 {
             return;
         }
-        let active = &mut x[..live.div_ceil(N)];
-        driver.decide(active, live);
-        driver.step(active);
-        for (x, group) in active.iter().zip(&mut groups) {
-            group.tick(unit.task.spec.horizon);
-            group.judge(&driver, x, unit.task);
-        }
-        live = retire(&mut x, &mut groups, live, unit.out);
+        driver.decide(&mut frame, live);
+        driver.step(&mut frame, live);
+        groups.iter_mut().for_each(|group| group.tick(unit.task.spec.horizon));
+        judge(&driver, &mut frame, &mut groups, live, unit.task);
+        live = retire(&mut frame, &mut groups, live, unit.out);
     }
+}
+
+/// Adds the states of a tile to its groups.
+fn judge<K: Kernel, const N: usize>(
+    driver: &Driver<'_, K>,
+    frame: &mut Frame,
+    groups: &mut [Group<N>],
+    live: usize,
+    task: &ReachAvoidTask<'_>,
+) {
+    driver.at_steps(frame, groups.iter().flat_map(|group| group.step));
+    let scores = groups.iter_mut().map(|group| {
+        let loss = Loss::at_each(task.tightening, &group.step);
+        (&mut group.score, loss)
+    });
+    driver.judge(frame, live, task.spec.gamma, scores);
+    groups.iter_mut().take(live.div_ceil(N)).for_each(|group| group.decide(task.spec.horizon));
 }
 
 /// What is known of the trajectories of a group besides their states.
@@ -71,19 +76,9 @@ impl<const N: usize> Group<N> {
         self.step = per_lane!(N, i => (self.step[i] + 1).min(horizon));
     }
 
-    /// Adds the states `x`.
-    fn judge<S, P, K, const NX: usize, const NU: usize>(
-        &mut self,
-        driver: &Driver<'_, S, P, K, N, NU>,
-        x: &[Lanes<N>; NX],
-        task: &ReachAvoidTask<'_, NX>,
-    ) where
-        S: System<NX, NU>,
-        K: Kernel,
-    {
-        let loss = Loss::at_each(task.tightening, &self.step);
-        driver.judge(x, &mut self.score, &loss, task.spec.gamma);
-        let (decided, horizon) = (self.score.decided(), task.spec.horizon);
+    /// Notes which signs are known.
+    fn decide(&mut self, horizon: u32) {
+        let decided = self.score.decided();
         self.done = per_lane!(N, i => decided[i] | u32::from(self.step[i] == horizon));
     }
 
@@ -112,20 +107,9 @@ fn sign(measure: f32) -> f32 {
     }
 }
 
-fn copy_lane<const N: usize, const NX: usize>(
-    x: &mut [Lanes<N>; NX],
-    to: usize,
-    source: &[Lanes<N>; NX],
-    from: usize,
-) {
-    for (x, source) in x.iter_mut().zip(source) {
-        x.0[to] = source.0[from];
-    }
-}
-
 /// Writes the results of decided trajectories and closes the gaps; returns how many are left.
-fn retire<const N: usize, const NX: usize>(
-    x: &mut [[Lanes<N>; NX]],
+fn retire<const N: usize>(
+    frame: &mut Frame,
     groups: &mut [Group<N>],
     mut live: usize,
     out: &mut [f32],
@@ -142,69 +126,58 @@ fn retire<const N: usize, const NX: usize>(
             }
             out[groups[index].place[lane] as usize] = signs[lane];
             live -= 1;
-            let (last, from) = (live / N, live % N);
-            let (moved, states) = (groups[last], x[last]);
-            groups[index].copy_lane(lane, &moved, from);
-            copy_lane(&mut x[index], lane, &states, from);
+            let moved = groups[live / N];
+            groups[index].copy_lane(lane, &moved, live % N);
+            frame.move_lane(index * N + lane, live);
         }
     }
     live
 }
 
 /// The next starts, judged at their first state: many are decided before any step.
-#[derive(Debug)]
-struct Queue<'a, const N: usize, const NX: usize> {
-    task: &'a ReachAvoidTask<'a, NX>,
+struct Queue<'a, K, const N: usize> {
+    task: &'a ReachAvoidTask<'a>,
     first: u64,
     count: usize,
     /// Starts loaded so far.
     loaded: usize,
-    x: [Lanes<N>; NX],
+    loader: Loader<K, N>,
+    frame: Frame,
     group: Group<N>,
     /// The first so many lanes wait for a place in the tile.
     waiting: usize,
 }
 
-impl<'a, const N: usize, const NX: usize> Queue<'a, N, NX> {
-    fn new(task: &'a ReachAvoidTask<'a, NX>, first: u64, count: usize) -> Self {
+impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
+    fn new(unit: &ReachAvoid<'a>, driver: &Driver<'_, K>) -> Self {
+        let frame = driver.frame_of(N);
         Self {
-            task,
-            first,
-            count,
+            task: unit.task,
+            first: unit.first,
+            count: unit.out.len(),
             loaded: 0,
-            x: [Lanes::lit(0.0); NX],
+            loader: Loader::new(driver.kernel(), frame.states().len()),
+            frame,
             group: Group::new(),
             waiting: 0,
         }
     }
 
     /// Loads starts until one waits; false if none is left.
-    fn fill<S, P, K, const NU: usize>(
-        &mut self,
-        driver: &Driver<'_, S, P, K, N, NU>,
-        out: &mut [f32],
-    ) -> bool
-    where
-        S: System<NX, NU>,
-        K: Kernel,
-    {
+    fn fill(&mut self, driver: &Driver<'_, K>, out: &mut [f32]) -> bool {
         while self.waiting == 0 {
             if self.loaded == self.count {
                 return false;
             }
             let live = N.min(self.count - self.loaded);
-            driver.kernel().call(LoadStarts {
-                starts: &self.task.starts,
-                first: self.first + self.loaded as u64,
-                x: &mut self.x,
-            });
+            let first = self.first + self.loaded as u64;
+            self.loader.starts(&self.task.starts, first, live, &mut self.frame);
             self.group = Group::new();
             self.group.place = per_lane!(N, i => (self.loaded + i) as u32);
-            self.group.judge(driver, &self.x, self.task);
+            let group = std::slice::from_mut(&mut self.group);
+            judge(driver, &mut self.frame, group, live, self.task);
             self.loaded += live;
-            let (x, group) =
-                (std::slice::from_mut(&mut self.x), std::slice::from_mut(&mut self.group));
-            self.waiting = retire(x, group, live, out);
+            self.waiting = retire(&mut self.frame, group, live, out);
         }
         true
     }

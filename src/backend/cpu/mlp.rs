@@ -1,10 +1,13 @@
 //! A network for a tile of trajectories in lockstep: weights packed in panels, activations in
 //! blocks.
 
+use std::ops::Range;
+
 use super::dispatch::Body;
+use super::frame::Frame;
 use super::kernel::{GRANULE, Kernel, Panel};
 use crate::error::{Error, Result};
-use crate::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use crate::policy::{Activation, Layer, Mlp, OutputActivation};
 use crate::real::{Lanes, Real};
 
 /// A network whose weights are in the order in which a kernel reads them.
@@ -32,27 +35,21 @@ enum Squash {
 }
 
 impl Packed {
-    /// The network of `policy`, if it is one.
+    /// Refuses a `network` that does not map `inputs` to `outputs` numbers.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the network does not map `NX` states to `NU` controls.
-    pub(super) fn of<P, const NX: usize, const NU: usize>(policy: &P) -> Result<Option<&Mlp>>
-    where
-        P: Policy<NX, NU>,
-    {
-        let Some(network) = policy.network() else {
-            return Ok(None);
-        };
+    /// [`Error::Invalid`] with both shapes.
+    pub(super) fn check(network: &Mlp, inputs: usize, outputs: usize) -> Result<()> {
         let widths = network.widths();
-        let (inputs, outputs) = (widths[0], widths[widths.len() - 1]);
-        if (inputs, outputs) != (NX, NU) {
-            let problem = format!(
-                "the network maps {inputs} inputs to {outputs} outputs, \
-                 the system has {NX} states and {NU} controls"
-            );
-            return Err(Error::invalid("policy", problem));
+        let (has_inputs, has_outputs) = (widths[0], widths[widths.len() - 1]);
+        if (has_inputs, has_outputs) == (inputs, outputs) {
+            return Ok(());
         }
-        Ok(Some(network))
+        let problem = format!(
+            "the network maps {has_inputs} inputs to {has_outputs} outputs, \
+             the system has {inputs} states and {outputs} controls"
+        );
+        Err(Error::invalid("policy", problem))
     }
 
     /// Packs `network` for panels of `rows` neurons.
@@ -171,17 +168,28 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
         Self { network, kernel, inputs: vec![0.0; size], outputs: vec![0.0; size] }
     }
 
-    /// The outputs for the first `lanes` trajectories of the groups `x`.
-    pub(super) fn forward<const N: usize, const NX: usize, const NU: usize>(
-        &mut self,
-        x: &[[Lanes<N>; NX]],
-        lanes: usize,
-        u: &mut [[Lanes<N>; NU]],
-    ) {
-        self.forward_some(x, lanes, u, NU);
+    /// From the rows `rows[0]` of a tile to its rows `rows[1]`, for the first `lanes` trajectories.
+    pub(super) fn forward(&mut self, frame: &mut Frame, rows: [Range<usize>; 2], lanes: usize) {
+        let [from, to] = rows;
+        for granule in 0..lanes.div_ceil(GRANULE) {
+            let (first, at) = (granule * GRANULE, place::<K>(granule, from.len()));
+            for (feature, row) in from.clone().enumerate() {
+                self.inputs[at + feature * K::BLOCK..][..GRANULE]
+                    .copy_from_slice(&frame.row(row)[first..][..GRANULE]);
+            }
+        }
+        self.layers::<GRANULE>(lanes);
+        for granule in 0..lanes.div_ceil(GRANULE) {
+            let (first, at) = (granule * GRANULE, place::<K>(granule, to.len()));
+            for (feature, row) in to.clone().enumerate() {
+                frame.row_mut(row)[first..][..GRANULE]
+                    .copy_from_slice(&self.inputs[at + feature * K::BLOCK..][..GRANULE]);
+            }
+        }
     }
 
-    /// The same for a network of `outputs` outputs, the first entries of `u`.
+    /// The outputs for the first `lanes` trajectories of the groups `x`, the first `outputs`
+    /// entries of `u`.
     pub(super) fn forward_some<const N: usize, const NX: usize, const NU: usize>(
         &mut self,
         x: &[[Lanes<N>; NX]],
@@ -190,31 +198,34 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
         outputs: usize,
     ) {
         for granule in 0..lanes.div_ceil(GRANULE) {
-            let (group, lane, at) = places::<K, N>(granule, NX);
-            for (feature, x) in x[group].iter().enumerate() {
+            let (first, at) = (granule * GRANULE, place::<K>(granule, NX));
+            for (feature, x) in x[first / N].iter().enumerate() {
                 self.inputs[at + feature * K::BLOCK..][..GRANULE]
-                    .copy_from_slice(&x.0[lane..][..GRANULE]);
+                    .copy_from_slice(&x.0[first % N..][..GRANULE]);
             }
         }
-        for layer in &self.network.layers {
-            layer.forward::<K, N>(self.kernel, lanes, &self.inputs, &mut self.outputs);
-            std::mem::swap(&mut self.inputs, &mut self.outputs);
-        }
+        self.layers::<N>(lanes);
         for granule in 0..lanes.div_ceil(GRANULE) {
-            let (group, lane, at) = places::<K, N>(granule, outputs);
-            for (feature, u) in u[group].iter_mut().take(outputs).enumerate() {
-                u.0[lane..][..GRANULE]
+            let (first, at) = (granule * GRANULE, place::<K>(granule, outputs));
+            for (feature, u) in u[first / N].iter_mut().take(outputs).enumerate() {
+                u.0[first % N..][..GRANULE]
                     .copy_from_slice(&self.inputs[at + feature * K::BLOCK..][..GRANULE]);
             }
         }
     }
+
+    /// All layers, from `inputs` back to `inputs`; activations by groups of `N`.
+    fn layers<const N: usize>(&mut self, lanes: usize) {
+        for layer in &self.network.layers {
+            layer.forward::<K, N>(self.kernel, lanes, &self.inputs, &mut self.outputs);
+            std::mem::swap(&mut self.inputs, &mut self.outputs);
+        }
+    }
 }
 
-/// Where a granule lies: its group, its first lane there, and its offset in
-/// `[blocks, features, BLOCK]`.
+/// Where a granule lies in `[blocks, features, BLOCK]`.
 #[inline(always)]
-fn places<K: Kernel, const N: usize>(granule: usize, features: usize) -> (usize, usize, usize) {
+fn place<K: Kernel>(granule: usize, features: usize) -> usize {
     let first = granule * GRANULE;
-    let at = first / K::BLOCK * features * K::BLOCK + first % K::BLOCK;
-    (first / N, first % N, at)
+    first / K::BLOCK * features * K::BLOCK + first % K::BLOCK
 }

@@ -1,8 +1,10 @@
 //! The native CPU backend: tiles of trajectories in SIMD lanes, tiles spread over threads.
 
+mod compiled;
 mod deviation;
 mod dispatch;
 mod early_exit;
+mod frame;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;
@@ -12,6 +14,7 @@ mod mppi;
 mod mppi_rollout;
 mod mppi_update;
 mod packs;
+mod physics;
 mod reach_avoid;
 mod schedule;
 mod spread;
@@ -23,13 +26,16 @@ mod vector_x86;
 
 use std::sync::Arc;
 
+use self::compiled::Compiled;
 use self::deviation::Deviation;
 use self::dispatch::Instructions;
 use self::mlp::Packed;
 use self::packs::Packs;
+use self::physics::Physics;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
+use self::tile::Driven;
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
 use crate::policy::{Mlp, Policy};
@@ -115,63 +121,75 @@ impl Cpu {
     pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
         &self,
         plant: Plant<'_, S, P>,
-        task: &ReachAvoidTask<'_, NX>,
+        task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()>
     where
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        check(&task.starts, task.range.end, task.tightening, &task.spec)?;
-        let network = self.pack::<P, NX, NU>(plant.policy)?;
-        let network = network.as_deref();
-        let mut measures = Vec::new();
-        for chunk in chunks(&task.range) {
-            let schedule = self.schedule(chunk.count, network);
-            measures.resize(chunk.count, 0.0);
-            spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
-                self.instructions.run(ReachAvoid {
-                    plant,
-                    network,
-                    task,
-                    width: schedule.width,
-                    first: chunk.first + (unit * schedule.unit) as u64,
-                    out,
-                });
-            });
-            sink(chunk.first, &measures)?;
-        }
-        Ok(())
+        self.measures(&Compiled(plant), plant.policy.network(), task, sink)
     }
 
     /// See [`super::Backend::deviation`].
     pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
         &self,
         plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_, NX>,
+        task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>>
     where
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
+        self.pairs(&Compiled(plant), plant.policy.network(), task, sink)
+    }
+
+    /// Measures of starts under any plant.
+    fn measures(
+        &self,
+        physics: &dyn Physics,
+        network: Option<&Mlp>,
+        task: &ReachAvoidTask<'_>,
+        sink: MeasureSink<'_>,
+    ) -> Result<()> {
+        check(&task.starts, task.range.end, task.tightening, &task.spec)?;
+        let network = self.network(physics, network)?;
+        let plant = Driven { physics, network: network.as_deref(), with: self.instructions };
+        let mut measures = Vec::new();
+        for chunk in chunks(&task.range) {
+            let schedule = self.schedule(chunk.count, plant.network);
+            measures.resize(chunk.count, 0.0);
+            spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
+                let first = chunk.first + (unit * schedule.unit) as u64;
+                let width = schedule.width;
+                self.instructions.run(ReachAvoid { plant, task, width, first, out });
+            });
+            sink(chunk.first, &measures)?;
+        }
+        Ok(())
+    }
+
+    /// Pairs under any plant.
+    fn pairs(
+        &self,
+        physics: &dyn Physics,
+        network: Option<&Mlp>,
+        task: &DeviationTask<'_>,
+        sink: PairSink<'_>,
+    ) -> Result<Vec<Farthest>> {
         check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
-        let network = self.pack::<P, NX, NU>(plant.policy)?;
-        let network = network.as_deref();
+        let network = self.network(physics, network)?;
+        let plant = Driven { physics, network: network.as_deref(), with: self.instructions };
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
-            let schedule = self.schedule(chunk.count, network);
+            let schedule = self.schedule(chunk.count, plant.network);
             measures.resize(chunk.count, PairMeasure::default());
             let found = spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
-                self.instructions.run(Deviation {
-                    plant,
-                    network,
-                    task,
-                    width: schedule.width,
-                    first: chunk.first + (unit * schedule.unit) as u64,
-                    out,
-                })
+                let first = chunk.first + (unit * schedule.unit) as u64;
+                let width = schedule.width;
+                self.instructions.run(Deviation { plant, task, width, first, out })
             });
             for found in found {
                 let steps = farthest.iter_mut().zip(found);
@@ -182,13 +200,14 @@ impl Cpu {
         Ok(farthest)
     }
 
-    /// The network of `policy`, if it is one, packed for the kernel.
-    fn pack<P, const NX: usize, const NU: usize>(&self, policy: &P) -> Result<Option<Arc<Packed>>>
-    where
-        P: Policy<NX, NU>,
-    {
-        let network = Packed::of::<P, NX, NU>(policy)?;
-        Ok(network.map(|network| self.packed(network)))
+    /// The network that drives a plant, if one does, packed for the kernel.
+    fn network(&self, physics: &dyn Physics, network: Option<&Mlp>) -> Result<Option<Arc<Packed>>> {
+        let Some(network) = network else {
+            return Ok(None);
+        };
+        let [inputs, outputs] = physics.network_size();
+        Packed::check(network, inputs, outputs)?;
+        Ok(Some(self.packed(network)))
     }
 
     /// `network`, packed for the kernel.
@@ -203,12 +222,7 @@ impl Cpu {
 }
 
 /// Checks a task against its list of starts and its horizon.
-fn check<const NX: usize>(
-    starts: &Starts<'_, NX>,
-    end: u64,
-    tightening: &Tightening,
-    spec: &RolloutSpec,
-) -> Result<()> {
+fn check(starts: &Starts<'_>, end: u64, tightening: &Tightening, spec: &RolloutSpec) -> Result<()> {
     if let Starts::Listed(list) = starts
         && end > list.len() as u64
     {

@@ -185,7 +185,7 @@ impl<'a, K: Kernel, const N: usize, const NX: usize, const NU: usize> Tile<'a, K
     fn evaluate<const NC: usize>(&mut self, task: &MppiTask<'_, NX, NU, NC>, live: usize) {
         let [value, disturbance] = &mut self.networks;
         if let Some(value) = value {
-            value.forward(&self.states, live, &mut self.values);
+            value.forward_some(&self.states, live, &mut self.values, 1);
         }
         if let (Some(disturbance), Some(asked)) = (disturbance, &task.disturbance) {
             let outputs = asked.entries.len();

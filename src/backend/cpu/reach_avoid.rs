@@ -3,23 +3,16 @@
 use super::dispatch::Unit;
 use super::early_exit::signs;
 use super::kernel::Kernel;
-use super::load::LoadStarts;
-use super::mlp::Packed;
-use super::tile::{Driver, Loss, Score};
-use crate::policy::Policy;
-use crate::real::Lanes;
-use crate::rollout::{Plant, Query, ReachAvoidTask};
-use crate::system::System;
+use super::load::Loader;
+use super::tile::{Driven, Driver, Loss, Score};
+use crate::rollout::{Query, ReachAvoidTask};
 
 /// Consecutive starts for one thread; twin: `shaders/reach_avoid.wgsl`.
-#[derive(Debug)]
-pub(super) struct ReachAvoid<'a, S, P, const NX: usize, const NU: usize> {
-    /// System and policy.
-    pub(super) plant: Plant<'a, S, P>,
-    /// The policy's network, packed for the kernel.
-    pub(super) network: Option<&'a Packed>,
+pub(super) struct ReachAvoid<'a> {
+    /// The plant.
+    pub(super) plant: Driven<'a>,
     /// The task.
-    pub(super) task: &'a ReachAvoidTask<'a, NX>,
+    pub(super) task: &'a ReachAvoidTask<'a>,
     /// Most trajectories in lockstep.
     pub(super) width: usize,
     /// Index of the first start.
@@ -28,56 +21,39 @@ pub(super) struct ReachAvoid<'a, S, P, const NX: usize, const NU: usize> {
     pub(super) out: &'a mut [f32],
 }
 
-impl<S, P, const NX: usize, const NU: usize> Unit for ReachAvoid<'_, S, P, NX, NU>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+impl Unit for ReachAvoid<'_> {
     type Output = ();
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) {
-        let driver = Driver::<S, P, K, N, NU>::new(self.plant, self.network, kernel, self.width);
+        let driver = Driver::new(self.plant, kernel, self.width);
         match self.task.query {
-            Query::Measure => measures(self, driver),
-            Query::Sign => signs(self, driver),
+            Query::Measure => measures::<K, N>(self, driver),
+            Query::Sign => signs::<K, N>(self, driver),
         }
     }
 }
 
 /// The measures, by tiles of trajectories that start and end together.
-fn measures<S, P, K, const N: usize, const NX: usize, const NU: usize>(
-    unit: ReachAvoid<'_, S, P, NX, NU>,
-    mut driver: Driver<'_, S, P, K, N, NU>,
-) where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-    K: Kernel,
-{
+fn measures<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver: Driver<'_, K>) {
     let (task, width) = (unit.task, unit.width);
-    let mut x = vec![[Lanes([0.0; N]); NX]; width.div_ceil(N)];
-    let mut scores = vec![Score::<N>::new(); x.len()];
+    let mut frame = driver.frame();
+    let mut loader = Loader::<K, N>::new(driver.kernel(), frame.states().len());
+    let mut scores = vec![Score::<N>::new(); width.div_ceil(N)];
     for (tile, out) in unit.out.chunks_mut(width).enumerate() {
-        let groups = out.len().div_ceil(N);
-        let (x, scores) = (&mut x[..groups], &mut scores[..groups]);
+        let count = out.len();
         scores.fill(Score::new());
-        for (group, x) in x.iter_mut().enumerate() {
-            driver.kernel().call(LoadStarts {
-                starts: &task.starts,
-                first: unit.first + (tile * width + group * N) as u64,
-                x,
-            });
-        }
+        loader.starts(&task.starts, unit.first + (tile * width) as u64, count, &mut frame);
         for t in 0..=task.spec.horizon as usize {
             if t > 0 {
-                driver.decide(x, out.len());
-                driver.step(x);
+                driver.decide(&mut frame, count);
+                driver.step(&mut frame, count);
             }
+            driver.at_step(&mut frame, t);
             let loss = Loss::at(task.tightening, t);
-            for (x, score) in x.iter().zip(&mut *scores) {
-                driver.judge(x, score, &loss, task.spec.gamma);
-            }
+            let scores = scores.iter_mut().map(|score| (score, loss));
+            driver.judge(&mut frame, count, task.spec.gamma, scores);
         }
-        for (out, score) in out.chunks_mut(N).zip(scores) {
+        for (out, score) in out.chunks_mut(N).zip(&scores) {
             out.copy_from_slice(&score.measure().0[..out.len()]);
         }
     }

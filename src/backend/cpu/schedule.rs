@@ -54,7 +54,7 @@ impl Schedule {
 /// Most trajectories of a tile: multiples of the blocks of every kernel, found by measurement.
 fn most_lanes(widest: Option<usize>) -> usize {
     match widest {
-        None => 32,
+        None => 256,
         Some(0..=256) => 96,
         Some(_) => 192,
     }

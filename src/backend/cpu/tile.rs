@@ -1,14 +1,12 @@
 //! A tile of trajectories in groups of lanes: their controls and their scores.
 
-use std::marker::PhantomData;
-
-use super::dispatch::Body;
+use super::dispatch::{Body, Instructions};
+use super::frame::Frame;
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
-use crate::policy::Policy;
-use crate::real::{Lanes, Real, Vector, load_rows, per_lane, store_rows};
-use crate::rollout::{Fold, HUGE, NON_FINITE, Plant, Tightening};
-use crate::system::System;
+use super::physics::Physics;
+use crate::real::{Lanes, Real, per_lane};
+use crate::rollout::{Fold, HUGE, NON_FINITE, Tightening};
 
 /// Exponent bits of an f32: all set for infinities and NaN.
 const EXPONENT: u32 = 0x7f80_0000;
@@ -20,75 +18,91 @@ pub(super) fn is_finite(value: f32) -> bool {
     value.to_bits() & EXPONENT != EXPONENT
 }
 
-/// A plant with room for the controls of a tile.
-#[derive(Debug)]
-pub(super) struct Driver<'a, S, P, K, const N: usize, const NU: usize> {
-    plant: Plant<'a, S, P>,
-    network: Option<Evaluator<'a, K>>,
-    kernel: K,
-    controls: Vec<[Lanes<N>; NU]>,
+/// A plant, and the network that drives it if its policy is one.
+#[derive(Clone, Copy)]
+pub(super) struct Driven<'a> {
+    /// Formulas of dynamics, margins and policy.
+    pub(super) physics: &'a dyn Physics,
+    /// The policy's network, packed for the kernel.
+    pub(super) network: Option<&'a Packed>,
+    /// The instructions that formulas are evaluated with.
+    pub(super) with: Instructions,
 }
 
-impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N, NU> {
-    /// For tiles of up to `lanes` trajectories; the policy's network packed, if it is one.
-    pub(super) fn new(
-        plant: Plant<'a, S, P>,
-        network: Option<&'a Packed>,
-        kernel: K,
-        lanes: usize,
-    ) -> Self {
-        Self {
-            plant,
-            network: network.map(|network| Evaluator::new(network, kernel, lanes)),
-            kernel,
-            controls: vec![[Lanes([0.0; N]); NU]; lanes.div_ceil(N)],
+/// A plant with what it needs to drive tiles.
+pub(super) struct Driver<'a, K> {
+    plant: Driven<'a>,
+    network: Option<Evaluator<'a, K>>,
+    kernel: K,
+    lanes: usize,
+}
+
+impl<'a, K: Kernel> Driver<'a, K> {
+    /// For tiles of up to `lanes` trajectories.
+    pub(super) fn new(plant: Driven<'a>, kernel: K, lanes: usize) -> Self {
+        let network = plant.network.map(|network| Evaluator::new(network, kernel, lanes));
+        Self { plant, network, kernel, lanes }
+    }
+
+    /// Room for a tile.
+    pub(super) fn frame(&self) -> Frame {
+        self.frame_of(self.lanes)
+    }
+
+    /// Room for a tile of up to `lanes` trajectories.
+    pub(super) fn frame_of(&self, lanes: usize) -> Frame {
+        let physics = self.plant.physics;
+        let mut frame = Frame::new(physics.size(), physics.own_rows(), lanes);
+        physics.fill(&mut frame);
+        frame
+    }
+
+    /// Evaluates the policy at the first `lanes` states.
+    pub(super) fn decide(&mut self, frame: &mut Frame, lanes: usize) {
+        let Driven { physics, with, .. } = self.plant;
+        let Some(network) = &mut self.network else {
+            return physics.control(with, frame, lanes);
+        };
+        physics.observe(with, frame, lanes);
+        let (from, to) = (physics.observed(frame), physics.acted(frame));
+        network.forward(frame, [from, to], lanes);
+        physics.act(with, frame, lanes);
+    }
+
+    /// Moves the first `lanes` states one step on, by the controls decided last.
+    pub(super) fn step(&self, frame: &mut Frame, lanes: usize) {
+        self.plant.physics.step(self.plant.with, frame, lanes);
+    }
+
+    /// Says that the states are those of step `t`.
+    pub(super) fn at_step(&self, frame: &mut Frame, t: usize) {
+        if self.plant.physics.timed() {
+            let row = frame.step();
+            frame.row_mut(row).fill(t as f32);
         }
     }
 
-    /// Evaluates the policy at the first `lanes` states of the groups `x`.
-    pub(super) fn decide<const NX: usize>(&mut self, x: &[[Lanes<N>; NX]], lanes: usize)
-    where
-        P: Policy<NX, NU>,
-    {
-        if let Some(network) = &mut self.network {
-            network.forward(x, lanes, &mut self.controls);
-            return;
-        }
-        let policy = self.plant.policy;
-        for (u, x) in self.controls.iter_mut().zip(x) {
-            self.kernel.call(Control::<P, K, N, NX, NU> { kernel: PhantomData, policy, x, u });
+    /// Says of which step each state is.
+    pub(super) fn at_steps(&self, frame: &mut Frame, steps: impl Iterator<Item = u32>) {
+        if self.plant.physics.timed() {
+            let row = frame.step();
+            frame.row_mut(row).iter_mut().zip(steps).for_each(|(at, step)| *at = step as f32);
         }
     }
 
-    /// Moves the states of the groups one step on, by the controls decided last.
-    pub(super) fn step<const NX: usize>(&self, x: &mut [[Lanes<N>; NX]])
-    where
-        S: System<NX, NU>,
-    {
-        let system = self.plant.system;
-        for (x, u) in x.iter_mut().zip(&self.controls) {
-            self.kernel.call(Step::<S, K, N, NX, NU> { kernel: PhantomData, system, x, u });
-        }
-    }
-
-    /// Adds the states `x` of a group to its scores.
-    pub(super) fn judge<const NX: usize>(
+    /// Adds the first `lanes` states to the scores of their groups, whose margins lose `loss`.
+    pub(super) fn judge<'s, const N: usize>(
         &self,
-        x: &[Lanes<N>; NX],
-        score: &mut Score<N>,
-        loss: &Loss<N>,
+        frame: &mut Frame,
+        lanes: usize,
         gamma: f32,
-    ) where
-        S: System<NX, NU>,
-    {
-        self.kernel.call(Judge::<S, K, N, NX, NU> {
-            kernel: PhantomData,
-            system: self.plant.system,
-            x,
-            score,
-            loss,
-            gamma,
-        });
+        scores: impl Iterator<Item = (&'s mut Score<N>, Loss<N>)>,
+    ) {
+        self.plant.physics.margins(self.plant.with, frame, lanes);
+        for (group, (score, loss)) in scores.take(lanes.div_ceil(N)).enumerate() {
+            let at = group * N;
+            self.kernel.call(Judge { frame, at, score, loss, gamma });
+        }
     }
 
     /// The kernel, for other bodies.
@@ -97,88 +111,47 @@ impl<'a, S, P, K: Kernel, const N: usize, const NU: usize> Driver<'a, S, P, K, N
     }
 }
 
-/// The policy's formula for a group.
-struct Control<'a, P, K, const N: usize, const NX: usize, const NU: usize> {
-    kernel: PhantomData<K>,
-    policy: &'a P,
-    x: &'a [Lanes<N>; NX],
-    u: &'a mut [Lanes<N>; NU],
+/// The numbers of a row from trajectory `at` on.
+#[inline(always)]
+pub(super) fn lanes<const N: usize>(frame: &Frame, row: usize, at: usize) -> Lanes<N> {
+    let mut lanes = [0.0; N];
+    lanes.copy_from_slice(&frame.row(row)[at..][..N]);
+    Lanes(lanes)
 }
 
-impl<P, K, const N: usize, const NX: usize, const NU: usize> Body for Control<'_, P, K, N, NX, NU>
-where
-    P: Policy<NX, NU>,
-    K: Kernel,
-{
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for at in (0..N).step_by(K::Vector::WIDTH) {
-            let x: [K::Vector; NX] = load_rows(self.x, at);
-            store_rows(self.policy.control(x), self.u, at);
-        }
-    }
-}
-
-/// The system's dynamics for a group.
-struct Step<'a, S, K, const N: usize, const NX: usize, const NU: usize> {
-    kernel: PhantomData<K>,
-    system: &'a S,
-    x: &'a mut [Lanes<N>; NX],
-    u: &'a [Lanes<N>; NU],
-}
-
-impl<S, K, const N: usize, const NX: usize, const NU: usize> Body for Step<'_, S, K, N, NX, NU>
-where
-    S: System<NX, NU>,
-    K: Kernel,
-{
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for at in (0..N).step_by(K::Vector::WIDTH) {
-            let x: [K::Vector; NX] = load_rows(self.x, at);
-            store_rows(self.system.step(x, load_rows(self.u, at)), self.x, at);
-        }
-    }
-}
-
-/// The system's margins for a group, folded.
-struct Judge<'a, S, K, const N: usize, const NX: usize, const NU: usize> {
-    kernel: PhantomData<K>,
-    system: &'a S,
-    x: &'a [Lanes<N>; NX],
+/// The margins of a group, folded.
+struct Judge<'a, const N: usize> {
+    frame: &'a Frame,
+    at: usize,
     score: &'a mut Score<N>,
-    loss: &'a Loss<N>,
+    loss: Loss<N>,
     gamma: f32,
 }
 
-impl<S, K, const N: usize, const NX: usize, const NU: usize> Body for Judge<'_, S, K, N, NX, NU>
-where
-    S: System<NX, NU>,
-    K: Kernel,
-{
+impl<const N: usize> Body for Judge<'_, N> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let mut margins = [Lanes([0.0; N]); 2];
-        for at in (0..N).step_by(K::Vector::WIDTH) {
-            let x: [K::Vector; NX] = load_rows(self.x, at);
-            let [target_loss, constraint_loss] = load_rows(&self.loss.0, at);
-            let target = self.system.target(x) - target_loss;
-            let constraint = self.system.constraint(x) - constraint_loss;
-            store_rows([target, constraint], &mut margins, at);
-        }
-        let [target, constraint] = margins;
+        let Loss([target_loss, constraint_loss]) = self.loss;
+        let [target, constraint] = self.frame.margins();
+        let target = lanes(self.frame, target, self.at) - target_loss;
+        let constraint = lanes(self.frame, constraint, self.at) - constraint_loss;
         let mut largest = [0; N];
-        for values in self.x.iter().chain([&target, &constraint]) {
-            largest = per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]));
+        for row in self.frame.states() {
+            largest = with_largest(largest, lanes(self.frame, row, self.at));
+        }
+        for margin in [target, constraint] {
+            largest = with_largest(largest, margin);
         }
         self.score.add(target, constraint, largest, self.gamma);
     }
+}
+
+/// The larger of `largest` and the bits of `values` without their sign.
+#[inline(always)]
+fn with_largest<const N: usize>(largest: [u32; N], values: Lanes<N>) -> [u32; N] {
+    per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]))
 }
 
 /// What both margins lose, per lane: off the target margin, off the constraint margin.

@@ -19,7 +19,7 @@ use crate::system::System;
 pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
     adapter: (&Opened, &Attempt),
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     (farthest, sink): (&mut [Farthest], PairSink<'_>),
 ) -> Result<()>
 where
@@ -73,16 +73,12 @@ struct Buffers {
 }
 
 impl Buffers {
-    fn new<const NX: usize>(
-        job: &Job<'_>,
-        network: Option<&Mlp>,
-        task: &DeviationTask<'_, NX>,
-    ) -> Result<Self> {
+    fn new(job: &Job<'_>, network: Option<&Mlp>, task: &DeviationTask<'_>) -> Result<Self> {
         let (row, stride) = (u64::from(job.plan.row), u64::from(job.plan.stride));
         Ok(Self {
             schedule: job.call.uploaded(&schedule(&task.spec, task.tightening)?),
             region: job.call.uploaded(&region_vectors(&task.pairs.nominal)),
-            state: job.call.storage(16 * NX.div_ceil(4) as u64 * row),
+            state: job.call.storage(16 * task.pairs.nominal.size().div_ceil(4) as u64 * row),
             folds: job.call.storage(8 * row),
             origin: job.call.storage(4 * stride),
             measures: job.call.storage(8 * stride),
@@ -122,7 +118,7 @@ struct Kernels {
 }
 
 /// Parameters of the pairs.
-fn pair_params<const NX: usize>(task: &DeviationTask<'_, NX>, stride: u32) -> Params {
+fn pair_params(task: &DeviationTask<'_>, stride: u32) -> Params {
     let [pair_key_low, pair_key_high] = task.pairs.stream.key();
     Params {
         stride,

@@ -187,7 +187,7 @@ impl Gpu {
     pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
         &self,
         plant: Plant<'_, S, P>,
-        task: &ReachAvoidTask<'_, NX>,
+        task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()>
     where
@@ -201,7 +201,7 @@ impl Gpu {
     pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
         &self,
         plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_, NX>,
+        task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>>
     where

@@ -18,7 +18,7 @@ use crate::system::System;
 pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
     adapter: (&Opened, &Attempt),
     plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
+    task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
 ) -> Result<()>
 where
@@ -69,17 +69,13 @@ struct Buffers {
 }
 
 impl Buffers {
-    fn new<const NX: usize>(
-        job: &Job<'_>,
-        network: Option<&Mlp>,
-        task: &ReachAvoidTask<'_, NX>,
-    ) -> Result<Self> {
+    fn new(job: &Job<'_>, network: Option<&Mlp>, task: &ReachAvoidTask<'_>) -> Result<Self> {
         Ok(Self {
             schedule: job.call.uploaded(&schedule(&task.spec, task.tightening)?),
             region: job.call.uploaded(&region_vectors(&task.starts)),
             measures: job.call.storage(4 * u64::from(job.plan.stride)),
             survivors: job.call.storage(4),
-            sets: [Columns::new(job, NX), Columns::new(job, NX)],
+            sets: [Columns::new(job, task.starts.size()), Columns::new(job, task.starts.size())],
             drive: Drive::new(job, network),
         })
     }

@@ -75,7 +75,7 @@ impl Progress {
 pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
     gpu: &Gpu,
     plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
+    task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
 ) -> Result<()>
 where
@@ -99,7 +99,7 @@ where
 pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
     gpu: &Gpu,
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
     sink: PairSink<'_>,
 ) -> Result<Vec<Farthest>>
 where

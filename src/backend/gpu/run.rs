@@ -153,9 +153,9 @@ impl<'a> Job<'a> {
     }
 
     /// Writes the listed starts `first..first + columns` into `state`; nothing if they are drawn.
-    pub(super) fn upload_starts<const NX: usize>(
+    pub(super) fn upload_starts(
         &self,
-        starts: &Starts<'_, NX>,
+        starts: &Starts<'_>,
         first: u64,
         columns: u32,
         state: &Buffer,
@@ -164,7 +164,7 @@ impl<'a> Job<'a> {
             return;
         }
         let row = self.plan.row as usize;
-        let mut packed = vec![[0.0; 4]; NX.div_ceil(4) * row];
+        let mut packed = vec![[0.0; 4]; starts.size().div_ceil(4) * row];
         for column in 0..columns as usize {
             let start = starts.start(first + column as u64);
             for (i, x) in start.into_iter().enumerate() {
@@ -224,7 +224,7 @@ impl<'a> Batch<'a> {
 }
 
 /// Parameters of the starts; the rest is 0.
-pub(super) fn start_params<const NX: usize>(starts: &Starts<'_, NX>, spec: &RolloutSpec) -> Params {
+pub(super) fn start_params(starts: &Starts<'_>, spec: &RolloutSpec) -> Params {
     let mut params =
         Params { horizon: spec.horizon, region_kind: REGION_LISTED, ..Params::default() };
     if let Starts::Drawn { region, stream } = starts {
@@ -239,7 +239,7 @@ pub(super) fn start_params<const NX: usize>(starts: &Starts<'_, NX>, spec: &Roll
 }
 
 /// One vector per coordinate, as `shaders/sample.wgsl` reads them.
-pub(super) fn region_vectors<const NX: usize>(starts: &Starts<'_, NX>) -> Vec<[f32; 4]> {
+pub(super) fn region_vectors(starts: &Starts<'_>) -> Vec<[f32; 4]> {
     let vector = |i: usize| match starts {
         Starts::Listed(_) => [0.0; 4],
         Starts::Drawn { region, .. } => match region {
@@ -250,7 +250,7 @@ pub(super) fn region_vectors<const NX: usize>(starts: &Starts<'_, NX>) -> Vec<[f
             }
         },
     };
-    (0..NX).map(vector).collect()
+    (0..starts.size()).map(vector).collect()
 }
 
 /// Per step: discount, and what both margins lose. The discount is multiplied up step by step in
@@ -281,9 +281,11 @@ pub(super) fn schedule(spec: &RolloutSpec, tightening: &Tightening) -> Result<Ve
 
 /// # Errors
 /// [`Error::Invalid`] for an empty list of starts.
-pub(super) fn check_starts<const NX: usize>(starts: &Starts<'_, NX>) -> Result<()> {
+pub(super) fn check_starts(starts: &Starts<'_>) -> Result<()> {
     match starts {
-        Starts::Listed([]) => Err(Error::invalid("starts", "the list is empty")),
+        Starts::Listed(list) if list.is_empty() => {
+            Err(Error::invalid("starts", "the list is empty"))
+        }
         _ => Ok(()),
     }
 }

@@ -39,7 +39,7 @@ fn a_state_that_is_not_finite_fails_the_rest_of_its_rollout() {
     for cpu in every_cpu() {
         for query in [Query::Measure, Query::Sign] {
             let task = ReachAvoidTask {
-                starts: Starts::Listed(&starts),
+                starts: Starts::listed(&starts),
                 range: 0..starts.len() as u64,
                 spec,
                 tightening: &Tightening::none(&spec),
@@ -67,7 +67,7 @@ fn a_violation_before_the_burst_decides_the_sign() {
     let plant = Plant { system: &system, policy: &Fragile };
     let run = |query| {
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&starts),
+            starts: Starts::listed(&starts),
             range: 0..2,
             spec,
             tightening: &Tightening::none(&spec),
@@ -86,7 +86,7 @@ fn a_pair_that_is_not_finite_is_the_farthest() {
     let plant = Plant { system: &system, policy: &Fragile };
     let task = DeviationTask {
         pairs: Pairs {
-            nominal: Starts::Listed(&starts),
+            nominal: Starts::listed(&starts),
             radius: 1e-3,
             stream: Stream::new(1, Purpose::User, 0),
         },

@@ -36,7 +36,7 @@ pub(super) fn tightening(spec: &RolloutSpec) -> Tightening {
 }
 
 /// Race starts near the study's: the positions of both drones vary with its box.
-pub(super) fn race_starts() -> Starts<'static, 12> {
+pub(super) fn race_starts() -> Starts<'static> {
     let low = [-0.8, 0.0, -2.5, 0.5, -0.1, -0.1, -0.8, 0.0, -2.5, 0.3, -0.1, -0.1];
     let high = [0.8, 0.0, -1.0, 0.7, 0.1, 0.1, 0.8, 0.0, -1.0, 0.5, 0.1, 0.1];
     Starts::Drawn {
@@ -46,7 +46,7 @@ pub(super) fn race_starts() -> Starts<'static, 12> {
 }
 
 /// Pairs around [`race_starts`].
-pub(super) fn race_pairs() -> Pairs<'static, 12> {
+pub(super) fn race_pairs() -> Pairs<'static> {
     Pairs { nominal: race_starts(), radius: 0.1, stream: Stream::new(7, Purpose::User, 1) }
 }
 
@@ -80,7 +80,7 @@ pub(super) fn network(widths: &[usize], activation: Activation, output: OutputAc
 pub(super) fn measures<S, P, const NX: usize, const NU: usize>(
     cpu: &Cpu,
     plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_, NX>,
+    task: &ReachAvoidTask<'_>,
 ) -> Vec<f32>
 where
     S: System<NX, NU>,
@@ -120,7 +120,7 @@ pub(super) fn race<P: Policy<12, 3>>(
 pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
     cpu: &Cpu,
     plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_, NX>,
+    task: &DeviationTask<'_>,
 ) -> (Vec<Farthest>, Vec<PairMeasure>)
 where
     S: System<NX, NU>,

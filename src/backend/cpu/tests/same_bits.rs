@@ -138,7 +138,7 @@ fn wrong_tasks_are_refused() {
     let list = [[0.0; 12]; 5];
     let run = |end, tightening: &Tightening, policy: &crate::policy::Mlp| {
         let task = ReachAvoidTask {
-            starts: Starts::Listed(&list),
+            starts: Starts::listed(&list),
             range: 0..end,
             spec,
             tightening,

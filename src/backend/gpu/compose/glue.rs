@@ -1,8 +1,8 @@
 //! Text that the kernels share: sizes, access to states and tables, calls of recorded functions.
 
 use super::WORKGROUP;
-use crate::real::record::record;
-use crate::real::wgsl::{Product, function_with};
+use crate::formula::record;
+use crate::formula::wgsl::{Product, function_with};
 use crate::rollout::{HUGE, NON_FINITE, normal_pair};
 
 pub(super) const PARAMS: &str = include_str!("../../../../shaders/params.wgsl");

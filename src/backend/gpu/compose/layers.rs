@@ -2,9 +2,9 @@
 
 use super::glue::component;
 use super::{TILE_PITCH, TILE_QUADS, WORKGROUP};
+use crate::formula::wgsl::function;
+use crate::formula::{Expr, record};
 use crate::policy::{Activation, Mlp, OutputActivation};
-use crate::real::record::{Expr, record};
-use crate::real::wgsl::function;
 
 const TILE: &str = include_str!("../../../../shaders/tile.wgsl");
 const MLP: &str = include_str!("../../../../shaders/mlp.wgsl");

@@ -5,9 +5,9 @@ use std::array::from_fn;
 use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
 use super::{Access, Kernel, PARTIAL_HEADER, Slot};
 use crate::cost::{Cost, CostMap};
+use crate::formula::wgsl::function;
+use crate::formula::{Expr, Graph, record};
 use crate::real::Real;
-use crate::real::record::{Expr, Graph, record};
-use crate::real::wgsl::function;
 use crate::rollout::{Disturbance, MppiSpec, MppiTask, NoiseShape, SPLINE_SUPPORT, ValueTerm};
 use crate::system::System;
 

@@ -5,10 +5,10 @@ use super::glue::{
 };
 use super::layers::{Fused, fused_text, layer_text};
 use super::{Access, Kernel, Slot};
+use crate::formula::wgsl::{Product, function, function_with};
+use crate::formula::{Expr, record};
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::real::Real;
-use crate::real::record::{Expr, record};
-use crate::real::wgsl::{Product, function, function_with};
 
 const FOLD: &str = include_str!("../../../../shaders/fold.wgsl");
 const JUDGE: &str = include_str!("../../../../shaders/judge.wgsl");

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::record::{Graph, Node};
+use super::{Graph, Node};
 
 /// How a product is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub enum Product<'a> {
 /// them where there are several outputs.
 ///
 /// ```
-/// use reachcast::real::{record::record, wgsl::function};
+/// use reachcast::formula::{record, wgsl::function};
 /// let graph = record(3, |x| vec![x[0] * x[2]]);
 /// let text = function("scaled", &[("x", 2), ("by", 1)], &graph);
 /// assert!(text.starts_with("fn scaled(x: array<f32, 2>, by: f32) -> f32 {"));

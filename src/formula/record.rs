@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::Real;
+use crate::real::Real;
 
 /// One operation of a graph; operands are indices of earlier nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,9 +65,19 @@ pub struct Graph {
     pub outputs: Vec<u32>,
 }
 
+/// A graph under construction.
+#[derive(Default)]
+struct Arena {
+    nodes: Vec<Node>,
+    /// The index of each node.
+    known: HashMap<Node, u32>,
+    /// The inputs that formulas ask for by name.
+    parameters: HashMap<String, Expr>,
+}
+
 thread_local! {
-    /// The graph under construction, and the index of each node that it has.
-    static ARENA: RefCell<(Vec<Node>, HashMap<Node, u32>)> = RefCell::default();
+    /// The graph under construction.
+    static ARENA: RefCell<Arena> = RefCell::default();
 }
 
 /// A number of the recording in progress on this thread.
@@ -76,7 +86,7 @@ pub struct Expr(u32);
 
 impl Expr {
     fn new(node: Node) -> Self {
-        ARENA.with_borrow_mut(|(nodes, known)| {
+        ARENA.with_borrow_mut(|Arena { nodes, known, .. }| {
             let next = nodes.len() as u32;
             let index = *known.entry(node).or_insert(next);
             if index == next {
@@ -92,17 +102,30 @@ impl Expr {
 /// Equal operations become one node; nodes that no output needs are left out.
 ///
 /// ```
-/// use reachcast::real::{Real, record::record};
+/// use reachcast::formula::record;
+/// use reachcast::real::Real;
 /// let graph = record(2, |x| vec![x[0] * x[1] + x[0] * x[1]]);
 /// assert_eq!(graph.nodes.len(), 4); // two inputs, one product, one sum
 /// assert_eq!(graph.eval(&[3.0_f32, 4.0]), [24.0]);
 /// ```
 pub fn record(inputs: usize, formula: impl FnOnce(&[Expr]) -> Vec<Expr>) -> Graph {
+    record_with(inputs, &[], formula)
+}
+
+/// Records `formula` on `inputs` inputs, some of which it may ask for by name
+/// ([`Real::parameter`]): `parameters` has their names and places.
+pub fn record_with(
+    inputs: usize,
+    parameters: &[(&str, usize)],
+    formula: impl FnOnce(&[Expr]) -> Vec<Expr>,
+) -> Graph {
     let outer = ARENA.take();
     let arguments: Vec<Expr> = (0..inputs).map(|i| Expr::new(Node::Input(i as u32))).collect();
+    let named = parameters.iter().map(|(name, place)| ((*name).to_owned(), arguments[*place]));
+    ARENA.with_borrow_mut(|arena| arena.parameters = named.collect());
     let outputs = formula(&arguments);
-    let (nodes, _) = ARENA.replace(outer);
-    prune(inputs, &nodes, &outputs)
+    let recorded = ARENA.replace(outer);
+    prune(inputs, &recorded.nodes, &outputs)
 }
 
 /// Keeps the nodes that the outputs need, in order.
@@ -205,6 +228,10 @@ impl Neg for Expr {
 impl Real for Expr {
     fn lit(value: f32) -> Self {
         Self::new(Node::Literal(value.to_bits()))
+    }
+    fn parameter(name: &str, value: f32) -> Self {
+        let named = ARENA.with_borrow(|arena| arena.parameters.get(name).copied());
+        named.unwrap_or_else(|| Self::lit(value))
     }
     fn abs(self) -> Self {
         Self::new(Node::Abs(self.0))

@@ -1,0 +1,47 @@
+//! The model: a plant and its task as plain data, recorded from Rust or read from text.
+
+mod recorded;
+
+pub use recorded::recorded_policy;
+
+use crate::formula::Graph;
+pub use crate::system::Parameter;
+use crate::system::{Axis, Body};
+
+/// A plant and its task: what a batch of rollouts is about.
+///
+/// Every formula takes the inputs that [`Model::inputs`] counts, in this order: the states, the
+/// controls, the parameters, the time in seconds, the number of the step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// Short name, lower case with hyphens.
+    pub name: String,
+    /// Name, unit and default box of each state; the order is the state order of every file.
+    pub states: Vec<Axis>,
+    /// Name, unit and bounds of each control.
+    pub controls: Vec<Axis>,
+    /// The numbers that are fixed for a rollout.
+    pub parameters: Vec<Parameter>,
+    /// Seconds between two steps; none where the model does not say.
+    pub period: Option<f32>,
+    /// The next state, `[states]`; clips the controls to their bounds.
+    pub step: Graph,
+    /// Target margin: positive inside the target set.
+    pub target: Graph,
+    /// Constraint margin: positive where safe.
+    pub constraint: Graph,
+    /// The bodies that a picture shows.
+    pub bodies: Vec<Body>,
+}
+
+impl Model {
+    /// Inputs of each formula: states, controls, parameters, time and step.
+    pub fn inputs(&self) -> usize {
+        self.states.len() + self.controls.len() + self.parameters.len() + 2
+    }
+
+    /// The values of the parameters.
+    pub fn values(&self) -> Vec<f32> {
+        self.parameters.iter().map(|parameter| parameter.value).collect()
+    }
+}

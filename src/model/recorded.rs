@@ -1,0 +1,68 @@
+//! Models recorded from systems that are written in Rust.
+
+use std::array::from_fn;
+
+use super::Model;
+use crate::formula::{Expr, Graph, record_with};
+use crate::policy::Policy;
+use crate::system::System;
+
+impl Model {
+    /// The model of `system`: its formulas recorded, its declared parameters as inputs.
+    ///
+    /// ```
+    /// use reachcast::model::Model;
+    /// use reachcast::system::DoubleIntegrator;
+    /// let model = Model::of(&DoubleIntegrator::default());
+    /// assert_eq!(model.states.len(), 2);
+    /// // Position and velocity; the control; no more than it declares; time and step.
+    /// assert_eq!(model.inputs(), 2 + 1 + model.parameters.len() + 2);
+    /// ```
+    pub fn of<S, const NX: usize, const NU: usize>(system: &S) -> Self
+    where
+        S: System<NX, NU>,
+    {
+        let record = |formula: &dyn Fn([Expr; NX], [Expr; NU]) -> Vec<Expr>| {
+            recorded(system, |x, u| formula(x, u))
+        };
+        Self {
+            name: system.name().to_owned(),
+            states: system.states().to_vec(),
+            controls: system.controls().to_vec(),
+            parameters: system.parameters(),
+            period: None,
+            step: record(&|x, u| system.step(x, u).to_vec()),
+            target: record(&|x, _| vec![system.target(x)]),
+            constraint: record(&|x, _| vec![system.constraint(x)]),
+            bodies: system.bodies(),
+        }
+    }
+}
+
+/// The formula of `policy`, with the inputs of the model of `system`.
+pub fn recorded_policy<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Graph
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    recorded(system, |x, _: [Expr; NU]| policy.control(x).to_vec())
+}
+
+/// Records `formula` of state and control with the inputs of the model of `system`.
+fn recorded<S, const NX: usize, const NU: usize>(
+    system: &S,
+    formula: impl FnOnce([Expr; NX], [Expr; NU]) -> Vec<Expr>,
+) -> Graph
+where
+    S: System<NX, NU>,
+{
+    let parameters = system.parameters();
+    let names: Vec<(&str, usize)> = parameters
+        .iter()
+        .enumerate()
+        .map(|(i, parameter)| (parameter.name.as_str(), NX + NU + i))
+        .collect();
+    record_with(NX + NU + names.len() + 2, &names, |inputs| {
+        formula(from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i]))
+    })
+}
