@@ -24,6 +24,7 @@ pub mod report;
 pub mod rollout;
 pub mod scenario;
 pub mod system;
+mod tile;
 pub mod train;
 
 pub use error::{Error, Fault, Result};

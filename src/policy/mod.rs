@@ -28,6 +28,19 @@ pub trait Policy<const NX: usize, const NU: usize>: Sync {
     fn control<R: Real>(&self, x: [R; NX]) -> [R; NU];
 }
 
+impl<P: Policy<NX, NU>, const NX: usize, const NU: usize> Policy<NX, NU> for &P {
+    fn name(&self) -> String {
+        (**self).name()
+    }
+    fn network(&self) -> Option<&Mlp> {
+        (**self).network()
+    }
+    #[inline(always)]
+    fn control<R: Real>(&self, x: [R; NX]) -> [R; NU] {
+        (**self).control(x)
+    }
+}
+
 impl<const NX: usize, const NU: usize> Policy<NX, NU> for Mlp {
     fn name(&self) -> String {
         let widths: Vec<String> = self.widths().iter().map(ToString::to_string).collect();

@@ -4,6 +4,7 @@ mod approx;
 pub mod bound;
 mod lanes;
 mod scalar;
+pub(crate) mod simd;
 mod vector;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};

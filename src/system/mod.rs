@@ -72,6 +72,36 @@ pub trait System<const NX: usize, const NU: usize>: Sync {
     }
 }
 
+impl<S: System<NX, NU>, const NX: usize, const NU: usize> System<NX, NU> for &S {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+    fn states(&self) -> [Axis; NX] {
+        (**self).states()
+    }
+    fn controls(&self) -> [Axis; NU] {
+        (**self).controls()
+    }
+    #[inline(always)]
+    fn step<R: Real>(&self, x: [R; NX], u: [R; NU]) -> [R; NX] {
+        (**self).step(x, u)
+    }
+    #[inline(always)]
+    fn target<R: Real>(&self, x: [R; NX]) -> R {
+        (**self).target(x)
+    }
+    #[inline(always)]
+    fn constraint<R: Real>(&self, x: [R; NX]) -> R {
+        (**self).constraint(x)
+    }
+    fn parameters(&self) -> Vec<Parameter> {
+        (**self).parameters()
+    }
+    fn bodies(&self) -> Vec<Body> {
+        (**self).bodies()
+    }
+}
+
 /// Something that moves in a plane: what a report draws the path of.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Body {

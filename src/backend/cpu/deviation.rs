@@ -1,12 +1,13 @@
 //! Pairs of rollouts side by side: the farthest pair of each step, and both measures.
 
-use super::dispatch::{Body, Unit};
-use super::frame::Frame;
+use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::load::Loader;
 use super::tile::{Driven, Driver, Loss, Score, is_finite, lanes};
+use crate::real::simd::Body;
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure};
+use crate::tile::Frame;
 
 /// Consecutive pairs for one thread; twin: `shaders/deviation.wgsl`.
 pub(super) struct Deviation<'a> {

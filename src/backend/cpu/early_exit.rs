@@ -1,13 +1,13 @@
 //! Signs of reach-avoid measures: a decided trajectory leaves the tile, and the next start takes
 //! its lane.
 
-use super::frame::Frame;
 use super::kernel::Kernel;
 use super::load::Loader;
 use super::reach_avoid::ReachAvoid;
 use super::tile::{Driver, Loss, Score};
 use crate::real::per_lane;
 use crate::rollout::{NON_FINITE, ReachAvoidTask};
+use crate::tile::Frame;
 
 /// The signs of the unit's measures.
 ///

@@ -1,10 +1,7 @@
 //! Dense-layer kernels: a panel of neurons times a block of trajectories, summed in registers.
 
-use super::dispatch::Body;
-use crate::real::{Lanes, Vector};
-
-/// Smallest number of trajectories that a kernel computes at once; blocks are multiples of it.
-pub(super) const GRANULE: usize = 16;
+use crate::real::simd::{Portable, Simd};
+pub(super) use crate::tile::GRANULE;
 
 /// Consecutive neurons of a layer.
 #[derive(Clone, Copy, Debug)]
@@ -17,22 +14,16 @@ pub(super) struct Panel<'a> {
     pub(super) floor: f32,
 }
 
-/// One instruction set: what is compiled for it, and its dense-layer kernel.
+/// The dense-layer kernel of an instruction set.
 ///
-/// A value is the proof that the processor has it. Each sum starts with the bias and takes the
-/// inputs in order, so the bits depend neither on the place of a trajectory in its block nor on
-/// the panel that a neuron belongs to; with and without fused multiply-add they differ.
-pub(super) trait Kernel: Copy + Send + Sync {
+/// Each sum starts with the bias and takes the inputs in order, so the bits depend neither on the
+/// place of a trajectory in its block nor on the panel that a neuron belongs to; with and without
+/// fused multiply-add they differ.
+pub(super) trait Kernel: Simd {
     /// Most neurons of a panel.
     const ROWS: usize;
     /// Trajectories of a block, a multiple of [`GRANULE`].
     const BLOCK: usize;
-
-    /// What its bodies evaluate formulas in; a divisor of the lanes per group.
-    type Vector: Vector;
-
-    /// Calls `body`, compiled for these instructions.
-    fn call<B: Body>(self, body: B) -> B::Output;
 
     /// Writes `max(floor, W x + b)`, `[rows, BLOCK]`, of the inputs `[inputs, BLOCK]`; NaN stays.
     ///
@@ -43,20 +34,10 @@ pub(super) trait Kernel: Copy + Send + Sync {
     fn panel(self, panel: Panel<'_>, lanes: usize, inputs: &[f32], outputs: &mut [f32]);
 }
 
-/// Plain Rust, for every processor.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Portable;
-
 impl Kernel for Portable {
     // 16 vector registers of 4 lanes hold 2 rows of sums beside the inputs, 32 hold 4.
     const ROWS: usize = if FUSED { 4 } else { 2 };
     const BLOCK: usize = GRANULE;
-    type Vector = Lanes<GRANULE>;
-
-    #[inline(never)]
-    fn call<B: Body>(self, body: B) -> B::Output {
-        body.run()
-    }
 
     fn panel(self, panel: Panel<'_>, _lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
         match panel.bias.len() {

@@ -1,8 +1,7 @@
 //! The dense-layer kernels for AVX-512 and for AVX2 with fused multiply-add.
 
-use super::dispatch::Body;
 use super::kernel::{Kernel, Panel};
-use super::vector_x86::{Vector256, Vector512};
+use crate::real::simd::{Avx2, Avx512};
 
 /// Rows of inputs that are fetched ahead of their use.
 const AHEAD: usize = 8;
@@ -13,34 +12,6 @@ use std::arch::x86_64::{
     _mm256_storeu_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_max_ps, _mm512_set1_ps,
     _mm512_storeu_ps,
 };
-
-/// The processor has AVX-512 as in x86-64-v4.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Avx512(());
-
-/// The processor has AVX2 and fused multiply-add.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Avx2(());
-
-impl Avx512 {
-    /// The proof, if there is one.
-    pub(super) fn detect() -> Option<Self> {
-        let found = is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512cd")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl");
-        (found && Avx2::detect().is_some()).then_some(Self(()))
-    }
-}
-
-impl Avx2 {
-    /// The proof, if there is one.
-    pub(super) fn detect() -> Option<Self> {
-        let found = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-        found.then_some(Self(()))
-    }
-}
 
 /// A kernel of `R` neurons by `V` vectors of trajectories in blocks of `$block`.
 macro_rules! x86_kernel {
@@ -136,26 +107,10 @@ mod kernels {
         };
     }
 
-    #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma")]
-    fn call_avx512<B: Body>(body: B) -> B::Output {
-        body.run()
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    fn call_avx2<B: Body>(body: B) -> B::Output {
-        body.run()
-    }
-
     impl Kernel for Avx512 {
         // 24 of 32 registers hold sums.
         const ROWS: usize = 8;
         const BLOCK: usize = 48;
-        type Vector = Vector512;
-
-        fn call<B: Body>(self, body: B) -> B::Output {
-            // SAFETY: `self` proves that the processor has the instructions.
-            unsafe { call_avx512(body) }
-        }
 
         fn panel(self, panel: Panel<'_>, lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
             match lanes {
@@ -170,12 +125,6 @@ mod kernels {
         // 12 of 16 registers hold sums.
         const ROWS: usize = 6;
         const BLOCK: usize = 16;
-        type Vector = Vector256;
-
-        fn call<B: Body>(self, body: B) -> B::Output {
-            // SAFETY: `self` proves that the processor has the instructions.
-            unsafe { call_avx2(body) }
-        }
 
         fn panel(self, panel: Panel<'_>, _lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
             by_rows!(avx2, 2, panel, inputs, outputs: 1 2 3 4 5 6)

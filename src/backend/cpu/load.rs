@@ -1,10 +1,10 @@
 //! Starts and pairs of a tile, drawn group by group.
 
-use super::dispatch::Body;
-use super::frame::Frame;
 use super::kernel::Kernel;
 use crate::real::Lanes;
+use crate::real::simd::Body;
 use crate::rollout::{Pairs, Starts};
+use crate::tile::Frame;
 
 /// What a kernel draws into.
 #[derive(Debug)]

@@ -3,12 +3,12 @@
 
 use std::ops::Range;
 
-use super::dispatch::Body;
-use super::frame::Frame;
 use super::kernel::{GRANULE, Kernel, Panel};
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+use crate::real::simd::Body;
 use crate::real::{Lanes, Real};
+use crate::tile::Frame;
 
 /// A network whose weights are in the order in which a kernel reads them.
 #[derive(Debug)]

@@ -1,10 +1,8 @@
 //! The native CPU backend: tiles of trajectories in SIMD lanes, tiles spread over threads.
 
-mod compiled;
 mod deviation;
 mod dispatch;
 mod early_exit;
-mod frame;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;
@@ -14,35 +12,32 @@ mod mppi;
 mod mppi_rollout;
 mod mppi_update;
 mod packs;
-mod physics;
 mod reach_avoid;
 mod schedule;
 mod spread;
 #[cfg(test)]
 mod tests;
 mod tile;
-#[cfg(target_arch = "x86_64")]
-mod vector_x86;
 
 use std::sync::Arc;
 
-use self::compiled::Compiled;
 use self::deviation::Deviation;
-use self::dispatch::Instructions;
+use self::dispatch::{rows, run};
 use self::mlp::Packed;
 use self::packs::Packs;
-use self::physics::Physics;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
-use self::tile::Driven;
+use self::tile::{Drive, Driven};
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
 use crate::policy::{Mlp, Policy};
+use crate::real::simd::Instructions;
 use crate::rollout::{
     DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };
 use crate::system::System;
+use crate::tile::{Clock, CompiledPolicy, CompiledSystem, Layout};
 
 /// The host's processor.
 #[derive(Debug)]
@@ -128,7 +123,7 @@ impl Cpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        self.measures(&Compiled(plant), plant.policy.network(), task, sink)
+        self.with_compiled(plant, |plant| self.measures(plant, task, sink))
     }
 
     /// See [`super::Backend::deviation`].
@@ -142,28 +137,25 @@ impl Cpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        self.pairs(&Compiled(plant), plant.policy.network(), task, sink)
+        self.with_compiled(plant, |plant| self.pairs(plant, task, sink))
     }
 
     /// Measures of starts under any plant.
     fn measures(
         &self,
-        physics: &dyn Physics,
-        network: Option<&Mlp>,
+        plant: Driven<'_>,
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
         check(&task.starts, task.range.end, task.tightening, &task.spec)?;
-        let network = self.network(physics, network)?;
-        let plant = Driven { physics, network: network.as_deref(), with: self.instructions };
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
-            let schedule = self.schedule(chunk.count, plant.network);
+            let schedule = self.schedule(chunk.count, plant.drive.network());
             measures.resize(chunk.count, 0.0);
             spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
                 let first = chunk.first + (unit * schedule.unit) as u64;
                 let width = schedule.width;
-                self.instructions.run(ReachAvoid { plant, task, width, first, out });
+                run(self.instructions, ReachAvoid { plant, task, width, first, out });
             });
             sink(chunk.first, &measures)?;
         }
@@ -173,23 +165,20 @@ impl Cpu {
     /// Pairs under any plant.
     fn pairs(
         &self,
-        physics: &dyn Physics,
-        network: Option<&Mlp>,
+        plant: Driven<'_>,
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
         check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
-        let network = self.network(physics, network)?;
-        let plant = Driven { physics, network: network.as_deref(), with: self.instructions };
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
-            let schedule = self.schedule(chunk.count, plant.network);
+            let schedule = self.schedule(chunk.count, plant.drive.network());
             measures.resize(chunk.count, PairMeasure::default());
             let found = spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
                 let first = chunk.first + (unit * schedule.unit) as u64;
                 let width = schedule.width;
-                self.instructions.run(Deviation { plant, task, width, first, out })
+                run(self.instructions, Deviation { plant, task, width, first, out })
             });
             for found in found {
                 let steps = farthest.iter_mut().zip(found);
@@ -200,19 +189,40 @@ impl Cpu {
         Ok(farthest)
     }
 
-    /// The network that drives a plant, if one does, packed for the kernel.
-    fn network(&self, physics: &dyn Physics, network: Option<&Mlp>) -> Result<Option<Arc<Packed>>> {
-        let Some(network) = network else {
-            return Ok(None);
+    /// Calls `run` with a system and a policy as compiled.
+    fn with_compiled<S, P, T, const NX: usize, const NU: usize>(
+        &self,
+        Plant { system, policy }: Plant<'_, S, P>,
+        run: impl FnOnce(Driven<'_>) -> Result<T>,
+    ) -> Result<T>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let network = match policy.network() {
+            Some(network) => {
+                Packed::check(network, NX, NU)?;
+                Some(self.packed(network))
+            }
+            None => None,
         };
-        let [inputs, outputs] = physics.network_size();
-        Packed::check(network, inputs, outputs)?;
-        Ok(Some(self.packed(network)))
+        let formula = CompiledPolicy(policy);
+        let drive = match &network {
+            Some(network) => Drive::Network { network, observe: None, act: None },
+            None => Drive::Formula(&formula),
+        };
+        run(Driven {
+            system: &CompiledSystem(system),
+            drive,
+            layout: Layout { states: NX, controls: NU, own: 0 },
+            clock: Clock::Ignored,
+            with: self.instructions,
+        })
     }
 
     /// `network`, packed for the kernel.
     fn packed(&self, network: &Mlp) -> Arc<Packed> {
-        self.packs.of(network, self.instructions.rows())
+        self.packs.of(network, rows(self.instructions))
     }
 
     fn schedule(&self, count: usize, network: Option<&Packed>) -> Schedule {

@@ -1,6 +1,7 @@
 //! MPPI problems cut into units for the threads, merged in order.
 
 use super::Cpu;
+use super::dispatch::run;
 use super::mppi_rollout::MppiRollout;
 use super::spread::spread;
 use crate::backend::softmin::Partial;
@@ -67,7 +68,7 @@ impl Cpu {
             let (problem, samples) = unit_of(number);
             let networks = [value.as_deref(), disturbance.as_deref()];
             let unit = MppiRollout { system, cost, task, networks, problem, samples, costs };
-            self.instructions.run(unit)
+            run(self.instructions, unit)
         });
         let merged = parts.chunks(units as usize).zip(task.problems).enumerate();
         let results = merged.map(|(number, (parts, problem))| {

@@ -3,13 +3,14 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::dispatch::{Body, Unit};
+use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use super::mppi_update::Softmin;
 use super::tile::is_finite;
 use crate::backend::softmin::Partial;
 use crate::cost::{Cost, CostMap};
+use crate::real::simd::Body;
 use crate::real::{Lanes, Real, Vector, load_rows, store_rows};
 use crate::rollout::{HUGE, MppiProblem, MppiSpec, MppiTask, Noise, Stream};
 use crate::system::System;

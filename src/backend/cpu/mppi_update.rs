@@ -1,9 +1,9 @@
 //! The softmin of a unit of samples, lane by lane, so that a group costs a few operations.
 
-use super::dispatch::Body;
 use super::kernel::Kernel;
 use super::tile::is_finite;
 use crate::backend::softmin::Partial;
+use crate::real::simd::Body;
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::HUGE;
 

@@ -1,12 +1,11 @@
 //! A tile of trajectories in groups of lanes: their controls and their scores.
 
-use super::dispatch::{Body, Instructions};
-use super::frame::Frame;
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
-use super::physics::Physics;
+use crate::real::simd::{Body, Instructions};
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{Fold, HUGE, NON_FINITE, Tightening};
+use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem};
 
 /// Exponent bits of an f32: all set for infinities and NaN.
 const EXPONENT: u32 = 0x7f80_0000;
@@ -18,15 +17,54 @@ pub(super) fn is_finite(value: f32) -> bool {
     value.to_bits() & EXPONENT != EXPONENT
 }
 
-/// A plant, and the network that drives it if its policy is one.
+/// A plant and who drives it.
 #[derive(Clone, Copy)]
 pub(super) struct Driven<'a> {
-    /// Formulas of dynamics, margins and policy.
-    pub(super) physics: &'a dyn Physics,
-    /// The policy's network, packed for the kernel.
-    pub(super) network: Option<&'a Packed>,
+    /// Dynamics and margins.
+    pub(super) system: &'a dyn NativeSystem,
+    /// The controls.
+    pub(super) drive: Drive<'a>,
+    /// Rows of a frame.
+    pub(super) layout: Layout,
+    /// Whether formulas read the row of steps.
+    pub(super) clock: Clock,
     /// The instructions that formulas are evaluated with.
     pub(super) with: Instructions,
+}
+
+/// Where the controls come from.
+#[derive(Clone, Copy)]
+pub(super) enum Drive<'a> {
+    /// A formula of the states.
+    Formula(&'a dyn NativeFormula),
+    /// A network, packed for the kernel, and what stands around it.
+    Network {
+        /// The network.
+        network: &'a Packed,
+        /// What it sees, if not the states.
+        observe: Option<Around<'a>>,
+        /// The controls from what it says, if not that itself.
+        act: Option<Around<'a>>,
+    },
+}
+
+/// A formula before or behind a network.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a> {
+    /// The formula.
+    pub(super) formula: &'a dyn NativeFormula,
+    /// The rows between it and the network.
+    pub(super) rows: [usize; 2],
+}
+
+impl<'a> Drive<'a> {
+    /// The network, if there is one.
+    pub(super) fn network(self) -> Option<&'a Packed> {
+        match self {
+            Self::Formula(_) => None,
+            Self::Network { network, .. } => Some(network),
+        }
+    }
 }
 
 /// A plant with what it needs to drive tiles.
@@ -40,7 +78,8 @@ pub(super) struct Driver<'a, K> {
 impl<'a, K: Kernel> Driver<'a, K> {
     /// For tiles of up to `lanes` trajectories.
     pub(super) fn new(plant: Driven<'a>, kernel: K, lanes: usize) -> Self {
-        let network = plant.network.map(|network| Evaluator::new(network, kernel, lanes));
+        let network = plant.drive.network();
+        let network = network.map(|network| Evaluator::new(network, kernel, lanes));
         Self { plant, network, kernel, lanes }
     }
 
@@ -51,32 +90,40 @@ impl<'a, K: Kernel> Driver<'a, K> {
 
     /// Room for a tile of up to `lanes` trajectories.
     pub(super) fn frame_of(&self, lanes: usize) -> Frame {
-        let physics = self.plant.physics;
-        let mut frame = Frame::new(physics.size(), physics.own_rows(), lanes);
-        physics.fill(&mut frame);
-        frame
+        Frame::new(self.plant.layout, lanes)
     }
 
     /// Evaluates the policy at the first `lanes` states.
     pub(super) fn decide(&mut self, frame: &mut Frame, lanes: usize) {
-        let Driven { physics, with, .. } = self.plant;
-        let Some(network) = &mut self.network else {
-            return physics.control(with, frame, lanes);
-        };
-        physics.observe(with, frame, lanes);
-        let (from, to) = (physics.observed(frame), physics.acted(frame));
-        network.forward(frame, [from, to], lanes);
-        physics.act(with, frame, lanes);
+        let with = self.plant.with;
+        match (self.plant.drive, &mut self.network) {
+            (Drive::Formula(formula), _) => formula.evaluate(with, frame, lanes),
+            (Drive::Network { observe, act, .. }, Some(network)) => {
+                let mut rows = [frame.states(), frame.controls()];
+                if let Some(Around { formula, rows: [first, end] }) = observe {
+                    formula.evaluate(with, frame, lanes);
+                    rows[0] = first..end;
+                }
+                if let Some(Around { rows: [first, end], .. }) = act {
+                    rows[1] = first..end;
+                }
+                network.forward(frame, rows, lanes);
+                if let Some(Around { formula, .. }) = act {
+                    formula.evaluate(with, frame, lanes);
+                }
+            }
+            (Drive::Network { .. }, None) => unreachable!("a network has its evaluator"),
+        }
     }
 
     /// Moves the first `lanes` states one step on, by the controls decided last.
     pub(super) fn step(&self, frame: &mut Frame, lanes: usize) {
-        self.plant.physics.step(self.plant.with, frame, lanes);
+        self.plant.system.step(self.plant.with, frame, lanes);
     }
 
     /// Says that the states are those of step `t`.
     pub(super) fn at_step(&self, frame: &mut Frame, t: usize) {
-        if self.plant.physics.timed() {
+        if self.plant.clock == Clock::Read {
             let row = frame.step();
             frame.row_mut(row).fill(t as f32);
         }
@@ -84,7 +131,7 @@ impl<'a, K: Kernel> Driver<'a, K> {
 
     /// Says of which step each state is.
     pub(super) fn at_steps(&self, frame: &mut Frame, steps: impl Iterator<Item = u32>) {
-        if self.plant.physics.timed() {
+        if self.plant.clock == Clock::Read {
             let row = frame.step();
             frame.row_mut(row).iter_mut().zip(steps).for_each(|(at, step)| *at = step as f32);
         }
@@ -98,7 +145,7 @@ impl<'a, K: Kernel> Driver<'a, K> {
         gamma: f32,
         scores: impl Iterator<Item = (&'s mut Score<N>, Loss<N>)>,
     ) {
-        self.plant.physics.margins(self.plant.with, frame, lanes);
+        self.plant.system.margins(self.plant.with, frame, lanes);
         for (group, (score, loss)) in scores.take(lanes.div_ceil(N)).enumerate() {
             let at = group * N;
             self.kernel.call(Judge { frame, at, score, loss, gamma });

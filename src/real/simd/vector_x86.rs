@@ -69,7 +69,7 @@ macro_rules! x86_vector {
     ($(#[$doc:meta])* $name:ident, $set:ident) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
-        pub(in crate::backend::cpu) struct $name($set::Register);
+        pub(crate) struct $name($set::Register);
 
         x86_vector!(@operator $name, Add, add, $set);
         x86_vector!(@operator $name, Sub, sub, $set);

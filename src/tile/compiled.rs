@@ -1,38 +1,51 @@
 //! Plants that are written in Rust: their formulas compiled for vectors.
 
+use std::fmt;
 use std::ops::Range;
 
-use super::dispatch::{Formulas, Instructions};
-use super::frame::Frame;
-use super::physics::Physics;
+use super::{Frame, NativeFormula, NativeSystem};
 use crate::policy::Policy;
 use crate::real::Vector;
-use crate::rollout::Plant;
+use crate::real::simd::{Formulas, Instructions};
 use crate::system::System;
 
-/// A system and its policy as compiled.
-#[derive(Debug)]
-pub(super) struct Compiled<'a, S, P, const NX: usize, const NU: usize>(pub(super) Plant<'a, S, P>);
+/// A system as compiled.
+pub(crate) struct CompiledSystem<S, const NX: usize, const NU: usize>(pub(crate) S);
 
-impl<S, P, const NX: usize, const NU: usize> Physics for Compiled<'_, S, P, NX, NU>
+impl<S, const NX: usize, const NU: usize> fmt::Debug for CompiledSystem<S, NX, NU> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "compiled system of {NX} states and {NU} controls")
+    }
+}
+
+impl<S, const NX: usize, const NU: usize> NativeSystem for CompiledSystem<S, NX, NU>
 where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
+    S: System<NX, NU> + Send,
 {
-    fn size(&self) -> [usize; 2] {
-        [NX, NU]
-    }
-
-    fn control(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
-        with.call(Control::<P, NX, NU> { policy: self.0.policy, frame, lanes });
-    }
-
     fn step(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
-        with.call(Step::<S, NX, NU> { system: self.0.system, frame, lanes });
+        with.call(Step::<S, NX, NU> { system: &self.0, frame, lanes });
     }
 
     fn margins(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
-        with.call(Margins::<S, NX, NU> { system: self.0.system, frame, lanes });
+        with.call(Margins::<S, NX, NU> { system: &self.0, frame, lanes });
+    }
+}
+
+/// A policy as compiled.
+pub(crate) struct CompiledPolicy<P, const NX: usize, const NU: usize>(pub(crate) P);
+
+impl<P, const NX: usize, const NU: usize> fmt::Debug for CompiledPolicy<P, NX, NU> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "compiled policy of {NX} states and {NU} controls")
+    }
+}
+
+impl<P, const NX: usize, const NU: usize> NativeFormula for CompiledPolicy<P, NX, NU>
+where
+    P: Policy<NX, NU> + Send,
+{
+    fn evaluate(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
+        with.call(Control::<P, NX, NU> { policy: &self.0, frame, lanes });
     }
 }
 

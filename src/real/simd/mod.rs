@@ -1,0 +1,124 @@
+//! Instruction sets: what formulas are compiled for, picked when the program starts.
+
+#[cfg(target_arch = "x86_64")]
+mod vector_x86;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::marker::PhantomData;
+
+use super::{Lanes, Vector};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
+
+/// Numbers of the vectors that the compiler makes of plain arrays.
+const PORTABLE: usize = 16;
+
+/// Work on one group of lanes, compiled for each instruction set by itself.
+///
+/// Small and few: every body is compiled for every set.
+pub(crate) trait Body {
+    /// What it returns.
+    type Output;
+
+    /// Does the work. Must be `#[inline(always)]`, as all that it calls, or it is compiled for
+    /// the baseline instructions.
+    fn run(self) -> Self::Output;
+}
+
+/// Formulas over the vectors of an instruction set.
+pub(crate) trait Formulas {
+    /// Does the work. Must be `#[inline(always)]`, as for [`Body`].
+    fn run<V: Vector>(self);
+}
+
+/// One instruction set, and what is compiled for it; a value is the proof that the processor has it.
+pub(crate) trait Simd: Copy + Send + Sync {
+    /// What its bodies evaluate formulas in.
+    type Vector: Vector;
+
+    /// Calls `body`, compiled for these instructions.
+    fn call<B: Body>(self, body: B) -> B::Output;
+}
+
+/// Those that the whole program is compiled for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Portable;
+
+impl Simd for Portable {
+    type Vector = Lanes<PORTABLE>;
+
+    #[inline(never)]
+    fn call<B: Body>(self, body: B) -> B::Output {
+        body.run()
+    }
+}
+
+/// Formulas as the body that an instruction set calls.
+struct InVectors<K, F> {
+    set: PhantomData<K>,
+    formulas: F,
+}
+
+impl<K: Simd, F: Formulas> Body for InVectors<K, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.formulas.run::<K::Vector>();
+    }
+}
+
+/// An instruction set that the processor has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Instructions {
+    /// 16 lanes per register.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+    /// 8 lanes per register.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// Those that the whole program is compiled for.
+    Baseline,
+}
+
+impl Instructions {
+    /// All that the processor has, the fastest first.
+    pub(crate) fn detect() -> Vec<Self> {
+        let mut found = Vec::new();
+        #[cfg(target_arch = "x86_64")]
+        {
+            found.extend(Avx512::detect().map(Self::Avx512));
+            found.extend(Avx2::detect().map(Self::Avx2));
+        }
+        found.push(Self::Baseline);
+        found
+    }
+
+    /// In words.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "AVX-512",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "AVX2",
+            Self::Baseline => "baseline instructions",
+        }
+    }
+
+    /// Evaluates `formulas` with these instructions.
+    pub(crate) fn call<F: Formulas>(self, formulas: F) {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(kernel) => in_vectors(kernel, formulas),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(kernel) => in_vectors(kernel, formulas),
+            Self::Baseline => in_vectors(Portable, formulas),
+        }
+    }
+}
+
+/// Calls `formulas` through `set`.
+fn in_vectors<K: Simd, F: Formulas>(set: K, formulas: F) {
+    set.call(InVectors::<K, F> { set: PhantomData, formulas });
+}

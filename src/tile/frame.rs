@@ -1,0 +1,146 @@
+//! A tile of trajectories as rows of numbers: states, controls, margins, and whatever a plant's
+//! formulas need besides.
+
+use std::ops::Range;
+
+use super::GRANULE;
+
+/// Bytes of a cache line: rows begin at one, so that no vector crosses two.
+const LINE: usize = 64;
+
+/// Which rows a frame has: the states, the controls, the step, the target margin, the constraint
+/// margin, then rows that formulas have to themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// Number of states.
+    pub(crate) states: usize,
+    /// Number of controls.
+    pub(crate) controls: usize,
+    /// Number of rows of formulas' own.
+    pub(crate) own: usize,
+}
+
+impl Layout {
+    /// Number of the row of the steps taken.
+    pub(crate) fn step(&self) -> usize {
+        self.states + self.controls
+    }
+
+    /// Numbers of the rows of the target and the constraint margin.
+    pub(crate) fn margins(&self) -> [usize; 2] {
+        [self.step() + 1, self.step() + 2]
+    }
+
+    /// Number of the first row of formulas' own.
+    pub(crate) fn first_own(&self) -> usize {
+        self.step() + 3
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.first_own() + self.own
+    }
+}
+
+/// Whether formulas read the row of steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Clock {
+    /// Some formula does.
+    Read,
+    /// None does: the row is not kept.
+    Ignored,
+}
+
+/// Rows of `width` numbers, one for each trajectory, as a [`Layout`] says.
+#[derive(Debug)]
+pub(crate) struct Frame {
+    numbers: Vec<f32>,
+    /// Where the first row begins in `numbers`.
+    begin: usize,
+    width: usize,
+    layout: Layout,
+}
+
+impl Frame {
+    /// Zeros for tiles of up to `lanes` trajectories.
+    pub(crate) fn new(layout: Layout, lanes: usize) -> Self {
+        let width = lanes.next_multiple_of(GRANULE);
+        let numbers = vec![0.0; layout.rows() * width + LINE / size_of::<f32>()];
+        // A place beyond the allowance cannot be: then rows begin where they do.
+        let begin = numbers.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
+        Self { numbers, begin, width, layout }
+    }
+
+    /// Numbers of a row.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Numbers of the rows of the states.
+    pub(crate) fn states(&self) -> Range<usize> {
+        0..self.layout.states
+    }
+
+    /// Numbers of the rows of the controls.
+    pub(crate) fn controls(&self) -> Range<usize> {
+        self.layout.states..self.layout.step()
+    }
+
+    /// Number of the row of the steps taken.
+    pub(crate) fn step(&self) -> usize {
+        self.layout.step()
+    }
+
+    /// Numbers of the rows of the target and the constraint margin.
+    pub(crate) fn margins(&self) -> [usize; 2] {
+        self.layout.margins()
+    }
+
+    /// All rows, one after the other, `[rows, width]`.
+    #[inline(always)]
+    pub(crate) fn rows(&self) -> &[f32] {
+        &self.numbers[self.begin..]
+    }
+
+    /// The same to write to.
+    #[inline(always)]
+    pub(crate) fn rows_mut(&mut self) -> &mut [f32] {
+        &mut self.numbers[self.begin..]
+    }
+
+    /// The row number `row`.
+    #[inline(always)]
+    pub(crate) fn row(&self, row: usize) -> &[f32] {
+        &self.rows()[row * self.width..][..self.width]
+    }
+
+    /// The same to write to.
+    #[inline(always)]
+    pub(crate) fn row_mut(&mut self, row: usize) -> &mut [f32] {
+        let width = self.width;
+        &mut self.rows_mut()[row * width..][..width]
+    }
+
+    /// Copies the states of trajectory `from` of `source` to trajectory `to`.
+    pub(crate) fn copy_lane(&mut self, to: usize, source: &Self, from: usize) {
+        for row in self.states() {
+            self.row_mut(row)[to] = source.row(row)[from];
+        }
+    }
+
+    /// Copies the states of trajectory `from` to trajectory `to`.
+    pub(crate) fn move_lane(&mut self, to: usize, from: usize) {
+        for row in self.states() {
+            let row = self.row_mut(row);
+            row[to] = row[from];
+        }
+    }
+
+    /// Takes the controls of `source` over.
+    pub(crate) fn copy_controls(&mut self, source: &Self) {
+        let range = self.controls();
+        let (rows, width) = (range.start * self.width..range.end * self.width, self.width);
+        debug_assert_eq!(width, source.width, "tiles of one width");
+        self.rows_mut()[rows.clone()].copy_from_slice(&source.rows()[rows]);
+    }
+}

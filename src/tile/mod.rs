@@ -1,0 +1,12 @@
+//! Tiles of trajectories as rows of numbers, and plants that move them: called once per tile.
+
+mod compiled;
+mod frame;
+mod native;
+
+pub(crate) use compiled::{CompiledPolicy, CompiledSystem};
+pub(crate) use frame::{Clock, Frame, Layout};
+pub(crate) use native::{NativeFormula, NativeSystem};
+
+/// Smallest number of trajectories of a tile; widths are multiples of it.
+pub(crate) const GRANULE: usize = 16;
