@@ -1,11 +1,13 @@
 //! The model: a plant and its task as plain data, recorded from Rust or read from text.
 
 mod controller;
+mod plant;
 mod recorded;
 
 use std::sync::Arc;
 
 pub use controller::{Controller, Law};
+pub use plant::Plant;
 
 use crate::formula::Graph;
 pub use crate::system::Parameter;
