@@ -1,7 +1,10 @@
 //! The model: a plant and its task as plain data, recorded from Rust or read from text.
 
+mod controller;
 mod recorded;
+pub mod text;
 
+pub use controller::{Controller, Law};
 pub use recorded::recorded_policy;
 
 use crate::formula::Graph;

@@ -60,7 +60,7 @@ impl Formula {
     /// ```
     /// use reachcast::formula::text::{Formula, Names, Values};
     /// let mut names = Names::default();
-    /// names.add("x")?;
+    /// names.add("x", "a state")?;
     /// let formula = Formula::parse("-x^2 + 2 * hypot(x, 4)", &names).expect("a formula");
     /// assert_eq!(formula.value(Values { names: &[3.0_f32], outputs: &[] }), 1.0);
     /// let fault = Formula::parse("1 + cosh(x)", &names).expect_err("no such function");

@@ -17,31 +17,45 @@ const RESERVED: [(&str, &str); 4] = [
 /// Names in order; the place of a name is its number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Names {
-    list: Vec<String>,
+    list: Vec<Entry>,
     places: HashMap<String, u32>,
 }
 
+/// A name, and what it is: `a state`.
+#[derive(Clone, Debug, PartialEq)]
+struct Entry {
+    name: String,
+    what: &'static str,
+}
+
 impl Names {
-    /// Adds `name` with the next place.
+    /// Adds `name`, which is `what` ("a state"), with the next place.
     ///
     /// # Errors
     /// A sentence if it cannot be a name, or is one already.
-    pub fn add(&mut self, name: &str) -> Result<(), String> {
+    pub fn add(&mut self, name: &str, what: &'static str) -> Result<(), String> {
         refuse_reserved(name)?;
-        self.add_reserved(name)
+        if let Some(place) = self.place(name) {
+            let before = self.list[place as usize].what;
+            return Err(format!("two definitions: `{name}` is {before} already"));
+        }
+        self.insert(name, what);
+        Ok(())
     }
 
-    /// Adds a name that formulas must not give to anything else: `t` or `step`.
-    ///
-    /// # Errors
-    /// A sentence if it is there already.
-    pub(crate) fn add_reserved(&mut self, name: &str) -> Result<(), String> {
-        let place = self.list.len() as u32;
-        if self.places.insert(name.to_owned(), place).is_some() {
-            return Err(format!("`{name}` is defined twice"));
-        }
-        self.list.push(name.to_owned());
-        Ok(())
+    /// Adds a place that formulas reach by the word `name`, which nothing else may be called.
+    pub(crate) fn add_reserved(&mut self, name: &str) {
+        self.insert(name, "reserved");
+    }
+
+    /// Adds a place that formulas cannot name.
+    pub(crate) fn skip(&mut self) {
+        self.list.push(Entry { name: String::new(), what: "nameless" });
+    }
+
+    fn insert(&mut self, name: &str, what: &'static str) {
+        self.places.insert(name.to_owned(), self.list.len() as u32);
+        self.list.push(Entry { name: name.to_owned(), what });
     }
 
     /// The place of `name`.
@@ -54,7 +68,7 @@ impl Names {
     /// # Panics
     /// If there is none.
     pub fn at(&self, place: u32) -> &str {
-        &self.list[place as usize]
+        &self.list[place as usize].name
     }
 
     /// The number of names.
@@ -69,7 +83,8 @@ impl Names {
 
     /// The known name that is nearest to `name`, `pi` among them.
     pub(super) fn nearest(&self, name: &str) -> &str {
-        let known = self.list.iter().map(String::as_str);
+        let known = self.list.iter().map(|entry| entry.name.as_str());
+        let known = known.filter(|known| !known.is_empty());
         nearest(name, known.chain(["pi"])).unwrap_or("pi")
     }
 }
