@@ -77,7 +77,7 @@ impl Policy<2, 1> for BangBang {
 
     #[inline(always)]
     fn control<R: Real>(&self, [position, _]: [R; 2]) -> [R; 1] {
-        let full = R::lit(self.acceleration);
-        [position.if_lt(R::lit(0.0), full, -full)]
+        let full = self.acceleration;
+        [position.if_lt(R::lit(0.0), R::lit(full), R::lit(-full))]
     }
 }
