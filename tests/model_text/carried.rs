@@ -44,7 +44,8 @@ fn assert_same<S: System<NX, NU>, const NX: usize, const NU: usize>(name: &str, 
             assert_eq!(bits(text, &inputs), bits(rust, &inputs), "{name} at {inputs:?}");
         }
         let compiled = [&system.step(x, u)[..], &[system.target(x), system.constraint(x)]].concat();
-        let recorded = graphs(&text).iter().flat_map(|graph| graph.eval(&inputs)).collect::<Vec<_>>();
+        let recorded =
+            graphs(&text).iter().flat_map(|graph| graph.eval(&inputs)).collect::<Vec<_>>();
         assert_eq!(compiled.map_bits(), recorded.map_bits(), "{name} compiled, at {inputs:?}");
     }
     // Printed as WGSL and hashed alike: the same operations in the same order.

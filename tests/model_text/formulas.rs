@@ -15,7 +15,8 @@ fn names() -> Names {
 }
 
 fn value(text: &str) -> f64 {
-    let formula = Formula::parse(text, &names()).unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
+    let formula =
+        Formula::parse(text, &names()).unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
     formula.value(Values { names: &[3.0, -2.0, 0.5], outputs: &[10.0, 20.0] })
 }
 
@@ -221,8 +222,8 @@ fn every_function_knows_its_name() {
 
 /// Words of the grammar.
 const WORDS: [&str; 28] = [
-    "x", "y", "heading", "1", "2.5", "1e9", "+", "-", "*", "/", "^", "(", ")", ",", "<", "==",
-    "[", "]", "if(", "sin(", "hypot(", "clamp(", "net(", "'a'", "out[", "0", " ", "pi",
+    "x", "y", "heading", "1", "2.5", "1e9", "+", "-", "*", "/", "^", "(", ")", ",", "<", "==", "[",
+    "]", "if(", "sin(", "hypot(", "clamp(", "net(", "'a'", "out[", "0", " ", "pi",
 ];
 
 /// Texts made of the words of the grammar, and of anything.

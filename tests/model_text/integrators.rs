@@ -11,7 +11,9 @@ const PERIOD: f64 = 0.1_f32 as f64;
 const MASS: f64 = 2.0;
 
 fn model(text: &str) -> Model {
-    described(text).and_then(|described| described.model()).unwrap_or_else(|e| panic!("{e}\n{text}"))
+    described(text)
+        .and_then(|described| described.model())
+        .unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 /// `[x, speed]` after a step of `model` from time `t` and step number `step`.

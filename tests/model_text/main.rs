@@ -77,3 +77,21 @@ fn the_cart_is_a_model() {
     assert_eq!(model.values(), [2.0]);
     description.controller().expect("a policy");
 }
+
+/// The model of the page on models is one, and its errors are those that the page shows.
+#[test]
+fn the_page_on_models_is_true() {
+    let page = std::fs::read_to_string("docs/models.md").expect("the page");
+    let text = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
+    let text = text.expect("a model on the page");
+    let model = |text: &str| read(text, "dubins.toml", Path::new("."));
+    model(text).and_then(|description| description.model()).expect("the model of the page");
+    for (from, to) in [
+        ("sin(heading) + wind", "sin(hedaing) + wind"),
+        ("heading = \"turn\"\n", "\n"),
+        ("bounds = [-1.0, 1.0]", "bounds = [1.0, -1.0]"),
+    ] {
+        let error = model(&text.replacen(from, to, 1)).expect_err(from).to_string();
+        assert!(page.contains(&format!("    {error}\n")), "not on the page: {error}");
+    }
+}

@@ -81,7 +81,10 @@ fn a_bare_network_sees_the_states_and_is_the_control() {
     };
     with_network(&named(["x", "speed"]), file).expect("the states in order");
     let problem = problem(&named(["speed", "x"]), file);
-    assert!(problem.contains("its inputs are `speed,x`") && problem.contains("`observe`"), "{problem}");
+    assert!(
+        problem.contains("its inputs are `speed,x`") && problem.contains("`observe`"),
+        "{problem}"
+    );
 }
 
 #[test]
@@ -109,11 +112,15 @@ fn networks_that_do_not_fit_are_refused() {
 
 #[test]
 fn sections_that_make_no_policy_are_refused() {
-    let policy = |policy: &str| refusal(&cart_with("formula = { force = \"-2 * x - speed\" }", policy));
+    let policy =
+        |policy: &str| refusal(&cart_with("formula = { force = \"-2 * x - speed\" }", policy));
     for (text, part) in [
         ("formula = \"bang-bang\"", "policy.formula: expected a section"),
         ("formula = { force = \"x\" }\nobserve = [\"x\"]", "policy.observe: belongs to a network"),
-        ("formula = { force = \"x\" }\nact = { force = \"x\" }", "policy.act: belongs to a network"),
+        (
+            "formula = { force = \"x\" }\nact = { force = \"x\" }",
+            "policy.act: belongs to a network",
+        ),
         ("observe = [\"x\"]", "no policy; expected `file`"),
         ("file = 3", "policy.file: expected a text"),
         ("file = \"a\"\nobserve = \"x\"", "policy.observe: expected a list of formulas"),

@@ -23,10 +23,18 @@ fn assert_refused(from: &str, to: &str, parts: &[&str]) {
 #[test]
 fn a_formula_is_refused_with_file_line_key_and_column() {
     let place = format!("cart.toml:{}: model.flow.speed, column 8", line("speed = \"pull / mass"));
-    assert_refused("pull / mass", "pull / mas", &[&place, "unknown name `mas`", "nearest is `mass`"]);
+    assert_refused(
+        "pull / mass",
+        "pull / mas",
+        &[&place, "unknown name `mas`", "nearest is `mass`"],
+    );
     assert_refused("pull / mass", "pull * / 2", &["column 8", "expected a number", "found `/`"]);
     assert_refused("0.1 * speed", "0.1 * sped", &["model.let.drag, column 7", "`speed`"]);
-    assert_refused("1 - abs(speed)", "1 - abd(speed)", &["model.task.constraint, column 5", "`abs`"]);
+    assert_refused(
+        "1 - abs(speed)",
+        "1 - abd(speed)",
+        &["model.task.constraint, column 5", "`abs`"],
+    );
     assert_refused("pull / mass", "log(-2) / mass", &["model.flow.speed, column 1", "`log` of -2"]);
     assert_refused("pull / mass", "pull^mass", &["column 6", "an exponent is a number"]);
     assert_refused("pull / mass", "hypot(pull)", &["`hypot` takes 2 arguments, found 1"]);
@@ -118,10 +126,11 @@ fn next_values_are_not_integrated() {
 #[test]
 fn cycles_are_named() {
     let drag = "drag = \"0.1 * ";
-    assert_refused(&format!("{drag}speed"), &format!("{drag}pull"), &[
-        "model.let.drag, column 7",
-        "a cycle: `pull` uses `drag` uses `pull`",
-    ]);
+    assert_refused(
+        &format!("{drag}speed"),
+        &format!("{drag}pull"),
+        &["model.let.drag, column 7", "a cycle: `pull` uses `drag` uses `pull`"],
+    );
     assert_refused(&format!("{drag}speed"), &format!("{drag}drag"), &["`drag` uses `drag`"]);
     // A cycle of 10,000 is found as well, and named in short.
     let chain: String =
@@ -134,7 +143,11 @@ fn cycles_are_named() {
 
 #[test]
 fn values_are_refused() {
-    assert_refused("box = [-1.0, 1.0]", "box = [1.0, -1.0]", &["model.states.x.box", "turned round"]);
+    assert_refused(
+        "box = [-1.0, 1.0]",
+        "box = [1.0, -1.0]",
+        &["model.states.x.box", "turned round"],
+    );
     assert_refused("[-2.0, 2.0]", "[2.0, -2.0]", &["model.controls.force.bounds", "turned round"]);
     assert_refused("[-2.0, 2.0]", "[inf, inf]", &["holds no finite number"]);
     assert_refused("[-2.0, 2.0]", "[nan, 2.0]", &["no number"]);
@@ -151,14 +164,26 @@ fn values_are_refused() {
     assert_refused("substeps = 2", "substeps = 2.5", &["a whole number"]);
     assert_refused("name = \"cart\"", "name = \"a cart\"", &["model.name", "letters, digits"]);
     assert_refused("x = { unit = \"m\", box = [-1.0, 1.0] }", "x = 3", &["expected a section"]);
-    assert_refused("[model.let]", "[model.let", &[&format!("cart.toml:{}:11: ", line("[model.let]"))]);
-    assert_refused("at = [\"x\", \"speed\"]", "at = [\"x\"]", &["model.bodies.cart.at", "two states"]);
+    assert_refused(
+        "[model.let]",
+        "[model.let",
+        &[&format!("cart.toml:{}:11: ", line("[model.let]"))],
+    );
+    assert_refused(
+        "at = [\"x\", \"speed\"]",
+        "at = [\"x\"]",
+        &["model.bodies.cart.at", "two states"],
+    );
     assert_refused("at = [\"x\",", "at = [\"2 * x\",", &["at a formula cannot be shown yet"]);
 }
 
 #[test]
 fn what_does_not_work_yet_is_refused_by_name() {
-    assert_refused("value = 2.0", "draw = \"uniform\"", &["model.parameters.mass.draw", "not work yet"]);
+    assert_refused(
+        "value = 2.0",
+        "draw = \"uniform\"",
+        &["model.parameters.mass.draw", "not work yet"],
+    );
     for section in ["disturbances", "noise", "costs", "references", "maps", "shapes"] {
         let text = format!("[model.{section}]\n[model.time]");
         let place = format!("model.{section}: ");
@@ -179,10 +204,11 @@ fn what_does_not_work_yet_is_refused_by_name() {
 
 #[test]
 fn formulas_know_what_their_place_allows() {
-    assert_refused("0.1 - abs(x)", "0.1 - force", &[
-        "model.task.target, column 7",
-        "`force` is a control; a margin knows",
-    ]);
+    assert_refused(
+        "0.1 - abs(x)",
+        "0.1 - force",
+        &["model.task.target, column 7", "`force` is a control; a margin knows"],
+    );
     assert_refused("0.1 - abs(x)", "0.1 - pull", &["`pull` uses the control `force`"]);
     assert_refused("-2 * x - speed", "-2 * force", &["column 6", "a policy knows"]);
     assert_refused("pull / mass", "out[0] / mass", &["column 1", "`out` stands in `act`"]);
@@ -204,7 +230,11 @@ fn networks_in_formulas_are_looked_at() {
 #[test]
 fn counts_beyond_the_limits_are_refused_with_the_figure() {
     let states: String = (0..63).map(|i| format!("s{i} = {{ box = [0, 1] }}\n")).collect();
-    assert_refused("[model.states]\n", &format!("[model.states]\n{states}"), &["65 states", "1 to 64"]);
+    assert_refused(
+        "[model.states]\n",
+        &format!("[model.states]\n{states}"),
+        &["65 states", "1 to 64"],
+    );
     let controls: String = (0..16).map(|i| format!("c{i} = {{ bounds = [0, 1] }}\n")).collect();
     let controls = format!("[model.controls]\n{controls}");
     assert_refused("[model.controls]\n", &controls, &["17 controls", "1 to 16"]);
@@ -224,7 +254,8 @@ fn size_is_refused_in_no_time() {
     let sums = vec!["x"; 10_000].join("+");
     assert_refused("pull / mass", &sums, &["model.flow", "operations in all, at most 65536"]);
     // Each doubles the one before: nodes are shared, nothing grows.
-    let doubled: String = (1..2000).map(|i| format!("d{i} = \"d{} + d{}\"\n", i - 1, i - 1)).collect();
+    let doubled: String =
+        (1..2000).map(|i| format!("d{i} = \"d{} + d{}\"\n", i - 1, i - 1)).collect();
     let text = cart_with("[model.let]\n", &format!("[model.let]\nd0 = \"x\"\n{doubled}"));
     let text = text.replacen("pull / mass", "pull / mass + d1999", 1);
     described(&text).expect("a description").model().expect("a model");
@@ -234,7 +265,8 @@ fn size_is_refused_in_no_time() {
 /// Pieces of models, put together at random.
 fn texts() -> impl Strategy<Value = String> {
     let pieces: Vec<String> = CART.lines().map(str::to_owned).collect();
-    let other = ["[model]", "[model.next]", "x = 3", "t = \"x\"", "[policy]", "file = \"a\"", "act = {}"];
+    let other =
+        ["[model]", "[model.next]", "x = 3", "t = \"x\"", "[policy]", "file = \"a\"", "act = {}"];
     let pieces: Vec<String> =
         pieces.into_iter().chain(other.map(str::to_owned)).map(|line| line + "\n").collect();
     let shuffled = proptest::collection::vec(proptest::sample::select(pieces), 0..40);

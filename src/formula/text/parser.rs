@@ -123,10 +123,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Runs `inner` one level deeper.
-    fn nested<T>(
-        &mut self,
-        inner: impl FnOnce(&mut Self) -> Result<T, Fault>,
-    ) -> Result<T, Fault> {
+    fn nested<T>(&mut self, inner: impl FnOnce(&mut Self) -> Result<T, Fault>) -> Result<T, Fault> {
         if self.depth == DEEPEST {
             return Err(self.fault(format!("nested deeper than {DEEPEST} levels")));
         }
@@ -280,9 +277,10 @@ impl<'a> Parser<'a> {
             ("if", _) => self.condition(at),
             ("net", _) => self.network(at),
             (_, Some(function)) => self.function(function, at),
-            (_, None) if self.names.place(name).is_some() => {
-                Err(Fault::new(at, format!("`{name}` is no function; a product is written with `*`")))
-            }
+            (_, None) if self.names.place(name).is_some() => Err(Fault::new(
+                at,
+                format!("`{name}` is no function; a product is written with `*`"),
+            )),
             (_, None) => {
                 let nearest = nearest(name, Function::names()).unwrap_or("abs");
                 let problem = format!("unknown function `{name}`; the nearest is `{nearest}`");
@@ -332,9 +330,8 @@ impl<'a> Parser<'a> {
             Kind::Symbol(symbol) => Comparison::of(symbol),
             _ => None,
         };
-        let comparison = comparison.ok_or_else(|| {
-            self.unexpected("a comparison (`<`, `<=`, `>`, `>=`, `==` or `!=`)")
-        })?;
+        let comparison = comparison
+            .ok_or_else(|| self.unexpected("a comparison (`<`, `<=`, `>`, `>=`, `==` or `!=`)"))?;
         self.advance()?;
         let b = self.sum()?;
         self.expect(",")?;

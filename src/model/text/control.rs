@@ -56,7 +56,8 @@ impl Description {
             None => (self.states.len(), "states; `observe` gives a network other inputs"),
         };
         if given != inputs {
-            let problem = format!("the network takes {inputs} inputs, the model has {given} {what}");
+            let problem =
+                format!("the network takes {inputs} inputs, the model has {given} {what}");
             return Err(Error::file(&policy.file, problem));
         }
         match network.state_order() {

@@ -118,8 +118,7 @@ fn name(model: &Section<'_>) -> Result<String> {
     let name = model.text("name")?.ok_or_else(missing)?;
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
-        let problem =
-            format!("`{}`; expected 1 to 64 letters, digits, `-` and `_`", shown(name));
+        let problem = format!("`{}`; expected 1 to 64 letters, digits, `-` and `_`", shown(name));
         return Err(model.refuse("name", problem));
     }
     Ok(name.to_owned())

@@ -131,9 +131,7 @@ fn integration(model: &Section<'_>, time: Time) -> Result<Integration> {
     };
     Ok(Integration {
         period: time.period.ok_or_else(|| missing("period", "the seconds of a step"))?,
-        integrator: time
-            .integrator
-            .ok_or_else(|| missing("integrator", "\"euler\" or \"rk4\""))?,
+        integrator: time.integrator.ok_or_else(|| missing("integrator", "\"euler\" or \"rk4\""))?,
         substeps: time.substeps.unwrap_or(1),
     })
 }

@@ -67,8 +67,7 @@ use crate::formula::text::LONGEST_TEXT;
 /// wrong, with what was expected and the nearest name.
 pub fn read(text: &str, origin: &str, folder: &Path) -> Result<Description> {
     if text.len() > LONGEST_TEXT {
-        let problem =
-            format!("a model of {} bytes, at most {LONGEST_TEXT} are read", text.len());
+        let problem = format!("a model of {} bytes, at most {LONGEST_TEXT} are read", text.len());
         return Err(Error::invalid(origin, problem));
     }
     let origin = Origin::new(origin, folder).with_text(text);

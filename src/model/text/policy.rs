@@ -30,19 +30,15 @@ pub struct NetworkPolicy {
 }
 
 /// Reads `[policy]`.
-pub(super) fn policy(
-    section: &Section<'_>,
-    controls: &[&str],
-    scope: &Scope,
-) -> Result<Policy> {
+pub(super) fn policy(section: &Section<'_>, controls: &[&str], scope: &Scope) -> Result<Policy> {
     section.only(["file", "formula", "observe", "act"].into_iter())?;
     match (section.text("file"), section.has("formula")) {
-        (Ok(Some(_)) | Err(_), true) => Err(section
-            .refuse_whole("two definitions: `file` and `formula` are both given; keep one of them")),
+        (Ok(Some(_)) | Err(_), true) => Err(section.refuse_whole(
+            "two definitions: `file` and `formula` are both given; keep one of them",
+        )),
         (file, false) => {
-            let missing = || {
-                section.refuse_whole("no policy; expected `file`, a network, or `formula`")
-            };
+            let missing =
+                || section.refuse_whole("no policy; expected `file`, a network, or `formula`");
             network(section, file?.ok_or_else(missing)?, controls, scope).map(Policy::Network)
         }
         (Ok(None), true) => formulas(section, controls, scope).map(Policy::Formulas),

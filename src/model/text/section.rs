@@ -105,7 +105,8 @@ impl<'a> Section<'a> {
             return Ok(None);
         };
         if low > high {
-            let problem = format!("turned round: [{low}, {high}] has its lower end above its upper");
+            let problem =
+                format!("turned round: [{low}, {high}] has its lower end above its upper");
             return Err(self.refuse(key, problem));
         }
         if low.is_nan() || high.is_nan() {

@@ -32,7 +32,10 @@ pub(super) fn task(section: &Section<'_>, scope: &Scope) -> Result<Task> {
     let margin = |key: &str| {
         let value = section.entries().find(|(name, _)| *name == key);
         let (_, value) = value.ok_or_else(|| {
-            section.refuse(key, "missing; expected a margin, a formula that is positive where it holds")
+            section.refuse(
+                key,
+                "missing; expected a margin, a formula that is positive where it holds",
+            )
         })?;
         Written::read(section, key, value, scope, Purpose::Task)
     };
@@ -70,9 +73,7 @@ pub(super) fn bodies(section: Option<Section<'_>>, scope: &Scope) -> Result<Vec<
                 x: coordinate(&entry, x, scope)?,
                 y: coordinate(&entry, y, scope)?,
             }),
-            other => {
-                Err(entry.refuse("at", format!("expected {expected}, found {}", other.len())))
-            }
+            other => Err(entry.refuse("at", format!("expected {expected}, found {}", other.len()))),
         }
     };
     section.entries().map(body).collect()

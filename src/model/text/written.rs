@@ -1,12 +1,13 @@
 //! Formulas where they stand: each with its key and text, checked against what it may use.
 
+use toml::Value;
+
 use super::names::Scope;
 use super::network;
 use super::origin::Origin;
-use super::section::Section;
+use super::section::{Section, unknown};
 use crate::error::{Error, Result};
 use crate::formula::text::{Fault, Formula, Use};
-use toml::Value;
 
 /// A formula of a description.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +33,20 @@ pub(super) enum Purpose {
     Policy,
     /// The control from a network's output: no controls, but the outputs.
     Act,
+}
+
+impl Purpose {
+    /// What a formula may use, for an error about one that uses more.
+    fn allowed(self) -> &'static str {
+        match self {
+            Self::Dynamics => "dynamics know states, controls, parameters and time",
+            Self::Task => "a margin knows states, parameters and time",
+            Self::Picture => "a body stands where states say",
+            Self::Policy | Self::Act => {
+                "a policy knows states, parameters and time, and makes the controls"
+            }
+        }
+    }
 }
 
 impl Written {
@@ -82,12 +97,7 @@ impl Written {
             } else {
                 format!("`{name}` uses the control `{control}`")
             };
-            let why = match purpose {
-                Purpose::Task => "a margin knows states, parameters and time",
-                Purpose::Picture => "a body stands where states say",
-                _ => "a policy knows states, parameters and time, and makes the controls",
-            };
-            return Err(self.refuse(origin, at, format!("{what}; {why}")));
+            return Err(self.refuse(origin, at, format!("{what}; {}", purpose.allowed())));
         }
         Ok(())
     }
@@ -108,7 +118,7 @@ pub(super) fn one_each<'a>(
 ) -> Result<Vec<Written>> {
     for (key, _) in section.entries() {
         if wanted.clone().all(|name| name != key) {
-            let problem = super::section::unknown(words.name, key, wanted);
+            let problem = unknown(words.name, key, wanted);
             return Err(section.refuse(key, problem));
         }
     }
