@@ -4,6 +4,7 @@ mod controller;
 mod identity;
 mod plant;
 mod recorded;
+pub mod text;
 
 use std::sync::Arc;
 
