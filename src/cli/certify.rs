@@ -1,18 +1,20 @@
 //! The command `certify`: a certificate, its tables and its report in one folder.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::args::Global;
+use super::options::Global;
+use super::inputs::inputs;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::Result;
-use crate::files::{Staged, check_room, json, npy_bytes};
+use crate::files::{Existing, MANIFEST, Staged, check_room, is_free, json, make_way, npy_bytes};
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::scenario;
 use crate::scenario::record::{DeviationRecord, Record};
+use crate::scenario::check_settings;
 use crate::scenario::settings::Settings;
 use crate::system::System;
 
@@ -29,13 +31,31 @@ pub(super) const POLICY: &str = "policy.safetensors";
 pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let config = Config::load(path, &global.overrides())?;
     let policy = config.policy_source(folder_of(path))?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let job = Certify { global, config: &config, out: &out };
+    let out = global.folder(DEFAULT_OUT);
+    inputs(path, &policy, []).spare_folder(&out)?;
+    let manifest = manifest(&config, &policy)?;
+    let job = Certify { global, config: &config, out: &out, manifest: &manifest };
     let (record, mut staged) = config.with_plant(&policy, job)?;
+    staged.add(MANIFEST, manifest.as_bytes())?;
     stage(&mut staged, &record, &policy)?;
+    // Again: the work may have taken hours.
+    match global.existing {
+        Existing::Kept => is_free(&out, &manifest).map(drop)?,
+        Existing::Replaced => make_way(&out, &manifest)?,
+    }
     let files = staged.publish()?;
     report(global, &record, || summary::text(&record, &files))?;
     Ok(if record.holds { Outcome::Done } else { Outcome::NotObtained })
+}
+
+/// What the folder of a certificate says that it holds: the same for a run that repeats it.
+fn manifest(config: &Config, policy: &PolicySource) -> Result<String> {
+    let digest = match policy {
+        PolicySource::Network { network, .. } => Some(network.digest()),
+        PolicySource::Formula(_) => None,
+    };
+    let work = serde_json::json!({ "config": config.to_json()?, "policy_sha256": digest });
+    json(MANIFEST, &serde_json::json!({ "certificate": work }))
 }
 
 /// The command for one plant.
@@ -43,6 +63,7 @@ struct Certify<'a> {
     global: &'a Global,
     config: &'a Config,
     out: &'a Path,
+    manifest: &'a str,
 }
 
 impl Job for Certify<'_> {
@@ -57,7 +78,11 @@ impl Job for Certify<'_> {
         P: Policy<NX, NU>,
     {
         let settings = self.config.settings(&plant.system.states())?;
+        check_settings(&settings)?;
         let stored = self.config.to_json()?;
+        if self.global.existing == Existing::Kept {
+            is_free(self.out, self.manifest)?;
+        }
         let backend = devices::open(self.global)?;
         let progress = Progress::new(self.global);
         // Before the work: a folder that cannot be written to would waste it.

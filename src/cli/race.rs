@@ -6,14 +6,15 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::args::{Global, RaceArguments};
+use super::args::RaceArguments;
+use super::options::Global;
 use super::progress::Progress;
 use super::race_input::{RaceInput, names, noise_seeds};
 use super::{Outcome, devices, report};
 use crate::error::Result;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
 use crate::experiment::run::{Experiment, TimingRecord};
-use crate::files::{Staged, json};
+use crate::files::{Existing, Staged, json};
 use crate::report::race_html;
 
 /// Where the results go unless `--out` says otherwise.
@@ -34,7 +35,8 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let names = names(&asked.controllers)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.noise_seeds)?;
     let (starts, source) = input.starts(asked.starts.as_deref())?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let out = global.folder(DEFAULT_OUT);
+    input.inputs(&asked.config, asked.starts.as_deref()).spare_folder(&out)?;
     let progress = Progress::new(global);
     let backend = devices::open(global)?;
     let experiment = Experiment {
@@ -46,6 +48,9 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
         config: input.config.to_json()?,
         folder: out.clone(),
     };
+    if global.existing == Existing::Replaced {
+        experiment.make_way()?;
+    }
     let (record, controllers) = experiment.run(&progress)?;
     progress.finish();
     devices::note_events(global, &backend);

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::args::{Global, ScenarioArguments};
+use super::args::ScenarioArguments;
+use super::options::Global;
 use super::{Outcome, report};
 use crate::error::{Error, Result};
 use crate::scenario::bound::{

@@ -2,18 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use super::args::Global;
+use super::options::Global;
 use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::{Error, Result};
-use crate::files::{Staged, StateReader};
+use crate::files::{Existing, Inputs, Staged, StateReader};
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::scenario::record::Record;
-use crate::scenario::{self, CheckReport, Finding, QueryRow};
+use crate::scenario::{self, CheckReport, Figure, Finding, QueryRow};
 use crate::system::System;
+
+/// Name of the file with a line per state.
+const ANSWERS: &str = "query.csv";
 
 /// A stored certificate with the configuration and the policy that it was made with.
 struct Stored {
@@ -24,11 +27,7 @@ struct Stored {
 
 impl Stored {
     /// Reads what `certify` wrote to `folder`.
-    fn read(global: &Global, folder: &Path) -> Result<Self> {
-        if global.profile.is_some() || global.seed.is_some() || !global.set.is_empty() {
-            let problem = "a stored certificate has its own; leave these flags out";
-            return Err(Error::invalid("--profile, --seed and --set", problem));
-        }
+    fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CERTIFICATE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;
@@ -51,7 +50,11 @@ fn at(path: &Path, error: Error) -> Error {
 
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
-    let stored = Stored::read(global, folder)?;
+    let stored = Stored::read(folder)?;
+    if let Some(out) = &global.out {
+        let read = [states.to_owned(), folder.join(CERTIFICATE), folder.join(POLICY)];
+        Inputs::new(read).spare_file(&out.join(ANSWERS))?;
+    }
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     let job = Ask { global, stored: &stored, states };
@@ -59,7 +62,7 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     match staged {
         None => report(global, &rows, || csv(&rows))?,
         Some(staged) => {
-            let path = write(staged, &rows)?;
+            let path = write(staged, &rows, global.existing)?;
             report(global, &rows, || counts(&rows, &path))?;
         }
     }
@@ -95,10 +98,10 @@ impl Job for Ask<'_> {
     }
 }
 
-/// Writes the rows to `query.csv`.
-fn write(mut staged: Staged, rows: &[QueryRow]) -> Result<PathBuf> {
-    staged.add("query.csv", csv(rows).as_bytes())?;
-    Ok(staged.publish()?.remove(0))
+/// Writes the rows to [`ANSWERS`].
+fn write(mut staged: Staged, rows: &[QueryRow], existing: Existing) -> Result<PathBuf> {
+    staged.add(ANSWERS, csv(rows).as_bytes())?;
+    Ok(staged.publish_sparing(existing)?.remove(0))
 }
 
 /// A line per state.
@@ -124,7 +127,7 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
 
 /// Verifies the certificate in the folder again.
 pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
-    let stored = Stored::read(global, folder)?;
+    let stored = Stored::read(folder)?;
     let job = Verify { global, stored: &stored };
     let mut found = stored.config.with_plant(&stored.policy, job)?;
     // Of a record that does not hold, a page may not even be made.
@@ -152,8 +155,8 @@ fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
         let holds = found == bytes;
         findings.push(Finding {
             name: name.to_owned(),
-            stored: format!("as {CERTIFICATE} gives it"),
-            found: if holds { "the same" } else { "other content" }.to_owned(),
+            stored: Figure::Words(format!("as {CERTIFICATE} gives it")),
+            found: Figure::Words(if holds { "the same" } else { "other content" }.to_owned()),
             holds,
         });
     }

@@ -23,7 +23,7 @@ use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, claim_folder};
+use crate::files::{Staged, claim_folder, make_way};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
@@ -72,6 +72,15 @@ pub struct TimingRecord {
 }
 
 impl Experiment<'_> {
+    /// Removes the results of other work from the folder, once nothing is wrong with this.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::run`] before any race.
+    pub fn make_way(&self) -> Result<()> {
+        self.check(&[])?;
+        make_way(&self.folder, &format!("{:#}\n", self.manifest()))
+    }
+
     /// Runs what is not stored yet and makes the record of all.
     ///
     /// # Errors

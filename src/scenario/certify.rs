@@ -7,7 +7,7 @@ use super::boundary;
 use super::ledger::{Entry, Ledger, Spend};
 use super::record::{
     ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
-    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
+    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing, decimal,
 };
 use super::settings::Settings;
 use super::{Context, Watch, derived, deviation, global, growth, lipschitz};
@@ -70,6 +70,8 @@ where
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, (&growth, global.band))?;
     let picture = picture(plant, settings, &growth);
+    let mut statements = derived::statements(settings, &deviation, &global, &growth);
+    statements.extend(derived::of_samples(plant, settings, &picture));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
@@ -77,11 +79,11 @@ where
         schema: SCHEMA,
         digests: BTreeMap::new(),
         holds: derived::holds(&deviation, &global, &growth),
-        statements: derived::statements(settings, &deviation, &global, &growth),
+        statements,
         provenance: provenance(backend, plant, settings.seed, config),
         system: system_record(plant.system, settings),
         horizon: settings.spec.horizon,
-        gamma: f64::from(settings.spec.gamma),
+        gamma: decimal(settings.spec.gamma),
         constants,
         deviation,
         global,
@@ -311,10 +313,10 @@ where
     let x = settings.state;
     let query = Query::Measure;
     let margins = global::check_margins(context, &settings.spec, tightening, &[x], query, band)?;
-    let check_margin = f64::from(margins[0]);
-    let target_margin = f64::from(context.plant.system.target(x));
+    let check_margin = decimal(margins[0]);
+    let target_margin = decimal(context.plant.system.target(x));
     let tier = super::verify::tier(target_margin, check_margin, growth, &x);
-    let constraint_margin = f64::from(context.plant.system.constraint(x));
+    let constraint_margin = decimal(context.plant.system.constraint(x));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }
 

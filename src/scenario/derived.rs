@@ -2,10 +2,11 @@
 
 use super::certify::{constants, hashes, ledger, spendings, system_record};
 use super::record::{
-    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, Record, SliceAxisRecord,
+    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record, RolloutRecord,
+    SliceAxisRecord, decimal,
 };
 use super::settings::Settings;
-use super::{deviation, global, growth, verify};
+use super::{deviation, global, growth, sampling, verify};
 use crate::error::Result;
 use crate::policy::Policy;
 use crate::rollout::{GENERATOR, Plant};
@@ -29,7 +30,7 @@ where
     let system = plant.system;
     let mut record = stored.clone();
     record.horizon = settings.spec.horizon;
-    record.gamma = f64::from(settings.spec.gamma);
+    record.gamma = decimal(settings.spec.gamma);
     record.provenance.seed = settings.seed;
     record.provenance.generator = GENERATOR.to_owned();
     record.provenance.policy = plant.policy.name();
@@ -43,6 +44,7 @@ where
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, system, settings);
     record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    record.statements.extend(of_samples(plant, settings, &record.picture));
     record.holds = holds(&record.deviation, &record.global, &record.growth);
     Ok(record)
 }
@@ -58,8 +60,8 @@ fn margins<S, const NX: usize, const NU: usize>(
     let x = settings.state;
     let state = &mut record.state;
     state.x = x.to_vec();
-    state.target_margin = f64::from(system.target(x));
-    state.constraint_margin = f64::from(system.constraint(x));
+    state.target_margin = decimal(system.target(x));
+    state.constraint_margin = decimal(system.constraint(x));
     state.tier = verify::tier(state.target_margin, state.check_margin, &record.growth, &x);
     let axis = |i: usize| SliceAxisRecord {
         state: settings.slice[i].state,
@@ -97,6 +99,22 @@ pub(super) fn statements<const NX: usize>(
     statements.insert(2, share_statement(global, settings));
     statements.extend(growth_statement(growth));
     statements
+}
+
+/// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is
+/// too coarse for them.
+pub(super) fn of_samples<S, P, const NX: usize, const NU: usize>(
+    plant: Plant<'_, S, P>,
+    settings: &Settings<NX>,
+    picture: &PictureRecord,
+) -> Vec<String>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let first = |rollout: &RolloutRecord| rollout.states.first()?.as_slice().try_into().ok();
+    let starts: Vec<[f32; NX]> = picture.rollouts.iter().filter_map(first).collect();
+    sampling::sampling(plant, &starts, settings.spec.horizon)
 }
 
 /// The certified share of the box in words.

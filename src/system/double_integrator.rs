@@ -1,6 +1,6 @@
 //! The double integrator in one dimension, whose reach-avoid set has a closed form.
 
-use super::{Axis, System};
+use super::{Axis, Feature, System};
 use crate::policy::Policy;
 use crate::real::Real;
 
@@ -55,6 +55,14 @@ impl System<2, 1> for DoubleIntegrator {
     #[inline(always)]
     fn constraint<R: Real>(&self, [position, _]: [R; 2]) -> R {
         R::lit(self.corridor) - position.abs()
+    }
+
+    fn smallest_feature(&self) -> Option<Feature> {
+        let (name, half) = match self.target < self.corridor {
+            true => ("the target", self.target),
+            false => ("the corridor", self.corridor),
+        };
+        Some(Feature { name: name.to_owned(), width: 2.0 * half })
     }
 }
 

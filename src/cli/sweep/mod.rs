@@ -7,9 +7,7 @@ mod grid;
 mod race;
 mod text;
 
-use std::path::PathBuf;
-
-use super::args::Global;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::error::Result;
@@ -24,7 +22,7 @@ const DEFAULT_OUT: &str = "reachcast-sweep";
 /// Runs the points that are not stored yet and writes the tables and the page of all.
 pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
     let grid = axes::grid(asked)?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let out = global.folder(DEFAULT_OUT);
     let progress = Progress::new(global);
     let backend = devices::open(global)?;
     let work = (&backend, &progress, out.as_path());
