@@ -5,6 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::options::{BackendName, Global};
+use super::remembered::hardware;
 use super::{Outcome, report};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -39,7 +40,9 @@ fn choice(global: &Global) -> Result<Option<Choice>> {
     }
     Ok(match global.common.backend {
         BackendName::Gpu => Some(Choice::Any),
-        BackendName::Auto if adapters().iter().any(is_hardware) => Some(Choice::Hardware),
+        BackendName::Auto if hardware(|| adapters().iter().any(is_hardware)) => {
+            Some(Choice::Hardware)
+        }
         BackendName::Auto | BackendName::Cpu => None,
     })
 }

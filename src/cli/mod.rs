@@ -10,6 +10,7 @@ mod policy;
 mod progress;
 mod race;
 mod race_input;
+mod remembered;
 mod rollout;
 mod scenarios;
 mod stored;

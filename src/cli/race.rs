@@ -20,6 +20,13 @@ use crate::report::race_html;
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-race";
 
+/// What the columns of the table are.
+const LEGEND: &str = "\
+Judges say what a safe win is. study: the published code's distance in space and the gate at the crossing;
+paper: a positive constraint with the squared cone; rigorous: the same with the cone as a distance.
+published: the study's rate; ms, share: mean wall time of a step of the batch over the races under way;
+unsafe starts aside: the share of starts that violate no rule before anyone moves";
+
 /// What `timing.json` holds: it differs from run to run, so it is no part of the results.
 #[derive(Serialize)]
 struct Timing {
@@ -109,6 +116,10 @@ fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
     ));
     for absent in &record.absent {
         line(format_args!("{:20} did not run: {}", absent.name, absent.reason));
+    }
+    line(format_args!("{LEGEND}"));
+    for note in &record.notes {
+        line(format_args!("note: {note}"));
     }
     line(format_args!("\n{:.1} s on {}", timing.wall_seconds, record.provenance.device));
     for file in files {

@@ -176,7 +176,7 @@ fn text(summary: &Summary) -> String {
         "{successes} of {starts} starts reach the target safely: {share:.2} % \
          (95 % interval {:.2} % to {:.2} %)\n\
          {non_finite} failed for a state that is not finite\n\
-         measures: {}\n\
+         measures (positive where the target is reached safely): {}\n\
          {} steps, {}, {:.3} s\n{notes}",
         100.0 * low,
         100.0 * high,

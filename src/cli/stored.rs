@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::options::Global;
+use serde::Serialize;
+
 use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::progress::Progress;
 use super::{Outcome, devices, report};
@@ -17,6 +19,11 @@ use crate::system::System;
 
 /// Name of the file with a line per state.
 const ANSWERS: &str = "query.csv";
+
+/// What the lines of `check` mean.
+const FRESH: &str = "\
+stored: what the certificate says; found: computed again from its seed, or on fresh pairs and starts, which
+are drawn anew and may refute a claim, not prove it";
 
 /// A stored certificate with the configuration and the policy that it was made with.
 struct Stored {
@@ -60,10 +67,10 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     let job = Ask { global, stored: &stored, states };
     let rows = stored.config.with_plant(&stored.policy, job)?;
     match staged {
-        None => report(global, &rows, || csv(&rows))?,
+        None => report(global, &numbered(&rows), || csv(&rows))?,
         Some(staged) => {
             let path = write(staged, &rows, global.existing)?;
-            report(global, &rows, || counts(&rows, &path))?;
+            report(global, &numbered(&rows), || counts(&rows, &path))?;
         }
     }
     Ok(Outcome::Done)
@@ -104,14 +111,26 @@ fn write(mut staged: Staged, rows: &[QueryRow], existing: Existing) -> Result<Pa
     Ok(staged.publish_sparing(existing)?.remove(0))
 }
 
+/// A row with the number of its state in the file, from 0.
+#[derive(Serialize)]
+struct Numbered<'a> {
+    index: usize,
+    #[serde(flatten)]
+    row: &'a QueryRow,
+}
+
+fn numbered(rows: &[QueryRow]) -> Vec<Numbered<'_>> {
+    rows.iter().enumerate().map(|(index, row)| Numbered { index, row }).collect()
+}
+
 /// A line per state.
 fn csv(rows: &[QueryRow]) -> String {
-    let line = |row: &QueryRow| {
+    let line = |(index, row): (usize, &QueryRow)| {
         let QueryRow { tier, check_margin, target_margin } = row;
-        format!("{tier},{check_margin},{target_margin}\n")
+        format!("{index},{tier},{check_margin},{target_margin}\n")
     };
-    let lines: String = rows.iter().map(line).collect();
-    format!("tier,check_margin,target_margin\n{lines}")
+    let lines: String = rows.iter().enumerate().map(line).collect();
+    format!("index,tier,check_margin,target_margin\n{lines}")
 }
 
 /// How many states are of each tier.
@@ -122,7 +141,8 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
         format!("tier {tier} ({name}): {count}\n")
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();
-    format!("{lines}rows: {}\n", path.display())
+    let words = "V_check: the reach-avoid measure with its margins tightened, certified where positive";
+    format!("{lines}{words}\nrows: {}\n", path.display())
 }
 
 /// Verifies the certificate in the folder again.
@@ -201,5 +221,5 @@ fn findings(found: &CheckReport) -> String {
         true => "the certificate holds",
         false => "the certificate no longer holds",
     };
-    format!("{lines}{verdict}\n")
+    format!("{lines}{FRESH}\n{verdict}\n")
 }

@@ -120,7 +120,10 @@ fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
 
 /// A configuration as JSON.
 fn stored(config: &Config) -> Result<serde_json::Value> {
-    serde_json::to_value(config).map_err(|e| Error::invalid("configuration", e.to_string()))
+    // By way of the text, in which an f32 is the shortest decimal that stands for it.
+    let text = serde_json::to_string(config);
+    text.and_then(|text| serde_json::from_str(&text))
+        .map_err(|e| Error::invalid("configuration", e.to_string()))
 }
 
 /// The defaults of the profile and the system that the table `given` names.

@@ -19,6 +19,7 @@ use super::record::{
 use super::roster::{absent, certifies, controller, settings, values};
 use super::settings::RaceSettings;
 use super::summary::Summary;
+use super::weights::note;
 use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
@@ -26,6 +27,7 @@ use crate::error::{Error, Result};
 use crate::files::{Staged, claim_folder, make_way};
 use crate::policy::Mlp;
 use crate::rollout::Plant;
+use crate::scenario::sampling::sampling;
 use crate::scenario::settings::Joint;
 use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
@@ -33,6 +35,8 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
+/// Starts whose rollouts under the policy are looked at for what samples do not tell.
+const LOOKED_AT: usize = 16;
 /// Room for record, page and manifest, bytes.
 const RECORD_BYTES: u64 = 2 << 20;
 
@@ -255,7 +259,20 @@ impl Experiment<'_> {
             absent: absent.collect(),
             picture: shown,
             events: self.events(&ran)?,
+            notes: self.notes(summaries),
         })
+    }
+
+    /// What has to be said beside the figures: of states at samples, and of plans whose weights say
+    /// little.
+    fn notes(&self, summaries: &[(Name, Summary)]) -> Vec<String> {
+        let World { system, policy, race, certificates, .. } = self.world;
+        let few = &self.starts[..self.starts.len().min(LOOKED_AT)];
+        let mut notes = sampling(Plant { system, policy }, few, certificates.spec.horizon);
+        notes.extend(summaries.iter().filter_map(|(name, summary)| {
+            note(*name, &settings(*name, race), summary.plan_means())
+        }));
+        notes
     }
 
     /// What failed on the adapter, in this run and in those that stored races of `names` before it.

@@ -37,6 +37,7 @@ use opened::{Opened, Setup};
 use recover::State;
 
 pub use buffer::Params;
+pub(crate) use cache::folder as cache_folder;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
 pub use device::{Adapter, AdapterKind, Choice, adapters};

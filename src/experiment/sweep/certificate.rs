@@ -33,6 +33,7 @@ where
         axes,
         total,
         points: Vec::new(),
+        notes: Vec::new(),
     }
 }
 

@@ -32,6 +32,7 @@ impl Experiment<'_> {
             axes,
             total,
             points: Vec::new(),
+            notes: Vec::new(),
         }
     }
 

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::notes::notes;
 use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
 use crate::backend::Event;
@@ -119,6 +120,7 @@ impl Store {
     /// # Errors
     /// [`Error::Write`].
     pub fn finish(&mut self, page: impl FnOnce(&SweepRecord) -> String) -> Result<Vec<PathBuf>> {
+        self.record.notes = notes(&self.record);
         let mut files = self.tables()?;
         let mut staged = Staged::new(&self.folder)?;
         staged.add("report.html", page(&self.record).as_bytes())?;
