@@ -1,5 +1,5 @@
 //! A system of one's own, from its definition to a certificate: a Dubins car, a round obstacle,
-//! a hand-written policy. `cargo run --release --example dubins [cpu|gpu]`
+//! a hand-written policy. `cargo run --release --example dubins`
 
 use reachcast::Result;
 use reachcast::backend::{Backend, cpu::Cpu};

@@ -159,7 +159,7 @@ fn exported_measures_are_those_of_the_command_rollout() {
         let (config, measures) = (config.to_str().unwrap(), path("measures.npy"));
         let starts = path("starts.npy");
         let files = ["--starts", starts.to_str().unwrap(), "--measures"];
-        let words = ["rollout", config, "--backend", "cpu", "-q"];
+        let words = ["rollout", config, "--backend", "cpu", "-q", "--overwrite"];
         done(&[&words[..], &files, &[measures.to_str().unwrap()]].concat());
         let (_, ours) = npy(&measures);
         assert_eq!(exported[..], ours[..4096], "{name}");

@@ -1,6 +1,6 @@
 //! The double integrator in one dimension, whose reach-avoid set has a closed form.
 
-use super::{Axis, Parameter, System};
+use super::{Axis, Feature, Parameter, System};
 use crate::policy::Policy;
 use crate::real::Real;
 
@@ -60,6 +60,14 @@ impl System<2, 1> for DoubleIntegrator {
     fn parameters(&self) -> Vec<Parameter> {
         let parameter = Parameter::new;
         vec![parameter("target", "m", self.target), parameter("corridor", "m", self.corridor)]
+    }
+
+    fn smallest_feature(&self) -> Option<Feature> {
+        let (name, half) = match self.target < self.corridor {
+            true => ("the target", self.target),
+            false => ("the corridor", self.corridor),
+        };
+        Some(Feature { name: name.to_owned(), width: 2.0 * half })
     }
 }
 

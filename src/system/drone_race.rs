@@ -1,6 +1,6 @@
 //! The two-drone race: an ego that must pass the gate first, and an opponent under linear feedback.
 
-use super::{Axis, Body, Parameter, System};
+use super::{Axis, Body, Feature, Parameter, System};
 use crate::real::Real;
 
 /// Step of the explicit Euler integration, seconds.
@@ -160,5 +160,13 @@ impl System<12, 3> for DroneRace {
     fn bodies(&self) -> Vec<Body> {
         let body = |name: &str, x| Body { name: name.to_owned(), x, y: x + 2 };
         vec![body("ego", 0), body("opponent", 6)]
+    }
+
+    fn smallest_feature(&self) -> Option<Feature> {
+        let radius = match self.cone {
+            Cone::Distance => Self::CONE,
+            Cone::Squared | Cone::Root => Self::CONE.sqrt(),
+        };
+        Some(Feature { name: "the cone around the opponent".to_owned(), width: 2.0 * radius })
     }
 }

@@ -26,8 +26,8 @@ mod params;
 mod plan;
 mod prepared;
 mod program;
-mod readback;
 mod reach_avoid;
+mod readback;
 mod recover;
 mod source;
 mod timing;
@@ -53,6 +53,7 @@ use recover::{State, Typed};
 use source::{Source, Sources};
 use traffic::Count;
 
+pub(crate) use cache::folder as cache_folder;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
 pub use device::{Adapter, AdapterKind, Choice, adapters};

@@ -64,7 +64,8 @@ impl Workspace {
         let buffers = Buffers::new(flight, (compiled, network), shape);
         let sets = if shape.work == Work::Sign { 2 } else { 1 };
         let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers };
-        let kernels = (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
+        let kernels =
+            (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(plan.stride);
         let farthest = 8 * (u64::from(shape.horizon) + 1);
         let readback = Readback::new(device, pool, MEASURES_AT + results + farthest);

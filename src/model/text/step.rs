@@ -36,6 +36,7 @@ impl Description {
             target: self.recorded(&target.key, std::slice::from_ref(target))?,
             constraint: self.recorded(&constraint.key, std::slice::from_ref(constraint))?,
             bodies: self.bodies.clone(),
+            smallest_feature: None,
             native: None,
         })
     }

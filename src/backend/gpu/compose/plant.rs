@@ -267,12 +267,16 @@ fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
     }
     if let Law::Network { observe, network, act } = &controller.law {
         let Driver { inputs: seen, outputs: said, .. } = driver(network, None);
-        check_network(observe.is_some() || seen == states, act.is_some() || said == controls, || {
-            format!(
-                "maps {seen} inputs to {said} outputs; the system has {states} states and \
+        check_network(
+            observe.is_some() || seen == states,
+            act.is_some() || said == controls,
+            || {
+                format!(
+                    "maps {seen} inputs to {said} outputs; the system has {states} states and \
                  {controls} controls"
-            )
-        })?;
+                )
+            },
+        )?;
         expected.extend(observe.iter().map(|graph| ("observe", graph, [inputs, seen])));
         expected.extend(act.iter().map(|graph| ("act", graph, [inputs + said, controls])));
     }
