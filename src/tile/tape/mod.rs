@@ -80,7 +80,9 @@ impl Tape {
     }
 
     #[cfg(test)]
-    pub(crate) fn len(&self) -> usize { self.steps.len() }
+    pub(crate) fn len(&self) -> usize {
+        self.steps.len()
+    }
 
     /// How many rows of its own it needs.
     pub(crate) fn own_rows(&self) -> usize {

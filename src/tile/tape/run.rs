@@ -172,13 +172,7 @@ fn binary<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Binary, places: [Place; 2])
 }
 
 #[inline(always)]
-fn pair<V: Vector>(
-    rows: Rows<'_>,
-    to: Row<'_>,
-    first: Binary,
-    then: Then,
-    [a, b, c]: [Place; 3],
-) {
+fn pair<V: Vector>(rows: Rows<'_>, to: Row<'_>, first: Binary, then: Then, [a, b, c]: [Place; 3]) {
     operands!(rows, [a, b], [a, b] => operand!(rows, c, c => {
         thens::<V, _, _, _>(to, first, then, a, b, c);
     }));
