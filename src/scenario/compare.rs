@@ -22,6 +22,9 @@ const FREE: [&str; 6] = [
 /// Fields that are measured on the device, or that put its numbers into words.
 const OF_THE_DEVICE: [&str; 5] =
     ["statements", "global.f32_error", "global.band", "global.f64_reruns", "growth.rounds"];
+/// Fields that each version of the record has its own way of.
+const OF_THE_VERSION: [&str; 3] =
+    ["schema", "provenance.physics_sha256", "provenance.policy_sha256"];
 /// Counts of rollouts, in which a measure may have crossed zero.
 const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
 
@@ -30,14 +33,21 @@ const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
 /// On the device that made it the record must be the same to the last digit; on another one
 /// numbers may differ by rounding.
 pub(super) fn fields(stored: &Record, again: &Record) -> Finding {
-    let same_device = stored.provenance.backend == again.provenance.backend
+    let same_version = stored.schema == again.schema;
+    let same_device = same_version
+        && stored.provenance.backend == again.provenance.backend
         && stored.provenance.device == again.provenance.device
         && stored.provenance.version == again.provenance.version
         && stored.events == again.events;
     let (Ok(was), Ok(is)) = (serde_json::to_value(stored), serde_json::to_value(again)) else {
         return finding(vec!["the record has no JSON form".to_owned()]);
     };
-    let mut walk = Walk { same_device, draws: again.global.draws as f64, differences: Vec::new() };
+    let mut walk = Walk {
+        same_version,
+        same_device,
+        draws: again.global.draws as f64,
+        differences: Vec::new(),
+    };
     walk.compare("", &was, &is);
     finding(walk.differences)
 }
@@ -58,6 +68,7 @@ fn finding(differences: Vec<String>) -> Finding {
 
 /// A walk through two JSON values side by side.
 struct Walk {
+    same_version: bool,
     same_device: bool,
     draws: f64,
     differences: Vec<String>,
@@ -70,7 +81,10 @@ impl Walk {
                 path.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
             })
         };
-        if under(&FREE) || (!self.same_device && under(&OF_THE_DEVICE)) {
+        if under(&FREE)
+            || (!self.same_device && under(&OF_THE_DEVICE))
+            || (!self.same_version && under(&OF_THE_VERSION))
+        {
             return;
         }
         match (was, is) {

@@ -10,7 +10,10 @@ use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
+/// The oldest version that is read. Its physics were hashed with parameters as literals, which no
+/// text of today gives again.
+pub const OLDEST_SCHEMA: u32 = 1;
 
 /// The shortest decimal that is this f32, so that a record says 0.4 and not 0.4000000059604645; as an
 /// f32 it is `value` again.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::record::{Record, SCHEMA};
+use super::record::{OLDEST_SCHEMA, Record, SCHEMA};
 use crate::digest::sha256;
 use crate::error::{Error, Result};
 
@@ -41,8 +41,10 @@ impl Record {
         let document: Value =
             serde_json::from_str(text).map_err(|e| refused("not a certificate", &e))?;
         let schema = document.get("schema").unwrap_or(&Value::Null);
-        if *schema != SCHEMA {
-            let problem = format!("schema is {schema}, this program reads {SCHEMA}");
+        let known = u64::from(OLDEST_SCHEMA)..=u64::from(SCHEMA);
+        if !schema.as_u64().is_some_and(|schema| known.contains(&schema)) {
+            let problem =
+                format!("schema is {schema}, this program reads {OLDEST_SCHEMA} to {SCHEMA}");
             return Err(Error::Refused(problem));
         }
         let sealed = document.get(DIGESTS).unwrap_or(&Value::Null);

@@ -57,6 +57,21 @@ fn verified_ball(growth: &GrowthRecord) -> Option<Ball> {
     })
 }
 
+/// Whether the record is of the version that this program writes, and not of an older one.
+fn is_current(record: &Record) -> bool {
+    record.schema == SCHEMA
+}
+
+/// That the physics of an older record cannot be compared; nothing of a current one.
+fn not_compared(record: &Record) -> Option<Finding> {
+    (!is_current(record)).then(|| Finding {
+        name: "hash of the physics".to_owned(),
+        stored: Figure::Words(format!("of schema {}", record.schema)),
+        found: Figure::Words("not compared: system, settings and numbers are".to_owned()),
+        holds: true,
+    })
+}
+
 /// Refuses a record that is not of this plant.
 fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
     let refuse = |field: &str, stored: &str, found: &str| {
@@ -66,7 +81,7 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
     };
     let (physics, policy) = hashes(plant);
     let stored = &record.provenance;
-    if record.schema != SCHEMA {
+    if record.schema > SCHEMA {
         return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());
     }
     if record.system.name != plant.model.name {
@@ -76,10 +91,12 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
         let found = record.system.states.len().to_string();
         return refuse("system.states length", &found, &plant.model.states.len().to_string());
     }
-    if stored.physics_sha256 != physics {
+    if is_current(record) && stored.physics_sha256 != physics {
         return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
     }
-    if stored.policy_sha256 != policy {
+    // The digest of a formula is that of the physics.
+    let comparable = is_current(record) || plant.controller.network().is_some();
+    if comparable && stored.policy_sha256 != policy {
         return refuse("provenance.policy_sha256", &stored.policy_sha256, &policy);
     }
     if record.deviation.bound.len() != record.horizon as usize + 1 {
@@ -154,6 +171,7 @@ pub fn check(
     let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
     findings.push(compare::fields(record, &again));
+    findings.extend(not_compared(record));
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
     let purposes = [Purpose::Check, Purpose::CheckPerturbation];
     let fresh = global::conditional(context, settings, &tightening, purposes)?;
