@@ -33,8 +33,7 @@ pub(super) fn reach_avoid(
         Query::Sign => (Work::Sign, 1),
     };
     let (starts, spec, tightening) = (&task.starts, &task.spec, task.tightening);
-    let mut job =
-        Job::new(adapter, subject, Request { work, starts, spec, tightening, count })?;
+    let mut job = Job::new(adapter, subject, Request { work, starts, spec, tightening, count })?;
     let stride = job.plan.stride;
     let params = Params { stride, sign_only, ..Params::of_starts(starts, spec) };
     let mut first = task.range.start;

@@ -64,7 +64,8 @@ impl Workspace {
         let buffers = Buffers::new(flight, (compiled, network), shape);
         let sets = if shape.work == Work::Sign { 2 } else { 1 };
         let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers };
-        let kernels = (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
+        let kernels =
+            (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(plan.stride);
         let farthest = 8 * (u64::from(shape.horizon) + 1);
         let readback = Readback::new(device, pool, MEASURES_AT + results + farthest);
@@ -97,12 +98,12 @@ impl Buffers {
         let row = shape.plan.row;
         let layered = network.filter(|_| compiled.text.fused().is_none());
         let seen = layered.filter(|_| compiled.text.observes()).map(|mlp| mlp.widths()[0]);
-        Self {
-            bytes: sizes.iter().map(|(_, bytes)| bytes).sum(),
-            slots: sizes.into_iter().map(|(slot, bytes)| (slot, storage(bytes))).collect(),
-            layers: layered.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, row)),
-            seen: seen.map(|seen| storage(16 * seen.div_ceil(4) as u64 * u64::from(row))),
-        }
+        let slots: Vec<_> = sizes.into_iter().map(|(slot, bytes)| (slot, storage(bytes))).collect();
+        let layers = layered.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, row));
+        let seen = seen.map(|seen| storage(16 * seen.div_ceil(4) as u64 * u64::from(row)));
+        let all = slots.iter().map(|(_, buffer)| buffer).chain(&seen);
+        let bytes = all.map(Buffer::size).sum::<u64>();
+        Self { bytes: bytes + layers.as_ref().map_or(0, Layers::size), slots, layers, seen }
     }
 
     /// The buffer of `slot`.
