@@ -1,6 +1,6 @@
 //! Recorded functions under the names and with the arguments that the kernels call them by.
 
-use super::Slot;
+use super::kernels::Slot;
 use super::layers::Fused;
 use crate::backend::physics::{Function, Part, Role};
 use crate::policy::{Activation, Mlp, OutputActivation};

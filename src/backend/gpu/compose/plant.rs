@@ -2,9 +2,9 @@
 
 use super::glue::{FINITE, PARAMS, RNG, component, constants, finite_glue, state_glue};
 use super::glue::{listed_glue, recorded_pair};
+use super::kernels::{Access, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
 use super::physics_glue::{Driver, Outline, physics_glue};
-use super::{Access, Kernel, Slot};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
 use crate::formula::wgsl::{Product, function, function_with};
