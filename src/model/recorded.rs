@@ -45,6 +45,7 @@ impl Model {
             target: record(&|x, _| vec![system.target(x)]),
             constraint: record(&|x, _| vec![system.constraint(x)]),
             bodies: system.bodies(),
+            smallest_feature: system.smallest_feature(),
             native: None,
         }
     }

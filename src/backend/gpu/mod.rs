@@ -53,6 +53,7 @@ use recover::{State, Typed};
 use source::{Source, Sources};
 use traffic::Count;
 
+pub(crate) use cache::folder as cache_folder;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
