@@ -7,15 +7,15 @@ use serde::Serialize;
 use super::args::ImportArguments;
 use super::options::{Global, Keys};
 use super::{Outcome, folder_of, report};
-use crate::config::{Config, Job, PolicySource};
+use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
 use crate::files::{Inputs, Staged};
+use crate::policy::Mlp;
 use crate::policy::import::{self, Cast, Origin, Request};
 use crate::policy::inspect::{Inspection, output_intervals, output_ranges};
-use crate::policy::{Mlp, Policy};
 use crate::real::bound::Interval;
-use crate::rollout::{Plant, Purpose, Stream};
-use crate::system::System;
+use crate::rollout::{Purpose, Stream};
+use crate::system::Axis;
 
 /// Ending of policy files.
 const ENDING: &str = "safetensors";
@@ -34,35 +34,16 @@ struct Frame {
     high: Vec<f32>,
 }
 
-/// The frame of a configuration, as a job for its plant.
-struct Look<'a>(&'a Config);
-
-impl Job for Look<'_> {
-    type Output = Frame;
-
-    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Frame>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let states = plant.system.states();
-        let settings = self.0.settings(&states)?;
-        Ok(Frame {
-            states: states.map(|axis| axis.name).to_vec(),
-            controls: plant.system.controls().map(|axis| axis.name).to_vec(),
-            low: settings.low.to_vec(),
-            high: settings.high.to_vec(),
-        })
-    }
-}
-
 /// The frame of the configuration at `path`, which the network of `file` has to fit.
 fn frame(global: &Global, path: &Path, file: &Path, network: &Mlp) -> Result<(Config, Frame)> {
     let config = Config::load(path, &global.overrides())?;
     let (path, network) = (file.to_owned(), network.clone());
     let source = PolicySource::Network { path, bytes: Vec::new(), network };
-    let frame = config.with_plant(&source, Look(&config))?;
-    Ok((config, frame))
+    let model = config.plant(&source)?.model;
+    let settings = config.settings(&model.states)?;
+    let names = |axes: &[Axis]| axes.iter().map(|axis| axis.name.clone()).collect();
+    let (states, controls) = (names(&model.states), names(&model.controls));
+    Ok((config, Frame { states, controls, low: settings.low, high: settings.high }))
 }
 
 /// What `policy import --json` prints.

@@ -4,7 +4,7 @@ use toml::Table;
 
 use super::counts;
 use super::section::{Config, Profile};
-use super::{defaults, keys};
+use super::{defaults, keys, model};
 use crate::error::{Error, Result};
 
 /// A document with the name that errors have for it.
@@ -14,6 +14,8 @@ pub(super) type Layer = (String, Table);
 pub(super) struct Layers {
     /// The file.
     pub(super) file: Layer,
+    /// Its text, where there is one.
+    pub(super) text: Option<String>,
     /// What is set over it, in order.
     pub(super) sets: Vec<Layer>,
     /// Profile instead of the file's.
@@ -51,9 +53,12 @@ impl Layers {
     fn merged(&self, taken: impl Fn(usize) -> bool, origin: &str) -> Result<Config> {
         let mut given = self.given(&taken);
         self.name_profile(&mut given);
-        let mut merged = defaults(&given, origin)?;
-        let valid = keys::with_optional(&merged);
+        let mut merged = defaults(&given, origin, self.text.as_deref())?;
+        let mut valid = keys::with_optional(&merged);
         keys::check_known(&valid, &self.file.1, &self.file.0)?;
+        if model::is_described(&self.file.1) {
+            valid.extend(model::settable(&self.file.1));
+        }
         for (_, (name, set)) in self.sets.iter().enumerate().filter(|(number, _)| taken(*number)) {
             keys::check_known(&valid, set, name)?;
         }
@@ -80,7 +85,7 @@ impl Layers {
     fn plain(&self) -> Result<Config> {
         let mut given = self.given(&|_| true);
         self.name_profile(&mut given);
-        let plain = defaults(&given, &self.file.0)?;
+        let plain = defaults(&given, &self.file.0, self.text.as_deref())?;
         plain.try_into().map_err(|e| Error::invalid("defaults", format!("{e}")))
     }
 

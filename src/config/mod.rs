@@ -3,6 +3,7 @@
 mod counts;
 mod keys;
 mod layers;
+mod model;
 mod plant;
 mod profile;
 mod race;
@@ -15,9 +16,9 @@ mod value;
 
 pub use plant::{Job, PolicySource, SystemJob};
 pub use section::{
-    BoxSection, Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection,
-    PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection, StateSection,
-    SystemSection,
+    BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
+    GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,
+    StateSection, SystemSection,
 };
 pub use value::{Constant, Coordinates, Named};
 
@@ -27,6 +28,7 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use crate::error::{Error, Result};
+use crate::model::text::Origin;
 use layers::Layers;
 
 /// What the command line lays over a configuration file.
@@ -50,7 +52,7 @@ impl Config {
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
-        Self::from_table(table, &path.display().to_string(), overrides)
+        Self::from_layers(table, Some(text), &path.display().to_string(), overrides)
     }
 
     /// The configuration of the TOML document `table`, which errors call `origin`.
@@ -58,11 +60,22 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`], as for [`Config::load`].
     pub fn from_table(table: Table, origin: &str, overrides: &Overrides) -> Result<Self> {
+        Self::from_layers(table, None, origin, overrides)
+    }
+
+    /// The configuration of the document `table`, whose text makes errors name lines.
+    fn from_layers(
+        table: Table,
+        text: Option<String>,
+        origin: &str,
+        overrides: &Overrides,
+    ) -> Result<Self> {
         let sets = overrides.set.iter().map(|text| {
             keys::parse_assignment(text).map(|assignment| (format!("--set {text}"), assignment))
         });
         let sets = sets.collect::<Result<Vec<_>>>()?;
-        let layers = Layers { file: (origin.to_owned(), table), sets, profile: overrides.profile };
+        let file = (origin.to_owned(), table);
+        let layers = Layers { file, text, sets, profile: overrides.profile };
         let mut config = layers.config()?;
         config.seed = overrides.seed.unwrap_or(config.seed);
         // What is about to be trained is not there yet.
@@ -103,7 +116,9 @@ impl Config {
 /// The refusal of what is no configuration of a system that this program knows.
 fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
     let system = value.pointer("/system/name").and_then(serde_json::Value::as_str);
-    if system.is_some_and(|name| profile::SYSTEMS.contains(&name)) {
+    if value.get("model").is_some_and(serde_json::Value::is_object)
+        || system.is_some_and(|name| profile::SYSTEMS.contains(&name))
+    {
         return None;
     }
     let plant = match (system, value) {
@@ -127,7 +142,7 @@ fn stored(config: &Config) -> Result<serde_json::Value> {
 }
 
 /// The defaults of the profile and the system that the table `given` names.
-fn defaults(given: &Table, origin: &str) -> Result<Table> {
+fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
     let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
     let profile = match given.get("profile").cloned() {
         Some(name) => {
@@ -135,7 +150,13 @@ fn defaults(given: &Table, origin: &str) -> Result<Table> {
         }
         None => Profile::default(),
     };
-    let expected = format!("expected \"{}\"", profile::SYSTEMS.join("\" or \""));
+    if model::is_described(given) {
+        let place = Origin::new(origin, Path::new(""));
+        let place = text.map_or(place.clone(), |text| place.with_text(text));
+        return model::defaults(profile, given, place);
+    }
+    let systems = profile::SYSTEMS.join("\" or \"");
+    let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
     let name = given.get("system").and_then(|system| system.get("name"));
     let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
     let config = known.ok_or_else(|| {

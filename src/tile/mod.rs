@@ -2,11 +2,17 @@
 
 mod compiled;
 mod frame;
+mod interpreted;
 mod native;
+mod tape;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use compiled::{CompiledPolicy, CompiledSystem};
 pub(crate) use frame::{Clock, Frame, Layout};
+pub(crate) use interpreted::{Held, Inputs, InterpretedFormula, InterpretedSystem};
 pub(crate) use native::{NativeFormula, NativeSystem};
+pub(crate) use tape::{Source, Tape};
 
 /// Smallest number of trajectories of a tile; widths are multiples of it.
 pub(crate) const GRANULE: usize = 16;

@@ -25,12 +25,22 @@ impl Description {
                 let law = Law::Formula(self.recorded("policy.formula", formulas)?);
                 Ok(Controller::new("formula", law))
             }
-            Policy::Network(policy) => self.network(policy),
+            Policy::Network(policy) => self.network(policy, Mlp::load(&policy.file)?),
         }
     }
 
-    fn network(&self, policy: &NetworkPolicy) -> Result<Controller> {
-        let network = Mlp::load(&policy.file)?;
+    /// The policy around a `network` that was read before.
+    ///
+    /// # Errors
+    /// Those of [`Description::controller`]; [`Error::Invalid`] for a policy that is no network.
+    pub fn controller_of(&self, network: Mlp) -> Result<Controller> {
+        match &self.policy {
+            Some(Policy::Network(policy)) => self.network(policy, network),
+            _ => Err(self.origin.refuse("policy", "no network; expected `file`")),
+        }
+    }
+
+    fn network(&self, policy: &NetworkPolicy, network: Mlp) -> Result<Controller> {
         self.check_inputs(policy, &network)?;
         self.check_outputs(policy, &network)?;
         let observe = policy.observe.as_deref();

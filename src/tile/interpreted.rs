@@ -1,0 +1,140 @@
+//! Plants and policies that are known at run time only: their formulas as tapes.
+
+use super::{Clock, Frame, Layout, NativeFormula, NativeSystem, Source, Tape};
+use crate::formula::Graph;
+use crate::model::Model;
+use crate::real::simd::Instructions;
+
+/// Where the inputs of a model's formulas are in a frame: its states and controls in their rows,
+/// the parameters as numbers, the time as a multiple of the row of steps.
+#[derive(Clone, Debug)]
+pub(crate) struct Inputs {
+    layout: Layout,
+    sources: Vec<Source>,
+}
+
+/// What controls are for a formula that does not have any yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Held {
+    /// Those in the rows.
+    Rows,
+    /// Zeros: margins and policies are of states alone.
+    Zeros,
+}
+
+impl Inputs {
+    /// For `model` with the values `parameters` of its parameters.
+    pub(crate) fn new(model: &Model, parameters: &[f32], controls: Held) -> Self {
+        let (states, count) = (model.states.len(), model.controls.len());
+        let layout = Layout { states, controls: count, own: 0 };
+        let controls = (states..states + count).map(|row| match controls {
+            Held::Rows => Source::Row(row),
+            Held::Zeros => Source::Number(0.0),
+        });
+        let step = layout.step();
+        let time = match model.period {
+            Some(period) => Source::Multiple { row: step, of: period },
+            None => Source::Number(0.0),
+        };
+        let sources = (0..states)
+            .map(Source::Row)
+            .chain(controls)
+            .chain(parameters.iter().copied().map(Source::Number))
+            .chain([time, Source::Row(step)])
+            .collect();
+        Self { layout, sources }
+    }
+
+    /// The same followed by the rows `rows`: what a network says.
+    pub(crate) fn followed_by(mut self, rows: std::ops::Range<usize>) -> Self {
+        self.sources.extend(rows.map(Source::Row));
+        self
+    }
+}
+
+/// A model's formulas as tapes.
+#[derive(Debug)]
+pub(crate) struct InterpretedSystem {
+    step: Tape,
+    margins: Tape,
+    layout: Layout,
+}
+
+impl InterpretedSystem {
+    /// The formulas of `model` with the values `parameters` of its parameters.
+    pub(crate) fn new(model: &Model, parameters: &[f32]) -> Self {
+        let held = Inputs::new(model, parameters, Held::Rows);
+        let free = Inputs::new(model, parameters, Held::Zeros);
+        let layout = held.layout;
+        let next: Vec<usize> = (0..layout.states).collect();
+        let margins = [&model.target, &model.constraint];
+        Self {
+            step: Tape::new(&[&model.step], &held.sources, &next, layout.first_own()),
+            margins: Tape::new(&margins, &free.sources, &layout.margins(), layout.first_own()),
+            layout,
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn sizes(&self) -> [usize; 2] {
+        [self.step.len(), self.margins.len()]
+    }
+
+    /// How many rows of their own the formulas need, from the first one on.
+    pub(crate) fn own_rows(&self) -> usize {
+        self.step.own_rows().max(self.margins.own_rows())
+    }
+
+    /// Whether they read the row of steps.
+    pub(crate) fn clock(&self) -> Clock {
+        clock(&[&self.step, &self.margins], self.layout)
+    }
+}
+
+impl NativeSystem for InterpretedSystem {
+    fn step(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
+        self.step.evaluate(with, frame, lanes);
+    }
+
+    fn margins(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
+        self.margins.evaluate(with, frame, lanes);
+    }
+}
+
+/// A formula of a model's inputs as a tape.
+#[derive(Debug)]
+pub(crate) struct InterpretedFormula {
+    tape: Tape,
+    layout: Layout,
+}
+
+impl InterpretedFormula {
+    /// `graph` of `inputs`, its outputs in the rows from `to` on; what lies between is in rows from
+    /// `first_own` on.
+    pub(crate) fn new(graph: &Graph, inputs: &Inputs, to: usize, first_own: usize) -> Self {
+        let outputs: Vec<usize> = (to..to + graph.outputs.len()).collect();
+        let tape = Tape::new(&[graph], &inputs.sources, &outputs, first_own);
+        Self { tape, layout: inputs.layout }
+    }
+
+    /// How many rows of its own it needs, from the first one on.
+    pub(crate) fn own_rows(&self) -> usize {
+        self.tape.own_rows()
+    }
+
+    /// Whether it reads the row of steps.
+    pub(crate) fn clock(&self) -> Clock {
+        clock(&[&self.tape], self.layout)
+    }
+}
+
+impl NativeFormula for InterpretedFormula {
+    fn evaluate(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
+        self.tape.evaluate(with, frame, lanes);
+    }
+}
+
+/// Whether one of `tapes` reads the row of steps.
+fn clock(tapes: &[&Tape], layout: Layout) -> Clock {
+    if tapes.iter().any(|tape| tape.reads(layout.step())) { Clock::Read } else { Clock::Ignored }
+}

@@ -1,0 +1,211 @@
+//! A tape run over the rows of a tile: one loop per operation.
+
+use std::cell::Cell;
+
+use super::operation::{Binary, Kind, Then, Unary};
+use super::{Place, Step};
+use crate::real::Vector;
+use crate::real::simd::Formulas;
+use crate::tile::{Frame, GRANULE};
+
+/// The numbers of a row that a loop takes at a time: whole vectors of every instruction set, and
+/// a bound checked once.
+type Block = [f32; GRANULE];
+
+/// The operations of a tape over the first `lanes` trajectories of a frame.
+pub(super) struct Run<'a> {
+    /// The operations.
+    pub(super) steps: &'a [Step],
+    /// The rows.
+    pub(super) frame: &'a mut Frame,
+    /// How many trajectories.
+    pub(super) lanes: usize,
+}
+
+impl Formulas for Run<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let (stride, length) = (self.frame.width() / GRANULE, self.lanes.div_ceil(GRANULE));
+        let (blocks, _) = self.frame.rows_mut().as_chunks_mut::<GRANULE>();
+        // Cells: an operation may write the row that it reads.
+        let rows = Rows { blocks: Cell::from_mut(blocks).as_slice_of_cells(), stride, length };
+        for step in self.steps {
+            let [a, b, c, d] = step.operation.places();
+            let to = rows.row(step.to);
+            match step.operation.kind {
+                Kind::Copy => copy::<V>(rows, to, a),
+                Kind::Unary(f) => unary::<V>(rows, to, f, a),
+                Kind::Binary(f) => binary::<V>(rows, to, f, [a, b]),
+                Kind::Pair(first, then) => pair::<V>(rows, to, first, then, [a, b, c]),
+                Kind::Select => select::<V>(rows, to, [a, b, c, d]),
+            }
+        }
+    }
+}
+
+/// All rows of a frame.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    blocks: &'a [Cell<Block>],
+    /// Blocks of a row.
+    stride: usize,
+    /// Blocks of a row that are computed.
+    length: usize,
+}
+
+impl<'a> Rows<'a> {
+    #[inline(always)]
+    fn row(self, row: usize) -> Row<'a> {
+        Row(&self.blocks[row * self.stride..][..self.length])
+    }
+}
+
+/// An operand inside a loop.
+trait Operand<V>: Copy {
+    /// Its vector at number `at` of a block.
+    fn vector(self, block: usize, at: usize) -> V;
+}
+
+/// The blocks of a row.
+#[derive(Clone, Copy)]
+struct Row<'a>(&'a [Cell<Block>]);
+
+impl<V: Vector> Operand<V> for Row<'_> {
+    #[inline(always)]
+    fn vector(self, block: usize, at: usize) -> V {
+        V::load(&self.0[block].get()[at..])
+    }
+}
+
+/// The same number everywhere.
+#[derive(Clone, Copy)]
+struct Splat<V>(V);
+
+impl<V: Vector> Operand<V> for Splat<V> {
+    #[inline(always)]
+    fn vector(self, _block: usize, _at: usize) -> V {
+        self.0
+    }
+}
+
+/// Writes `f` of each place to a row.
+#[inline(always)]
+fn each<V: Vector>(Row(to): Row<'_>, f: impl Fn(usize, usize) -> V) {
+    for (block, to) in to.iter().enumerate() {
+        let mut numbers = [0.0; GRANULE];
+        for at in (0..GRANULE).step_by(V::WIDTH) {
+            f(block, at).store(&mut numbers[at..]);
+        }
+        to.set(numbers);
+    }
+}
+
+/// `$body` with `$name` as the operand at `$place`: compiled for rows and for numbers.
+macro_rules! operand {
+    ($rows:ident, $place:expr, $name:ident => $body:expr) => {
+        match $place {
+            Place::Row(row) => {
+                let $name = $rows.row(row);
+                $body
+            }
+            Place::Number(number) => {
+                let $name = Splat(V::lit(number));
+                $body
+            }
+        }
+    };
+}
+
+/// `$body` with the two operands at `$places`, at least one of which is a row.
+macro_rules! operands {
+    ($rows:ident, $places:expr, [$a:ident, $b:ident] => $body:expr) => {
+        match $places {
+            [Place::Row(a), Place::Row(b)] => {
+                let ($a, $b) = ($rows.row(a), $rows.row(b));
+                $body
+            }
+            [Place::Row(a), Place::Number(b)] => {
+                let ($a, $b) = ($rows.row(a), Splat(V::lit(b)));
+                $body
+            }
+            [Place::Number(a), Place::Row(b)] => {
+                let ($a, $b) = (Splat(V::lit(a)), $rows.row(b));
+                $body
+            }
+            [Place::Number(_), Place::Number(_)] => unreachable!("numbers are folded"),
+        }
+    };
+}
+
+/// A loop for each of the functions listed: which one it is, is asked outside of it.
+macro_rules! one_of {
+    ($f:expr, $kind:ident: $($name:ident)*, $known:ident => $body:expr $(, $other:ident)?) => {
+        match $f {
+            $($kind::$name => {
+                let $known = $kind::$name;
+                $body
+            })*
+            $($kind::$other => unreachable!("no loops of its own"),)?
+        }
+    };
+}
+
+#[inline(always)]
+fn copy<V: Vector>(rows: Rows<'_>, to: Row<'_>, a: Place) {
+    operand!(rows, a, a => each(to, |block, at| -> V { a.vector(block, at) }));
+}
+
+#[inline(always)]
+fn unary<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Unary, a: Place) {
+    let Place::Row(a) = a else { unreachable!("numbers are folded") };
+    let a = rows.row(a);
+    one_of!(f, Unary: Neg Abs Sqrt Floor, f => {
+        each(to, |block, at| -> V { f.of(a.vector(block, at)) });
+    });
+}
+
+#[inline(always)]
+fn binary<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Binary, places: [Place; 2]) {
+    operands!(rows, places, [a, b] => one_of!(f, Binary: Add Sub Mul Div Min Max, f => {
+        each(to, |block, at| -> V { f.of(a.vector(block, at), b.vector(block, at)) });
+    }));
+}
+
+#[inline(always)]
+fn pair<V: Vector>(rows: Rows<'_>, to: Row<'_>, first: Binary, then: Then, [a, b, c]: [Place; 3]) {
+    operands!(rows, [a, b], [a, b] => operand!(rows, c, c => {
+        thens::<V, _, _, _>(to, first, then, a, b, c);
+    }));
+}
+
+/// The loops of pairs of operands of given kinds.
+#[inline(always)]
+fn thens<V: Vector, A: Operand<V>, B: Operand<V>, C: Operand<V>>(
+    to: Row<'_>,
+    first: Binary,
+    then: Then,
+    a: A,
+    b: B,
+    c: C,
+) {
+    one_of!(first, Binary: Add Sub Mul Min Max, first => {
+        one_of!(then, Then: Add Sub From Mul Min MinOf Max MaxOf, then => {
+            each(to, |block, at| -> V {
+                let value = first.of(a.vector(block, at), b.vector(block, at));
+                then.of(value, c.vector(block, at))
+            });
+        });
+    }, Div);
+}
+
+#[inline(always)]
+fn select<V: Vector>(rows: Rows<'_>, to: Row<'_>, [a, b, yes, no]: [Place; 4]) {
+    operands!(rows, [a, b], [a, b] => {
+        operand!(rows, yes, yes => operand!(rows, no, no => {
+            each(to, |block, at| -> V {
+                let (yes, no) = (yes.vector(block, at), no.vector(block, at));
+                V::if_lt(a.vector(block, at), b.vector(block, at), yes, no)
+            });
+        }));
+    });
+}
