@@ -1,4 +1,4 @@
-// Parameters of one dispatch; twin: `Params` in backend/gpu/buffer.rs, scalars only, so that the
+// Parameters of one dispatch; twin: `Params` in backend/gpu/params.rs, scalars only, so that the
 // offsets are the same without padding rules.
 struct Params {
     key_low: u32,

@@ -6,6 +6,7 @@
 mod common;
 #[path = "oracle/drive.rs"]
 mod drive;
+mod models;
 #[path = "oracle/mppi.rs"]
 mod oracle;
 
@@ -15,13 +16,14 @@ use common::{adapter, race_policy};
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::real::Real;
 use reachcast::rollout::{
     Ball, CostQuery, DeviationTask, Disturbance, MppiProblem, MppiSettings, MppiSpec, MppiTask,
-    NoiseKind, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region, RolloutSpec,
-    Sigma, Starts, Stream, Tightening, ValueTerm, measure, pair_measures,
+    NON_FINITE, NoiseKind, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
+    RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, measure, pair_measures,
 };
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
 
 /// Starts of each comparison.
 const BATCH: u64 = 96;
@@ -82,7 +84,7 @@ fn measures_agree<S, P, const NX: usize, const NU: usize>(
 ) -> bool
 where
     S: System<NX, NU>,
-    P: reachcast::policy::Policy<NX, NU>,
+    P: Policy<NX, NU>,
 {
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let tightening = losses(&spec);
@@ -118,7 +120,7 @@ fn pairs_agree<S, P, const NX: usize, const NU: usize>(
 ) -> bool
 where
     S: System<NX, NU>,
-    P: reachcast::policy::Policy<NX, NU>,
+    P: Policy<NX, NU>,
 {
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let tightening = losses(&spec);
@@ -153,6 +155,118 @@ where
                     && device.pair == host.pair
             })
         })
+}
+
+/// Whether the adapter agrees with f64 on a plant whose formulas read parameters and time, driven by
+/// a network with an observation and an action, its starts listed, in feedback.
+fn drift_parity(gpu: Gpu) -> bool {
+    let driver = models::Driver::Wrapped;
+    let truth = models::Truth::new(driver, models::VALUES);
+    let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
+    let region = Region::new_box([-1.5, -1.5, -2.0], [1.5, 1.5, 2.0]).expect("box");
+    let drawn = Starts::Drawn { region, stream: Stream::new(3, Purpose::User, 8) };
+    let list: Vec<f32> = (0..BATCH).flat_map(|index| drawn.start(index)).collect();
+    let task = DeviationTask {
+        pairs: Pairs {
+            nominal: Starts::Listed(States::new(&list, 3)),
+            radius: 0.2,
+            stream: Stream::new(3, Purpose::User, 9),
+        },
+        range: 0..BATCH,
+        spec,
+        tightening: &losses(&spec),
+        control: PairControl::ClosedLoop,
+    };
+    let backend = Backend::Gpu(gpu);
+    let plant = driver.plant(models::VALUES);
+    let Ok(program) = backend.prepare(&plant) else { return false };
+    let mut agree = true;
+    let ran = program.deviation(&task, &mut |first, values| {
+        for (index, value) in (first..).zip(values) {
+            let [nominal, perturbed] = task.pairs.pair(index);
+            let starts = [&nominal[..], &perturbed];
+            let [nominal, perturbed] = truth.pair(starts, &spec, task.tightening, task.control);
+            agree &= (f64::from(value.nominal) - nominal).abs() <= BAND
+                && (f64::from(value.perturbed) - perturbed).abs() <= BAND;
+        }
+        Ok(())
+    });
+    ran.is_ok() && agree
+}
+
+/// The same, the network run by the rollouts.
+fn fused_drift_parity(gpu: Gpu) -> bool {
+    drift_parity(gpu.with_networks(NetworkKernels::Fused))
+}
+
+/// A system whose margins become infinite, or no number, where the second state says so.
+struct Walls;
+
+impl System<2, 1> for Walls {
+    fn name(&self) -> &str {
+        "walls"
+    }
+    fn states(&self) -> [Axis; 2] {
+        ["n", "kind"].map(|name| Axis::new(name, "", -1.0, 1.0))
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("u", "", -1.0, 1.0)]
+    }
+    fn step<R: Real>(&self, [n, kind]: [R; 2], _: [R; 1]) -> [R; 2] {
+        [n + R::lit(1.0), kind]
+    }
+    fn target<R: Real>(&self, [n, kind]: [R; 2]) -> R {
+        // Kind 1: infinite from the fourth state on, kind 4: no number then.
+        let late = kind.if_lt(R::lit(4.0), infinite(n), infinite(n) - infinite(n));
+        let late = R::lit(3.0).if_lt(n, late, n - R::lit(10.0));
+        let concerned = (kind - R::lit(2.5)).abs();
+        R::lit(1.0).if_lt(concerned, late, n - R::lit(10.0))
+    }
+    fn constraint<R: Real>(&self, [n, kind]: [R; 2]) -> R {
+        // Kind 2: minus infinity from the fourth state on, kind 3: no number then.
+        let late = kind.if_lt(R::lit(3.0), -infinite(n), infinite(n) - infinite(n));
+        let late = R::lit(3.0).if_lt(n, late, R::lit(2.0));
+        let concerned = (kind - R::lit(2.5)).abs();
+        concerned.if_lt(R::lit(1.0), late, R::lit(2.0))
+    }
+}
+
+/// Infinite, in a way that no compiler sees.
+fn infinite<R: Real>(n: R) -> R {
+    let large = R::lit(1.0e30) + R::lit(0.0) * n;
+    large * large
+}
+
+/// Whether the adapter says of infinite margins what they mean.
+fn walls_parity(gpu: Gpu) -> bool {
+    let plant = Plant { system: &Walls, policy: &Still };
+    let starts = [[0.0, 1.0], [0.0, 2.0], [0.0, 3.0], [0.0, 4.0]];
+    let spec = RolloutSpec::new(6, 1.0).expect("spec");
+    let task = ReachAvoidTask {
+        starts: Starts::listed(&starts),
+        range: 0..4,
+        spec,
+        tightening: &Tightening::none(&spec),
+        query: Query::Measure,
+    };
+    let mut all = Vec::new();
+    let ran = Backend::Gpu(gpu).reach_avoid(plant, &task, &mut |_, values| {
+        all.extend_from_slice(values);
+        Ok(())
+    });
+    ran.is_ok() && all == [2.0, -7.0, NON_FINITE, NON_FINITE]
+}
+
+/// The control is 0.
+struct Still;
+
+impl Policy<2, 1> for Still {
+    fn name(&self) -> String {
+        "still".to_owned()
+    }
+    fn control<R: Real>(&self, _: [R; 2]) -> [R; 1] {
+        [R::lit(0.0)]
+    }
 }
 
 /// A problem of the double integrator that differs from the others and from step to step.
@@ -253,6 +367,11 @@ fn kernels_as_they_are_agree() {
     if let Some(gpu) = adapter() {
         assert!(fused_parity(gpu));
     }
+    for parity in [drift_parity, fused_drift_parity, walls_parity] {
+        if let Some(gpu) = adapter() {
+            assert!(parity(gpu));
+        }
+    }
     if let Some(gpu) = adapter() {
         assert!(mppi_parity(gpu));
     }
@@ -281,12 +400,12 @@ mutants! {
     target_not_discounted: "discount * target_margin" => "target_margin";
     target_without_constraint: "min(safe, discount * target_margin)" => "discount * target_margin";
     constraint_forgotten: "min(fold.safe, discount * constraint_margin)" => "discount * constraint_margin";
-    losses_swapped: "target_at(x) - row.y" => "target_at(x) - row.z";
-    loss_added: "constraint_at(x) - row.z" => "constraint_at(x) + row.z";
+    losses_swapped: "target_at(x, t) - row.y" => "target_at(x, t) - row.z";
+    loss_added: "constraint_at(x, t) - row.z" => "constraint_at(x, t) + row.z";
     early_exit_on_safety: "fold.best > 0.0 || fold.safe <= 0.0" => "fold.best > 0.0 || fold.safe > 0.0";
     survivors_mixed_up: "kept_origin[place] = origin[column];" => "kept_origin[place] = origin[place];";
     largest_is_smallest: "b.x > a.x ||" => "b.x < a.x ||";
-    perturbed_is_nominal: "perturbed = advance(perturbed, replayed);" => "perturbed = advance(nominal, replayed);";
+    perturbed_is_nominal: "perturbed = advance(perturbed, replayed, t);" => "perturbed = advance(nominal, replayed, t);";
     states_swapped: "let v1 = x[1];" => "let v1 = x[0];";
     branches_turned: " < v" => " > v";
 }
@@ -297,12 +416,39 @@ mutants! {
     one_layer_too_few: "i < LAYER_COUNT" => "i + 1u < LAYER_COUNT";
     last_layer_like_the_others: "if layer.last {" => "if !layer.last {";
     inputs_replaced_too_early: "    // All inputs are read before the first is replaced.\n    workgroupBarrier();\n" => "";
-    states_of_a_neighbour: "put_state(lane, x);" => "put_state((lane + 1u) % WORKGROUP, x);";
+    states_of_a_neighbour: "put_inputs(lane, observed(x, t));" => "put_inputs((lane + 1u) % WORKGROUP, observed(x, t));";
     neurons_of_another_tile: "2u * (lane / TILE_PITCH)" => "2u * (lane % TILE_PITCH)";
     one_tile_in_eight_left_out: "let column = lane % TILE_PITCH;" => "let column = lane % (TILE_PITCH - 1u);";
-    controls_of_a_neighbour: "control_at(lane % WORKGROUP)" => "control_at((lane + 1u) % WORKGROUP)";
+    controls_of_a_neighbour: "outputs_at(lane % WORKGROUP)" => "outputs_at((lane + 1u) % WORKGROUP)";
     biases_forgotten: "let upper_bias = weights[layer.offset + quad];" => "let upper_bias = vec4<f32>(0.0);";
-    perturbed_controls_are_nominal: "drive(lane, second, perturbed)" => "replayed";
+    perturbed_controls_are_nominal: "drive(lane, second, perturbed, t)" => "replayed";
+}
+
+mutants! {
+    drift_parity:
+    time_of_the_next_step: "return f32(t) * " => "return f32(t + 1u) * ";
+    step_of_the_next_state: ", f32(t));" => ", f32(t + 1u));";
+    parameters_swapped: "(values[0].x, values[0].y" => "(values[0].y, values[0].x";
+    fifth_parameter_is_the_first: "values[1].x" => "values[0].x";
+    network_sees_the_first_time: "observed(load_state(column), params.step)" => "observed(load_state(column), 0u)";
+    action_of_the_first_step: "return acted(x, Outputs(v0.x, v0.y, v0.z), t);" => "return acted(x, Outputs(v0.x, v0.y, v0.z), 0u);";
+    output_of_another_neuron: "Outputs(v0.x, v0.y, v0.z)" => "Outputs(v0.x, v0.z, v0.y)";
+    list_of_a_neighbour: "u * params.columns + column]" => "u * params.columns + (column ^ 1u)]";
+}
+
+mutants! {
+    fused_drift_parity:
+    fused_network_sees_the_first_time: "observed(x, t)" => "observed(x, 0u)";
+    fused_action_of_the_first_step: "acted(x, outputs_at(lane % WORKGROUP), t)" => "acted(x, outputs_at(lane % WORKGROUP), 0u)";
+}
+
+mutants! {
+    walls_parity:
+    infinite_margins_fail: "(bits & MAGNITUDE) == EXPONENT" => "false";
+    minus_infinity_fails: "(bits & MAGNITUDE) == EXPONENT" => "bits == EXPONENT";
+    largest_number_of_the_other_sign: "bits - 1u)" => "(bits - 1u) ^ 0x80000000u)";
+    a_target_that_is_no_number_counts: "finite(target_margin)" => "true";
+    a_constraint_that_is_no_number_counts: "finite(constraint_margin)" => "true";
 }
 
 mutants! {

@@ -1,23 +1,26 @@
 //! Without a GPU: every composed kernel is valid WGSL and agrees with the Rust side; the layers.
 
+mod models;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use bytemuck::Zeroable;
+use models::{DRIVERS, VALUES};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
 use reachcast::backend::gpu::Params;
 use reachcast::backend::gpu::compose::{
-    Access, Fused, Kernel, MppiText, Shape, Slot, compose, limit_kernel,
+    Access, Fused, Kernel, MppiText, PlantText, Slot, limit_kernel,
 };
-use reachcast::backend::physics;
 use reachcast::cost::{
     Cost, CostMap, Fence, GoalCost, Grid, Quadratic, RaceCost, RecoveryCost, Safety,
 };
+use reachcast::model::{Controller, Law, Model};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::rollout::{
-    CostQuery, Disturbance, MppiSettings, MppiSpec, MppiTask, NoiseKind, Plant, ValueTerm,
+    CostQuery, Disturbance, MppiSettings, MppiSpec, MppiTask, NoiseKind, ValueTerm,
 };
 use reachcast::system::{Axis, BangBang, Cone, DiffDrive, DoubleIntegrator, DroneRace, System};
 
@@ -74,39 +77,63 @@ fn network_of(states: usize, hidden: usize, controls: usize, activation: Activat
     Mlp::new(layers, activation, OutputActivation::Tanh).expect("a whole network")
 }
 
-/// Shape and physics under a formula, and under a network of each activation in layers and fused.
-fn plants<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-) -> Vec<(String, Shape, String)> {
-    let formula = physics::<_, _, NX, NU>(Plant { system, policy: &Clamped });
-    let mut all = vec![(format!("{} clamped", system.name()), Shape::new(NX, NU, None), formula)];
-    for activation in [Activation::Relu, Activation::Tanh, Activation::Silu] {
-        let mlp = network(NX, NU, activation);
-        let text = physics::<_, _, NX, NU>(Plant { system, policy: &mlp });
-        let name = format!("{} {activation:?}", system.name());
-        all.push((name.clone(), Shape::new(NX, NU, Some(&mlp)), text.clone()));
+/// The kernels of a plant, by name.
+type Named = (String, PlantText);
+
+/// A system under a formula, and under a network of each activation in layers and fused.
+fn plants<S, const NX: usize, const NU: usize>(system: S) -> Vec<Named>
+where
+    S: System<NX, NU> + Send + Sync + 'static,
+{
+    let name = system.name().to_owned();
+    let formula = Controller::of(&system, Clamped);
+    let activations = [Activation::Relu, Activation::Tanh, Activation::Silu];
+    let networks = activations.map(|activation| network(NX, NU, activation));
+    let driven = networks.map(|mlp| Controller::of(&system, mlp));
+    let model = Model::of(system);
+    let mut all = vec![(format!("{name} clamped"), text(&model, &formula))];
+    for (activation, controller) in activations.into_iter().zip(&driven) {
+        let (name, text) = (format!("{name} {activation:?}"), text(&model, controller));
+        all.push((name.clone(), text.clone()));
         for hidden in [5, 128] {
-            let fused = Some(Fused::new(&network_of(NX, hidden, NU, activation)));
-            let shape = Shape { fused, ..Shape::new(NX, NU, Some(&mlp)) };
-            all.push((format!("{name}, {hidden} neurons fused"), shape, text.clone()));
+            let fused = Fused::new(&network_of(NX, hidden, NU, activation));
+            let name = format!("{name}, {hidden} neurons fused");
+            all.push((name, text.clone().fusing(Some(fused))));
         }
     }
     all
 }
 
+fn text(model: &Model, controller: &Controller) -> PlantText {
+    PlantText::new(model, controller).expect("formulas that fit")
+}
+
+/// A model whose formulas read parameters and time, under each kind of driver.
+fn drifts() -> Vec<Named> {
+    let mut all = Vec::new();
+    for driver in DRIVERS {
+        let plant = driver.plant(VALUES);
+        let text = text(&plant.model, &plant.controller);
+        let fused = plant.controller.network().map(Fused::new);
+        all.push((format!("drift, {driver:?}"), text.clone()));
+        all.push((format!("drift, {driver:?} fused"), text.fusing(fused)));
+    }
+    all
+}
+
 /// Every plant that the kernels are composed for here.
-fn all_plants() -> Vec<(String, Shape, String)> {
-    let mut all = plants(&Scalar);
-    all.extend(plants(&DoubleIntegrator::default()));
-    all.extend(plants(&DiffDrive::default()));
+fn all_plants() -> Vec<Named> {
+    let mut all = plants(Scalar);
+    all.extend(plants(DoubleIntegrator::default()));
+    all.extend(plants(DiffDrive::default()));
     let integrator = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
-    let text = physics(Plant { system: &integrator, policy: &policy });
-    all.push(("bang-bang".to_owned(), Shape::new(2, 1, None), text));
+    let bang = Controller::of(&integrator, BangBang { acceleration: 1.0 });
+    all.push(("bang-bang".to_owned(), text(&Model::of(integrator), &bang)));
     for cone in [Cone::Distance, Cone::Squared, Cone::Root] {
         let speed_limit = cone == Cone::Distance;
-        all.extend(plants(&DroneRace { cone, speed_limit, ..DroneRace::default() }));
+        all.extend(plants(DroneRace { cone, speed_limit, ..DroneRace::default() }));
     }
+    all.extend(drifts());
     all
 }
 
@@ -194,12 +221,14 @@ fn mppi_texts() -> Vec<(String, MppiText)> {
 }
 
 fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInfo)) {
-    for (plant, shape, physics) in all_plants() {
-        for kernel in Kernel::ROLLOUT {
+    for (plant, text) in all_plants() {
+        // Only some networks see other things than the state.
+        let kernels = Kernel::ROLLOUT.into_iter();
+        for kernel in kernels.filter(|kernel| *kernel != Kernel::Observe || text.observes()) {
             let name = format!("{kernel:?} of {plant}");
-            let (module, info) = validated(&name, &compose(kernel, &shape, &physics));
-            let bindings = shape.bindings(kernel);
-            see(&name, (kernel, shape.lanes(kernel), &bindings), &module, &info);
+            let (module, info) = validated(&name, &text.compose(kernel));
+            let bindings = text.bindings(kernel);
+            see(&name, (kernel, text.lanes(kernel), &bindings), &module, &info);
         }
     }
     for (plant, text) in mppi_texts() {
@@ -248,6 +277,7 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
         Slot::Value => &["value"],
         Slot::Push => &["push"],
         Slot::Partials => &["partials"],
+        Slot::Values => &["values"],
     }
 }
 
@@ -273,7 +303,8 @@ fn bindings_are_those_that_rust_lists() {
                 "{name}: {variable_name} stands in the slot of {slot:?}"
             );
             let expected = match variable.space {
-                AddressSpace::Uniform => Access::Uniform,
+                AddressSpace::Uniform if *slot == Slot::Params => Access::Uniform,
+                AddressSpace::Uniform => Access::Constant,
                 AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
                     Access::ReadWrite
                 }
@@ -302,7 +333,8 @@ fn entry_points_and_workgroups() {
 #[test]
 fn storage_fits_the_least_that_adapters_offer() {
     each_kernel(|name, (_, _, bindings), _, _| {
-        let storage = bindings.iter().filter(|(_, access)| *access != Access::Uniform).count();
+        let uniform = [Access::Uniform, Access::Constant];
+        let storage = bindings.iter().filter(|(_, access)| !uniform.contains(access)).count();
         assert!(storage <= 8, "{name} binds {storage} storage buffers");
     });
 }
@@ -389,11 +421,60 @@ fn a_map_is_not_part_of_the_text() {
     }
 }
 
+/// What a parameter is worth is data: another value compiles no kernel anew.
+#[test]
+fn a_parameter_is_not_part_of_the_text() {
+    for driver in DRIVERS {
+        let text = |values| {
+            let plant = driver.plant(values);
+            text(&plant.model, &plant.controller)
+        };
+        assert_eq!(text(VALUES), text([1.5, -2.0, 0.0, 7.25, 1.0e9]), "{driver:?}");
+    }
+}
+
+/// A formula that reads neither time nor parameters is not given them.
+#[test]
+fn what_a_formula_does_not_read_it_does_not_pay_for() {
+    let plain = Model::of(Scalar);
+    let clamped = Controller::of(&Scalar, Clamped);
+    let plain = text(&plain, &clamped).compose(Kernel::ReachAvoid);
+    assert!(!plain.contains("seconds") && !plain.contains("f32(t)"), "{plain}");
+    assert!(!plain.contains("parameters()"), "{plain}");
+    let drift = models::Driver::Formula.plant(VALUES);
+    let drift = text(&drift.model, &drift.controller).compose(Kernel::ReachAvoid);
+    assert!(drift.contains("plant_target(x, parameters(), f32(t))"), "{drift}");
+    assert!(drift.contains("plant_constraint(x, parameters(), seconds_at(t))"), "{drift}");
+}
+
+/// Formulas that do not fit their place are refused with the figures.
+#[test]
+fn formulas_that_do_not_fit_are_refused() {
+    let plant = models::Driver::Wrapped.plant(VALUES);
+    let refused = |model: &Model, controller: &Controller| {
+        PlantText::new(model, controller).expect_err("it does not fit").to_string()
+    };
+    let mut short = (*plant.model).clone();
+    short.target = short.step.clone();
+    let text = refused(&short, &plant.controller);
+    assert!(text.contains("target") && text.contains("12 inputs to 3 outputs"), "{text}");
+    let mut blind = (*plant.model).clone();
+    blind.constraint = reachcast::formula::record(12, |inputs| vec![inputs[3]]);
+    let text = refused(&blind, &plant.controller);
+    assert!(text.contains("plant_constraint") && text.contains("control"), "{text}");
+    let Law::Network { network, act, .. } = plant.controller.law.clone() else {
+        panic!("it is driven by a network");
+    };
+    let narrow = Controller::new("narrow", Law::Network { observe: None, network, act });
+    let text = refused(&plant.model, &narrow);
+    assert!(text.contains("5 inputs") && text.contains("3 states"), "{text}");
+}
+
 #[test]
 fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
     use reachcast::backend::gpu::compose::{TILE_COLUMNS, TILE_QUADS};
-    let (_, shape, physics) = all_plants().swap_remove(1);
-    let text = compose(Kernel::HiddenLayer, &shape, &physics);
+    let (_, text) = all_plants().swap_remove(1);
+    let text = text.compose(Kernel::HiddenLayer);
     assert!(text.contains(&format!("const TILE_COLUMNS: u32 = {TILE_COLUMNS}u;")));
     let stores = text.matches("tile.upper_").count() + text.matches("tile.lower_").count();
     assert_eq!(stores as u32, TILE_COLUMNS * TILE_QUADS);
@@ -406,9 +487,10 @@ fn fused_activations_take_the_workgroup_memory_that_is_planned() {
         let fused = Fused::new(&mlp);
         // A quarter of a KiB per neuron, the 12 inputs and whole tiles of 8 at least.
         assert_eq!((fused.lanes(), fused.workgroup_bytes()), (lanes, bytes << 10), "{hidden}");
-        let shape = Shape { fused: Some(fused), ..Shape::new(12, 3, Some(&mlp)) };
-        let text = physics(Plant { system: &DroneRace::default(), policy: &mlp });
-        let (module, _) = validated("fused", &compose(Kernel::ReachAvoid, &shape, &text));
+        let race = DroneRace::default();
+        let controller = Controller::of(&race, mlp);
+        let text = text(&Model::of(race), &controller).fusing(Some(fused));
+        let (module, _) = validated("fused", &text.compose(Kernel::ReachAvoid));
         let shared = module.global_variables.iter().map(|(_, variable)| variable);
         let shared = shared.filter(|variable| variable.space == AddressSpace::WorkGroup);
         let size = |variable: &naga::GlobalVariable| {
@@ -419,7 +501,7 @@ fn fused_activations_take_the_workgroup_memory_that_is_planned() {
 }
 
 /// Layer of each top-level module; a file may name its own layer and those above it.
-const LAYERS: [(&str, u32); 19] = [
+const LAYERS: [(&str, u32); 22] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -427,6 +509,9 @@ const LAYERS: [(&str, u32); 19] = [
     ("system", 2),
     ("policy", 2),
     ("cost", 2),
+    ("formula", 2),
+    ("tile", 2),
+    ("model", 2),
     ("rollout", 3),
     ("backend", 4),
     ("scenario", 5),

@@ -34,11 +34,6 @@ where
     Physics::new(&Model::recorded(system), &Controller::recorded(system, policy)).text()
 }
 
-/// The same for a model and who drives it.
-pub fn model_physics(model: &Model, controller: &Controller) -> String {
-    Physics::new(model, controller).text()
-}
-
 /// Which function of the physics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {

@@ -187,7 +187,8 @@ fn a_failure_at_any_submission_is_survived() {
         assert_eq!(found, plain, "{work:?} in small chunks");
         gpu = back;
         let submissions = gpu.submissions();
-        assert!(submissions >= 8, "{work:?} has {submissions} submissions");
+        // Two that fail, and one for each chunk at least.
+        assert!(submissions >= 5, "{work:?} has {submissions} submissions");
         for at in 2..submissions {
             for fault in SURVIVED {
                 let asked = [small_chunks(), vec![once(fault, at)]].concat();

@@ -3,18 +3,23 @@
 //! Without an adapter every test says so and passes, unless `REACHCAST_REQUIRE_GPU` is 1.
 
 mod cache;
+mod calls;
 mod certificates;
 #[path = "../common/mod.rs"]
 mod common;
 mod edges;
 mod failures;
 mod faults;
+mod infinite;
 mod measures;
+#[path = "../models/mod.rs"]
+mod models;
 mod mppi;
 mod networks;
 #[path = "../oracle/mppi.rs"]
 mod oracle;
 mod pairs;
+mod plants;
 mod starts;
 mod systems;
 mod threads;

@@ -86,6 +86,11 @@ pub(super) struct Buffer {
 }
 
 impl Buffer {
+    /// Bytes asked for.
+    pub(super) fn size(&self) -> u64 {
+        self.bytes
+    }
+
     /// The part asked for, as a kernel sees it.
     pub(super) fn binding(&self) -> wgpu::BufferBinding<'_> {
         wgpu::BufferBinding { buffer: &self.inner, offset: 0, size: NonZeroU64::new(self.bytes) }

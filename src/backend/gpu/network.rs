@@ -69,6 +69,11 @@ impl Layers {
         Self { activations: [(); 2].map(|()| pool.take(device, Use::Storage, bytes)), shapes }
     }
 
+    /// Bytes of its activations.
+    pub(super) fn size(&self) -> u64 {
+        self.activations.iter().map(Buffer::size).sum()
+    }
+
     /// Where the last layer leaves its outputs.
     pub(super) fn output(&self) -> &Buffer {
         &self.activations[(self.shapes.len() + 1) % 2]

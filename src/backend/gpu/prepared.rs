@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Gpu;
+use super::adapter::Gpu;
 use super::job::Subject;
 use super::recover::{self, Instead};
 use super::source::Source;

@@ -4,41 +4,19 @@
 //! not change results: what goes on on the same adapter gives the bits that it would have given.
 
 use std::cell::Cell;
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::Arc;
 
-use super::attempt::{Attempt, Limit};
+use super::adapter::Gpu;
+use super::attempt::Attempt;
 use super::job::Subject;
 use super::opened::Opened;
-use super::{Gpu, deviation, mppi, reach_avoid};
+use super::{deviation, mppi, reach_avoid};
 use crate::backend::cpu::Cpu;
 use crate::backend::{Action, Event, MeasureSink, PairSink};
 use crate::cost::Cost;
 use crate::error::{Error, Fault, Result};
-use crate::policy::Policy;
-use crate::rollout::{
-    DeviationTask, Farthest, MppiResult, MppiTask, PairMeasure, Plant, ReachAvoidTask,
-};
+use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, PairMeasure, ReachAvoidTask};
 use crate::system::System;
-
-/// Where the calls of an adapter run now.
-pub(super) struct State {
-    opened: Arc<Opened>,
-    limit: Limit,
-    reopened: bool,
-    on_cpu: bool,
-}
-
-impl State {
-    pub(super) fn new(opened: Opened) -> Self {
-        let (reopened, on_cpu) = (false, false);
-        Self { opened: Arc::new(opened), limit: Limit::default(), reopened, on_cpu }
-    }
-
-    /// The device and what is kept on it.
-    pub(super) fn opened(&self) -> Arc<Opened> {
-        Arc::clone(&self.opened)
-    }
-}
 
 /// Who makes an attempt.
 enum Runner<'a> {
@@ -82,33 +60,6 @@ pub(super) trait Instead {
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>>;
 }
-
-impl<S, P, const NX: usize, const NU: usize> Instead for Typed<'_, S, P, NX, NU>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    fn reach_avoid(
-        &self,
-        cpu: &Cpu,
-        task: &ReachAvoidTask<'_>,
-        sink: MeasureSink<'_>,
-    ) -> Result<()> {
-        cpu.reach_avoid(self.0, task, sink)
-    }
-
-    fn deviation(
-        &self,
-        cpu: &Cpu,
-        task: &DeviationTask<'_>,
-        sink: PairSink<'_>,
-    ) -> Result<Vec<Farthest>> {
-        cpu.deviation(self.0, task, sink)
-    }
-}
-
-/// A system and its policy as Rust types.
-pub(super) struct Typed<'a, S, P, const NX: usize, const NU: usize>(pub(super) Plant<'a, S, P>);
 
 /// See [`crate::backend::Program::reach_avoid`].
 pub(super) fn reach_avoid(
@@ -259,13 +210,5 @@ impl Gpu {
         }
         state.on_cpu = self.fallback.is_some();
         state.on_cpu.then_some(Action::Cpu)
-    }
-
-    pub(super) fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn note(&self, event: Event) {
-        self.events.lock().unwrap_or_else(PoisonError::into_inner).push(event);
     }
 }

@@ -98,12 +98,12 @@ impl Buffers {
         let row = shape.plan.row;
         let layered = network.filter(|_| compiled.text.fused().is_none());
         let seen = layered.filter(|_| compiled.text.observes()).map(|mlp| mlp.widths()[0]);
-        Self {
-            bytes: sizes.iter().map(|(_, bytes)| bytes).sum(),
-            slots: sizes.into_iter().map(|(slot, bytes)| (slot, storage(bytes))).collect(),
-            layers: layered.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, row)),
-            seen: seen.map(|seen| storage(16 * seen.div_ceil(4) as u64 * u64::from(row))),
-        }
+        let slots: Vec<_> = sizes.into_iter().map(|(slot, bytes)| (slot, storage(bytes))).collect();
+        let layers = layered.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, row));
+        let seen = seen.map(|seen| storage(16 * seen.div_ceil(4) as u64 * u64::from(row)));
+        let all = slots.iter().map(|(_, buffer)| buffer).chain(&seen);
+        let bytes = all.map(Buffer::size).sum::<u64>();
+        Self { bytes: bytes + layers.as_ref().map_or(0, Layers::size), slots, layers, seen }
     }
 
     /// The buffer of `slot`.

@@ -1,6 +1,6 @@
 //! Text that the kernels share: sizes, access to states and tables, calls of recorded functions.
 
-use super::WORKGROUP;
+use super::kernels::WORKGROUP;
 use crate::formula::record;
 use crate::formula::wgsl::{Product, function_with};
 use crate::rollout::{HUGE, NON_FINITE, normal_pair};

@@ -1,7 +1,7 @@
 //! How a network lies on the device, and the text of the kernels that run it.
 
 use super::glue::{component, padded};
-use super::{TILE_PITCH, TILE_QUADS, WORKGROUP};
+use super::kernels::{TILE_PITCH, TILE_QUADS, WORKGROUP};
 use crate::formula::wgsl::function;
 use crate::formula::{Expr, record};
 use crate::policy::{Activation, Mlp, OutputActivation};

@@ -1,7 +1,7 @@
 //! The text of the kernels that measure what an adapter can do.
 
 use super::glue::{PARAMS, constants};
-use super::{Access, Kernel, Slot};
+use super::kernels::{Access, Kernel, Slot};
 
 const PEAK: &str = include_str!("../../../../shaders/peak.wgsl");
 const COPY: &str = include_str!("../../../../shaders/copy.wgsl");

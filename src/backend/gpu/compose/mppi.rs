@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
-use super::{Access, Kernel, PARTIAL_HEADER, Slot};
+use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
 use crate::cost::{Cost, CostMap};
 use crate::formula::wgsl::function;
 use crate::formula::{Expr, Graph, record};

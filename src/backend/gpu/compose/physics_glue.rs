@@ -1,27 +1,68 @@
 //! Recorded functions under the names and with the arguments that the kernels call them by.
 
-use super::Slot;
-use super::plant::PlantText;
+use super::kernels::Slot;
+use super::layers::Fused;
 use crate::backend::physics::{Function, Part, Role};
+use crate::policy::{Activation, Mlp, OutputActivation};
 
-/// The functions of `roles` as recorded and what calls them: `advance`, `target_at`,
-/// `constraint_at`, `control_of`, `observed`, `acted`, all of them given the number of the step.
-pub(super) fn physics_glue(text: &PlantText, roles: &[Role]) -> String {
-    let functions: Vec<&Function> =
-        roles.iter().filter_map(|role| text.physics.function(*role)).collect();
+/// What the texts have of a plant besides its formulas.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Outline {
+    /// Number of states.
+    pub(super) states: usize,
+    /// Number of controls.
+    pub(super) controls: usize,
+    /// Number of parameters.
+    pub(super) parameters: usize,
+    /// Seconds between two steps; 0 where the model does not say.
+    pub(super) period: f32,
+    /// The network that drives, if one does.
+    pub(super) driver: Option<Driver>,
+}
+
+/// What the texts have of the network that drives.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Driver {
+    /// Activation of hidden layers and of the last one.
+    pub(super) activations: (Activation, OutputActivation),
+    /// Numbers that it sees.
+    pub(super) inputs: usize,
+    /// Numbers that it says.
+    pub(super) outputs: usize,
+    /// Its layers, where the rollouts run them.
+    pub(super) fused: Option<Fused>,
+}
+
+impl Driver {
+    /// What the texts have of `mlp`, its layers with kernels of their own.
+    pub(super) fn new(mlp: &Mlp) -> Self {
+        let widths = mlp.widths();
+        Self {
+            activations: (mlp.activation(), mlp.output()),
+            inputs: widths[0],
+            outputs: widths[widths.len() - 1],
+            fused: None,
+        }
+    }
+}
+
+/// `functions` as recorded and what calls them: `advance`, `target_at`, `constraint_at`,
+/// `control_of`, `observed`, `acted`, all of them given the number of the step.
+pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String {
     let reads = |part| functions.iter().any(|function| function.reads(part));
     let mut glue = String::new();
     if reads(Part::Parameters) {
-        glue += &parameter_glue(text.parameters);
+        glue += &parameter_glue(outline.parameters);
     }
     if reads(Part::Seconds) {
-        glue += &seconds_glue(text.period);
+        glue += &seconds_glue(outline.period);
     }
-    for function in &functions {
+    for function in functions {
         glue += &function.text;
-        glue += &caller(text, function);
+        glue += &caller(outline, function);
     }
-    glue + &network_glue(text, roles)
+    let has = |role| functions.iter().any(|function| function.role == role);
+    glue + &network_glue(outline, has)
 }
 
 /// `parameters`: the parameters of the model, from constant memory.
@@ -46,7 +87,7 @@ fn seconds_glue(period: f32) -> String {
 }
 
 /// The function by which the kernels call `function`.
-fn caller(text: &PlantText, function: &Function) -> String {
+fn caller(outline: &Outline, function: &Function) -> String {
     let (name, arguments, kind, several) = match function.role {
         Role::Step => ("advance", "x: State, u: Control", "State", true),
         Role::Target => ("target_at", "x: State", "f32", false),
@@ -55,15 +96,15 @@ fn caller(text: &PlantText, function: &Function) -> String {
         Role::Observe => ("observed", "x: State", "Inputs", true),
         Role::Act => ("acted", "x: State, said: Outputs", "Control", true),
     };
-    let said = text.driver.as_ref().map_or(0, |driver| driver.outputs);
+    let said = outline.driver.as_ref().map_or(0, |driver| driver.outputs);
     // A single number is an f32 to the recorded function, and an array to the kernel.
     let array = |name: &str, length: usize| match length {
         1 => format!("{name}[0]"),
         _ => name.to_owned(),
     };
     let passed = |part: &Part| match part {
-        Part::State => array("x", text.states),
-        Part::Control => array("u", text.controls),
+        Part::State => array("x", outline.states),
+        Part::Control => array("u", outline.controls),
         Part::Said => array("said", said),
         Part::Parameters => "parameters()".to_owned(),
         Part::Seconds => "seconds_at(t)".to_owned(),
@@ -76,17 +117,17 @@ fn caller(text: &PlantText, function: &Function) -> String {
 }
 
 /// What stands around the network where nothing is said: it sees the states, and says the controls.
-fn network_glue(text: &PlantText, roles: &[Role]) -> String {
-    let Some(driver) = &text.driver else { return String::new() };
+fn network_glue(outline: &Outline, has: impl Fn(Role) -> bool) -> String {
+    let Some(driver) = &outline.driver else { return String::new() };
     let mut glue = format!(
         "alias Inputs = array<f32, {}>;\nalias Outputs = array<f32, {}>;\n",
         driver.inputs, driver.outputs
     );
-    let rolls = roles.contains(&Role::Step);
-    if rolls && driver.fused.is_some() && !roles.contains(&Role::Observe) {
+    let rolls = has(Role::Step);
+    if rolls && driver.fused.is_some() && !has(Role::Observe) {
         glue += "fn observed(x: State, t: u32) -> Inputs {\n    return x;\n}\n";
     }
-    if rolls && !roles.contains(&Role::Act) {
+    if rolls && !has(Role::Act) {
         glue += "fn acted(x: State, said: Outputs, t: u32) -> Control {\n    return said;\n}\n";
     }
     glue

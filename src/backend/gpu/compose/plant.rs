@@ -2,15 +2,15 @@
 
 use super::glue::{FINITE, PARAMS, RNG, component, constants, finite_glue, state_glue};
 use super::glue::{listed_glue, recorded_pair};
+use super::kernels::{Access, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
-use super::physics_glue::physics_glue;
-use super::{Access, Kernel, Slot};
-use crate::backend::physics::{Part, Physics, Role};
+use super::physics_glue::{Driver, Outline, physics_glue};
+use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
 use crate::formula::wgsl::{Product, function, function_with};
 use crate::formula::{Expr, record};
 use crate::model::{Controller, Law, Model};
-use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::policy::Mlp;
 use crate::real::Real;
 
 const FOLD: &str = include_str!("../../../../shaders/fold.wgsl");
@@ -22,30 +22,12 @@ const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
 const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
 
-/// What the texts have of the network that drives.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Driver {
-    /// Activation of hidden layers and of the last one.
-    pub(super) activations: (Activation, OutputActivation),
-    /// Numbers that it sees.
-    pub(super) inputs: usize,
-    /// Numbers that it says.
-    pub(super) outputs: usize,
-    /// Its layers, where the rollouts run them.
-    pub(super) fused: Option<Fused>,
-}
-
 /// The texts of the kernels of a model and who drives it; values of parameters and weights are no
 /// part of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantText {
-    pub(super) states: usize,
-    pub(super) controls: usize,
-    pub(super) parameters: usize,
-    /// Seconds between two steps; 0 where the model does not say.
-    pub(super) period: f32,
-    pub(super) driver: Option<Driver>,
-    pub(super) physics: Physics,
+    outline: Outline,
+    physics: Physics,
 }
 
 impl PlantText {
@@ -59,11 +41,13 @@ impl PlantText {
         let physics = Physics::new(model, controller);
         check_reads(&physics)?;
         Ok(Self {
-            states: model.states.len(),
-            controls: model.controls.len(),
-            parameters: model.parameters.len(),
-            period: model.period.unwrap_or(0.0),
-            driver: controller.network().map(|mlp| driver(mlp, None)),
+            outline: Outline {
+                states: model.states.len(),
+                controls: model.controls.len(),
+                parameters: model.parameters.len(),
+                period: model.period.unwrap_or(0.0),
+                driver: controller.network().map(Driver::new),
+            },
             physics,
         })
     }
@@ -71,7 +55,7 @@ impl PlantText {
     /// The same texts where the rollouts run the layers of a network themselves.
     #[must_use]
     pub fn fusing(mut self, fused: Option<Fused>) -> Self {
-        if let Some(driver) = &mut self.driver {
+        if let Some(driver) = &mut self.outline.driver {
             driver.fused = fused;
         }
         self
@@ -79,23 +63,23 @@ impl PlantText {
 
     /// Number of states.
     pub fn states(&self) -> usize {
-        self.states
+        self.outline.states
     }
 
     /// Number of parameters of the model.
     pub fn parameters(&self) -> usize {
-        self.parameters
+        self.outline.parameters
     }
 
     /// Whether a kernel of its own evaluates what the network sees.
     pub fn observes(&self) -> bool {
-        let layered = self.driver.as_ref().is_some_and(|driver| driver.fused.is_none());
+        let layered = self.outline.driver.as_ref().is_some_and(|driver| driver.fused.is_none());
         layered && self.physics.function(Role::Observe).is_some()
     }
 
     /// The layers that the rollouts run themselves.
     pub fn fused(&self) -> Option<&Fused> {
-        self.driver.as_ref().and_then(|driver| driver.fused.as_ref())
+        self.outline.driver.as_ref().and_then(|driver| driver.fused.as_ref())
     }
 
     /// Operations of the formulas for one step: a line of the text is one.
@@ -105,7 +89,7 @@ impl PlantText {
 
     /// What `kernel` binds.
     pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
-        let mut list = kernel.bindings(self.driver.is_some());
+        let mut list = kernel.bindings(self.outline.driver.is_some());
         if self.fused().is_some() {
             let control = list.iter_mut().filter(|(slot, _)| *slot == Slot::Control);
             control.for_each(|(slot, _)| *slot = Slot::Weights);
@@ -130,7 +114,7 @@ impl PlantText {
     /// # Panics
     /// For any other kernel.
     pub fn compose(&self, kernel: Kernel) -> String {
-        let states = self.states;
+        let states = self.outline.states;
         let folds = || [FINITE, FOLD].concat();
         let parts = match kernel {
             Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
@@ -141,19 +125,19 @@ impl PlantText {
             Kernel::Compact => vec![folds(), COMPACT.to_owned()],
             Kernel::Reduce => vec![REDUCE.to_owned()],
             Kernel::HiddenLayer | Kernel::OutputLayer => {
-                let activations = self.driver.as_ref().map(|driver| driver.activations);
+                let activations = self.outline.driver.as_ref().map(|driver| driver.activations);
                 vec![layer_text(activations, kernel == Kernel::OutputLayer)]
             }
             Kernel::Observe => vec![self.observation(), OBSERVE.to_owned()],
             other => panic!("{other:?} is no kernel of a plant"),
         };
-        let shared = vec![constants(states, self.controls), PARAMS.to_owned()];
+        let shared = vec![constants(states, self.outline.controls), PARAMS.to_owned()];
         [shared, parts].concat().join("\n")
     }
 
     /// What draws starts and pairs.
     fn draw(&self) -> String {
-        let glue = [state_glue(self.states), listed_glue(self.states)].concat();
+        let glue = [state_glue(self.outline.states), listed_glue(self.outline.states)].concat();
         [glue, RNG.to_owned(), recorded_normals()].join("\n")
     }
 
@@ -165,30 +149,33 @@ impl PlantText {
             self.lanes(kernel),
             self.fused().is_some()
         );
-        let states = self.states;
+        let states = self.outline.states;
         let glue = [state_glue(states), finite_glue(states), self.functions(kernel)].concat();
         [FINITE, FOLD, &lanes, &glue, &self.drive(), JUDGE].join("\n")
     }
 
     /// What evaluates the inputs of a network.
     fn observation(&self) -> String {
-        let quads = self.driver.as_ref().map_or(0, |driver| driver.inputs.div_ceil(4));
+        let quads = self.outline.driver.as_ref().map_or(0, |driver| driver.inputs.div_ceil(4));
         let mut store = String::from("fn store_seen(column: u32, seen: Inputs) {\n");
         for quad in 0..quads {
             let entries = super::glue::padded("seen", quad, self.seen());
             store += &format!("    sink[{quad}u * params.stride + column] = {entries};\n");
         }
-        [state_glue(self.states), self.functions(Kernel::Observe), store + "}\n"].join("\n")
+        [state_glue(self.outline.states), self.functions(Kernel::Observe), store + "}\n"].join("\n")
     }
 
     /// Numbers that the network sees.
     fn seen(&self) -> usize {
-        self.driver.as_ref().map_or(0, |driver| driver.inputs)
+        self.outline.driver.as_ref().map_or(0, |driver| driver.inputs)
     }
 
     /// The recorded functions that `kernel` calls, and what calls them.
     fn functions(&self, kernel: Kernel) -> String {
-        physics_glue(self, &self.roles(kernel))
+        let roles = self.roles(kernel);
+        let functions: Vec<&Function> =
+            roles.iter().filter_map(|role| self.physics.function(*role)).collect();
+        physics_glue(&self.outline, &functions)
     }
 
     /// The recorded functions that `kernel` calls.
@@ -213,7 +200,7 @@ impl PlantText {
     /// `drive`: the controls at a state, by the formula, from the last layer's outputs, or by the
     /// network that the rollout runs itself.
     fn drive(&self) -> String {
-        let Some(driver) = &self.driver else {
+        let Some(driver) = &self.outline.driver else {
             return "fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {\n    \
                     return control_of(x, t);\n}\n"
                 .to_owned();
@@ -236,20 +223,9 @@ impl PlantText {
     }
 }
 
-/// What the texts have of `mlp`.
-pub(super) fn driver(mlp: &Mlp, fused: Option<Fused>) -> Driver {
-    let widths = mlp.widths();
-    Driver {
-        activations: (mlp.activation(), mlp.output()),
-        inputs: widths[0],
-        outputs: widths[widths.len() - 1],
-        fused,
-    }
-}
-
 /// The WGSL module of a hidden or the last layer of `mlp`, whoever it drives.
 pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
-    let Driver { activations, inputs, outputs, .. } = driver(mlp, None);
+    let Driver { activations, inputs, outputs, .. } = Driver::new(mlp);
     let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
     [constants(inputs, outputs), PARAMS.to_owned(), text].join("\n")
 }
@@ -266,7 +242,7 @@ fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
         expected.push(("control", graph, [inputs, controls]));
     }
     if let Law::Network { observe, network, act } = &controller.law {
-        let Driver { inputs: seen, outputs: said, .. } = driver(network, None);
+        let Driver { inputs: seen, outputs: said, .. } = Driver::new(network);
         check_network(
             observe.is_some() || seen == states,
             act.is_some() || said == controls,

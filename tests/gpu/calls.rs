@@ -1,0 +1,299 @@
+//! What a call of a prepared plant costs the host: nothing that was done before, and as few writes,
+//! submissions, waits and reads as there can be.
+
+use reachcast::backend::cpu::Cpu;
+use reachcast::backend::gpu::{Gpu, Injection, NetworkKernels, Traffic};
+use reachcast::backend::{Backend, Program};
+use reachcast::model::Plant;
+use reachcast::policy::Activation;
+use reachcast::rollout::Plant as TypedPlant;
+use reachcast::rollout::{
+    DeviationTask, PairControl, Pairs, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
+    States, Stream,
+};
+use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
+use reachcast::{Error, Fault, Result};
+
+use crate::models::{Driver, VALUES};
+use crate::{drawn, gpu, ramp, random_network, whole_box};
+
+/// One write, one submission, one wait, one read.
+const ONE: Traffic = Traffic {
+    writes: 1,
+    submissions: 1,
+    waits: 1,
+    reads: 1,
+    texts: 0,
+    pipelines: 0,
+    packs: 0,
+    buffers: 0,
+    groups: 0,
+};
+
+/// The race under a network of three hidden layers.
+fn race() -> Plant {
+    Plant::of(DroneRace::default(), random_network(&[12, 64, 64, 64, 3], Activation::Relu))
+}
+
+fn integrator() -> Plant {
+    Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 })
+}
+
+fn starts(plant: &Plant) -> Starts<'static> {
+    if plant.model.states.len() == 2 {
+        drawn(whole_box(&DoubleIntegrator::default()), 81)
+    } else {
+        drawn(whole_box(&DroneRace::default()), 81)
+    }
+}
+
+/// A batch of 158 starts.
+fn roll_out(program: &Program<'_>, starts: &Starts<'_>, query: Query) -> Result<Vec<f32>> {
+    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+    let task = ReachAvoidTask {
+        starts: starts.clone(),
+        range: 0..158,
+        spec,
+        tightening: &ramp(&spec),
+        query,
+    };
+    let mut all = Vec::new();
+    program.reach_avoid(&task, &mut |_, values| {
+        all.extend_from_slice(values);
+        Ok(())
+    })?;
+    Ok(all)
+}
+
+/// A batch of 158 pairs.
+fn roll_out_pairs(program: &Program<'_>, control: PairControl) -> Result<()> {
+    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+    let task = DeviationTask {
+        pairs: Pairs {
+            nominal: starts(program.plant()),
+            radius: 0.1,
+            stream: Stream::new(82, Purpose::DeviationPerturbation, 0),
+        },
+        range: 0..158,
+        spec,
+        tightening: &ramp(&spec),
+        control,
+    };
+    program.deviation(&task, &mut |_, _| Ok(())).map(drop)
+}
+
+fn traffic(backend: &Backend) -> Traffic {
+    match backend {
+        Backend::Gpu(gpu) => gpu.traffic(),
+        Backend::Cpu(_) => Traffic::default(),
+    }
+}
+
+/// What `call` costs the second time.
+fn second(backend: &Backend, call: impl Fn() -> Result<()>) -> Traffic {
+    call().expect("it runs");
+    let before = traffic(backend);
+    call().expect("it runs again");
+    traffic(backend).since(before)
+}
+
+/// Each plant, its network in layers and fused.
+fn each(test: impl Fn(&Backend, &Plant)) {
+    for networks in [NetworkKernels::Layered, NetworkKernels::Fused] {
+        for plant in [race(), integrator()] {
+            let Some(gpu) = gpu() else { return };
+            test(&Backend::Gpu(gpu.with_networks(networks)), &plant);
+        }
+    }
+}
+
+#[test]
+fn a_call_is_one_write_one_submission_one_wait_and_one_read() {
+    each(|backend, plant| {
+        let program = backend.prepare(plant).expect("it fits");
+        let drawn = starts(plant);
+        let measures = || roll_out(&program, &drawn, Query::Measure).map(drop);
+        assert_eq!(second(backend, measures), ONE, "measures of {}", plant.model.name);
+        for control in [PairControl::Replay, PairControl::ClosedLoop] {
+            let pairs = || roll_out_pairs(&program, control);
+            assert_eq!(second(backend, pairs), ONE, "{control:?} pairs of {}", plant.model.name);
+        }
+        let size = plant.model.states.len();
+        let list: Vec<f32> = (0..158).flat_map(|i| drawn.start(i)).collect();
+        let listed = Starts::Listed(States::new(&list, size));
+        let measures = || roll_out(&program, &listed, Query::Measure).map(drop);
+        assert_eq!(second(backend, measures), ONE, "a list of {}", plant.model.name);
+    });
+}
+
+/// Signs are compacted after each submission, which asks for the number that is left.
+#[test]
+fn signs_are_one_of_each_per_submission() {
+    each(|backend, plant| {
+        let program = backend.prepare(plant).expect("it fits");
+        let signs = || roll_out(&program, &starts(plant), Query::Sign).map(drop);
+        let cost = second(backend, signs);
+        let count = cost.submissions;
+        // 31 states in submissions of 8 under a network, of 32 under a formula.
+        assert!((1..=4).contains(&count), "{cost:?}");
+        let expected =
+            Traffic { writes: count, submissions: count, waits: count, reads: count, ..ONE };
+        assert_eq!(cost, expected, "{}", plant.model.name);
+    });
+}
+
+#[test]
+fn preparing_again_is_a_look_up() {
+    for plant in [race(), integrator(), Driver::Wrapped.plant(VALUES)] {
+        let Some(gpu) = gpu() else { return };
+        let (backend, plant) = (&Backend::Gpu(gpu), &plant);
+        let program = backend.prepare(plant).expect("it fits");
+        let before = traffic(backend);
+        let again = backend.prepare(plant).expect("it fits");
+        assert_eq!(traffic(backend).since(before), Traffic::default(), "the very same");
+        drop((program, again));
+        // Other values of parameters: printed, and found to be what is there already.
+        let mut model = (*plant.model).clone();
+        model.parameters.iter_mut().for_each(|parameter| parameter.value += 0.5);
+        let other = Plant { model: model.into(), controller: plant.controller.clone() };
+        backend.prepare(&other).expect("it fits");
+        let printed = Traffic { texts: 1, ..Traffic::default() };
+        assert_eq!(traffic(backend).since(before), printed, "{}", plant.model.name);
+    }
+}
+
+/// Other values of parameters are other numbers, and compile and upload nothing anew.
+#[test]
+fn a_parameter_is_sent_with_the_call() {
+    for networks in [NetworkKernels::Layered, NetworkKernels::Fused] {
+        let Some(gpu) = gpu() else { return };
+        let backend = Backend::Gpu(gpu.with_networks(networks));
+        let region = Region::new_box([-1.0; 3], [1.0; 3]).expect("a box");
+        let starts = drawn(region, 83);
+        let of = |values: [f32; 5]| {
+            let plant = Driver::Wrapped.plant(values);
+            let program = backend.prepare(&plant).expect("it fits");
+            roll_out(&program, &starts, Query::Measure).expect("it runs")
+        };
+        let first = of(VALUES);
+        let before = traffic(&backend);
+        let other = of([1.0, -0.5, 0.9, 3.0, 0.1]);
+        let cost = traffic(&backend).since(before);
+        // Printed, and found to be the same plant with the same network.
+        assert_eq!(cost, Traffic { texts: 1, ..ONE });
+        assert_ne!(first, other);
+        assert_eq!(of(VALUES), first, "and back");
+    }
+}
+
+/// A device that is opened again has the plant again, and gives the same bits.
+#[test]
+fn a_prepared_plant_outlives_its_device() {
+    let Some(first) = gpu() else { return };
+    let plant = race();
+    let plain = Backend::Gpu(first);
+    let drawn = starts(&plant);
+    let expected = roll_out(&plain.prepare(&plant).expect("it fits"), &drawn, Query::Measure);
+    let Some(second) = gpu() else { return };
+    let lost = Injection { fault: Fault::Lost, submission: 1, repeats: false };
+    let backend = Backend::Gpu(second.with_failures(vec![lost]));
+    let program = backend.prepare(&plant).expect("it fits");
+    for _ in 0..3 {
+        let found = roll_out(&program, &drawn, Query::Measure);
+        assert_eq!(found.expect("it goes on"), *expected.as_ref().expect("it runs"));
+    }
+    assert_eq!(backend.events().len(), 1);
+    // Uploaded to the first device and to the second.
+    assert_eq!(traffic(&backend).packs, 2);
+}
+
+/// The CPU takes a prepared plant over.
+#[test]
+fn a_cpu_takes_a_prepared_plant_over() {
+    let Some(gpu) = gpu() else { return };
+    let refused = Injection { fault: Fault::Validation, submission: 0, repeats: true };
+    let host = || Cpu::new(Some(2)).expect("two threads");
+    let backend = Backend::Gpu(gpu.with_failures(vec![refused]).with_fallback(host()));
+    let plant = race();
+    let program = backend.prepare(&plant).expect("it fits");
+    let found = roll_out(&program, &starts(&plant), Query::Measure).expect("the CPU runs it");
+    let cpu = Backend::Cpu(host());
+    let expected =
+        roll_out(&cpu.prepare(&plant).expect("it fits"), &starts(&plant), Query::Measure);
+    assert_eq!(found, expected.expect("it runs"));
+    roll_out_pairs(&program, PairControl::ClosedLoop).expect("and pairs");
+}
+
+/// Without one, the error says what failed.
+#[test]
+fn without_a_cpu_a_prepared_plant_fails() {
+    let Some(gpu) = gpu() else { return };
+    let refused = Injection { fault: Fault::Validation, submission: 0, repeats: true };
+    let backend = Backend::Gpu(gpu.with_failures(vec![refused]));
+    let plant = integrator();
+    let program = backend.prepare(&plant).expect("it fits");
+    let failed = roll_out(&program, &starts(&plant), Query::Measure);
+    assert!(matches!(failed, Err(Error::DeviceFailed { fault: Fault::Validation, .. })));
+}
+
+/// A plant that is given as Rust types is recorded at each call, but nothing more.
+#[test]
+fn types_are_recorded_and_nothing_else() {
+    let Some(gpu) = gpu() else { return };
+    let backend = Backend::Gpu(gpu);
+    let policy = random_network(&[12, 16, 3], Activation::Tanh);
+    let system = DroneRace::default();
+    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+    let task = ReachAvoidTask {
+        starts: drawn(whole_box(&system), 84),
+        range: 0..158,
+        spec,
+        tightening: &ramp(&spec),
+        query: Query::Measure,
+    };
+    let plant = TypedPlant { system: &system, policy: &policy };
+    let call = || backend.reach_avoid(plant, &task, &mut |_, _| Ok(()));
+    assert_eq!(second(&backend, call), Traffic { texts: 1, ..ONE });
+}
+
+/// Threads that share a prepared plant have workspaces of their own.
+#[test]
+fn threads_share_a_prepared_plant() {
+    let Some(gpu) = gpu() else { return };
+    let backend = Backend::Gpu(gpu);
+    let plant = integrator();
+    let program = backend.prepare(&plant).expect("it fits");
+    let drawn = starts(&plant);
+    let expected = roll_out(&program, &drawn, Query::Measure).expect("it runs");
+    std::thread::scope(|scope| {
+        let run = || {
+            for _ in 0..20 {
+                let found = roll_out(&program, &drawn, Query::Measure).expect("it runs");
+                assert_eq!(found, expected);
+            }
+        };
+        for _ in 0..4 {
+            scope.spawn(run);
+        }
+    });
+}
+
+/// Failures at any submission leave the same results.
+#[test]
+fn a_prepared_plant_survives_failures() {
+    let plain = |gpu: Gpu| {
+        let backend = Backend::Gpu(gpu);
+        let plant = race();
+        let program = backend.prepare(&plant).expect("it fits");
+        roll_out(&program, &starts(&plant), Query::Sign).expect("it runs")
+    };
+    let Some(first) = gpu() else { return };
+    let expected = plain(first);
+    for fault in [Fault::OutOfMemory, Fault::Timeout, Fault::Lost] {
+        for submission in 0..3 {
+            let Some(gpu) = gpu() else { return };
+            let asked = vec![Injection { fault, submission, repeats: false }];
+            assert_eq!(plain(gpu.with_failures(asked)), expected, "{fault} at {submission}");
+        }
+    }
+}
