@@ -5,7 +5,7 @@ use super::glue::{
 };
 use super::layers::{Fused, fused_text, layer_text};
 use super::{Access, Kernel, Slot};
-use crate::formula::wgsl::{Product, function, function_with};
+use crate::formula::wgsl::{CHOICES, Product, function, function_with};
 use crate::formula::{Expr, record};
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::real::Real;
@@ -87,7 +87,7 @@ pub fn compose(kernel: Kernel, shape: &Shape, physics: &str) -> String {
         }
         Kernel::Peak | Kernel::Copy => panic!("{kernel:?} is composed by `limit_kernel`"),
     };
-    let shared = vec![constants(states, shape.controls), PARAMS.to_owned()];
+    let shared = vec![constants(states, shape.controls), PARAMS.to_owned(), CHOICES.to_owned()];
     [shared, parts].concat().join("\n")
 }
 
