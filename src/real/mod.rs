@@ -123,14 +123,14 @@ pub trait Real:
         }
     }
 
-    /// Sine of an angle in radians, for `|self|` up to 8192: error below 3e-7 up to pi, 4e-7 up to 1000.
-    /// Beyond 8192 it grows with the angle, and means nothing from 1e5 on.
+    /// Sine of an angle in radians: error below 3e-7 for `|self|` up to 8192. Beyond, it grows with the
+    /// angle, and from 1e5 on the result means nothing.
     #[inline(always)]
     fn sin(self) -> Self {
         approx::sin(self)
     }
 
-    /// Cosine of an angle in radians, as [`Real::sin`]: error below 5e-7 up to pi, 6e-7 up to 1000.
+    /// Cosine of an angle in radians: error below 5e-7, as that of [`Real::sin`].
     #[inline(always)]
     fn cos(self) -> Self {
         approx::cos(self)
@@ -143,62 +143,65 @@ pub trait Real:
         approx::principal_sin_cos(self)
     }
 
-    /// Tangent of an angle in radians, for `|self|` up to 8192.
+    /// Tangent of an angle in radians: error below 3.5 ulp for `|self|` up to 1.5; up to 8192 below 5 ulp
+    /// and what an error of the angle of 5e-8 makes of it. Beyond as [`Real::sin`].
     #[inline(always)]
     fn tan(self) -> Self {
         approx::tan(self)
     }
 
-    /// Arc sine, in `[-pi/2, pi/2]`; NaN beyond `[-1, 1]`.
+    /// Arc sine, in `[-pi/2, pi/2]`: error below 2.5 ulp; NaN beyond `[-1, 1]`.
     #[inline(always)]
     fn asin(self) -> Self {
         approx::asin(self)
     }
 
-    /// Arc cosine, in `[0, pi]`; NaN beyond `[-1, 1]`.
+    /// Arc cosine, in `[0, pi]`: error below 1.5 ulp; NaN beyond `[-1, 1]`.
     #[inline(always)]
     fn acos(self) -> Self {
         approx::acos(self)
     }
 
-    /// Arc tangent, in `[-pi/2, pi/2]`.
+    /// Arc tangent, in `[-pi/2, pi/2]`: error below 3 ulp.
     #[inline(always)]
     fn atan(self) -> Self {
         approx::atan(self)
     }
 
-    /// The angle of the point `(x, self)`, in `[-pi, pi]`: 0 at the origin, pi on the negative half of the
-    /// axis, for a negative zero too.
+    /// The angle of the point `(x, self)`, in `[-pi, pi]`: error below 3e-7, where neither coordinate is
+    /// subnormal. 0 at the origin; pi on the negative half of the axis, for a negative zero too.
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         approx::atan2(self, x)
     }
 
     /// `self`, an angle in radians, less a multiple of `2 pi`: in `[-pi, pi)`, with the f32 pi in f32.
+    /// Error below 4e-7 for `|self|` up to 8192, modulo a turn; 0.04 up to 1e6, where neighbouring
+    /// numbers are 0.06 apart; NaN from 4.2e6 on.
     #[inline(always)]
     fn wrap(self) -> Self {
         approx::wrap(self)
     }
 
-    /// Exponential.
+    /// Exponential: error below 1.1 ulp from -87.3 on, 1.5e-45 below; infinite above 88.722839.
     #[inline(always)]
     fn exp(self) -> Self {
         approx::exp(self)
     }
 
-    /// Natural logarithm; NaN of 0 and below.
+    /// Natural logarithm: error below 1.3 ulp, 6e-8 in `[0.5, 2]`; NaN of 0 and below.
     #[inline(always)]
     fn ln(self) -> Self {
         approx::ln(self)
     }
 
-    /// Hyperbolic tangent: error below 4e-7.
+    /// Hyperbolic tangent: error below 4e-7 everywhere.
     #[inline(always)]
     fn tanh(self) -> Self {
         approx::tanh(self)
     }
 
-    /// Logistic function, `1 / (1 + exp(-self))`.
+    /// Logistic function, `1 / (1 + exp(-self))`: error below 2.6 ulp from -87 on, 1.2e-38 below.
     #[inline(always)]
     fn sigmoid(self) -> Self {
         approx::sigmoid(self)

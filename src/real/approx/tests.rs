@@ -1,6 +1,9 @@
 //! The functions against the platform's in f64.
 
-use crate::real::{Lanes, Real};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+use crate::real::Real;
 
 /// Largest error of `ours` against `truth` over an even grid.
 fn worst(low: f32, high: f32, ours: fn(f32) -> f32, truth: fn(f64) -> f64) -> f64 {
@@ -99,40 +102,155 @@ fn errors(range: [f32; 2], ours: impl Fn(f32) -> f32, truth: impl Fn(f64) -> f64
     })
 }
 
+/// What the documentation of each function states, and that it does not state much more than there is.
 #[test]
-fn measure() {
-    type Case = (&'static str, [f32; 2], fn(f32) -> f32, fn(f64) -> f64);
-    let cases: &[Case] = &[
-        ("exp", [-87.3, 88.72], <f32 as Real>::exp, f64::exp),
-        ("exp sub", [-104.0, -87.3], <f32 as Real>::exp, f64::exp),
-        ("ln small", [1e-45, 0.5], <f32 as Real>::ln, f64::ln),
-        ("ln mid", [0.5, 2.0], <f32 as Real>::ln, f64::ln),
-        ("ln big", [2.0, f32::MAX], <f32 as Real>::ln, f64::ln),
-        ("sigmoid", [-87.0, 100.0], <f32 as Real>::sigmoid, |x| 1.0 / (1.0 + (-x).exp())),
-        ("tanh", [-12.0, 12.0], <f32 as Real>::tanh, f64::tanh),
-        ("tan 1.5", [-1.5, 1.5], <f32 as Real>::tan, f64::tan),
-        ("tan pi", [-3.1, 3.1], <f32 as Real>::tan, f64::tan),
-        ("tan 8192", [-8192.0, 8192.0], <f32 as Real>::tan, f64::tan),
-        ("asin", [-1.0, 1.0], <f32 as Real>::asin, f64::asin),
-        ("acos", [-1.0, 1.0], <f32 as Real>::acos, f64::acos),
-        ("atan", [-10.0, 10.0], <f32 as Real>::atan, f64::atan),
-        ("atan", [-f32::MAX, f32::MAX], <f32 as Real>::atan, f64::atan),
-        ("sin pi", [-3.2, 3.2], <f32 as Real>::sin, f64::sin),
-        ("cos pi", [-3.2, 3.2], <f32 as Real>::cos, f64::cos),
-        ("sin 8192", [-8192.0, 8192.0], <f32 as Real>::sin, f64::sin),
-        ("cos 8192", [-8192.0, 8192.0], <f32 as Real>::cos, f64::cos),
-        ("1.5", [1e-25, 1e25], |x| Real::powf(x, 1.5), |x| x.powf(1.5)),
-        ("-0.3", [1e-25, 1e25], |x| Real::powf(x, -0.3), |x| x.powf(f64::from(-0.3f32))),
+fn errors_are_as_stated() {
+    type Case = ([f32; 2], fn(f32) -> f32, fn(f64) -> f64, f64);
+    let in_units: [Case; 8] = [
+        ([-87.3, 88.72], Real::exp, f64::exp, 1.1),
+        ([1e-45, 0.5], Real::ln, f64::ln, 1.3),
+        ([2.0, f32::MAX], Real::ln, f64::ln, 1.3),
+        ([-87.0, 100.0], Real::sigmoid, Real::sigmoid, 2.6),
+        ([-1.5, 1.5], Real::tan, f64::tan, 3.5),
+        ([-1.0, 1.0], Real::asin, f64::asin, 2.5),
+        ([-1.0, 1.0], Real::acos, f64::acos, 1.5),
+        ([-f32::MAX, f32::MAX], Real::atan, f64::atan, 3.0),
     ];
-    for (name, range, ours, truth) in cases {
-        let [absolute, units] = errors(*range, ours, truth);
-        println!("{name:10} {absolute:e} {units}");
+    for (number, (range, ours, truth, limit)) in in_units.into_iter().enumerate() {
+        let [_, units] = errors(range, ours, truth);
+        assert!(units < limit && units > 0.7 * limit, "{number}: {units} of {limit}");
     }
-    let mut worst = 0.0f64;
+    let absolute: [Case; 6] = [
+        ([0.5, 2.0], Real::ln, f64::ln, 6e-8),
+        ([-104.0, -87.3], Real::exp, f64::exp, 1.5e-45),
+        ([-12.0, 12.0], Real::tanh, f64::tanh, 4e-7),
+        ([-8192.0, 8192.0], Real::sin, f64::sin, 3e-7),
+        ([-8192.0, 8192.0], Real::cos, f64::cos, 5e-7),
+        ([-f32::MAX, -87.0], Real::sigmoid, Real::sigmoid, 1.2e-38),
+    ];
+    for (number, (range, ours, truth, limit)) in absolute.into_iter().enumerate() {
+        let [error, _] = errors(range, ours, truth);
+        assert!(error < limit && (number == 5 || error > 0.6 * limit), "{number}: {error:e}");
+    }
+}
+
+/// The tangent grows with the error of the angle where it is steep.
+#[test]
+fn tangents_of_far_angles() {
     for x in numbers([-8192.0, 8192.0]) {
-        let t = f64::from(x).tan();
-        let d = ((f64::from(Real::tan(x)) - t).abs() - 5.0 * ulp(t)) / (1.0 + t * t);
-        worst = worst.max(d);
+        let truth = f64::from(x).tan();
+        let error = (f64::from(Real::tan(x)) - truth).abs();
+        assert!(error < 5.0 * ulp(truth) + 5e-8 * (1.0 + truth * truth), "{x}: {error:e}");
     }
-    println!("tan 8192 combined {worst:e}");
+}
+
+/// `wrap` is the angle to which f64 wraps, or that angle a whole turn on next to an odd half turn.
+#[test]
+fn wrapped_angles() {
+    let pi = std::f32::consts::PI;
+    for (range, limit) in [([-8192.0, 8192.0], 4e-7), ([-1e6, 1e6], 0.04)] {
+        for x in numbers(range) {
+            let (found, truth) = (Real::wrap(x), Real::wrap(f64::from(x)));
+            assert!((-pi..pi).contains(&found), "{x}: {found}");
+            let apart = (f64::from(found) - truth).abs();
+            let apart = apart.min((apart - std::f64::consts::TAU).abs());
+            assert!(apart < limit, "{x}: {found} {truth}");
+        }
+    }
+    assert_eq!([pi, -pi, 0.0, 3.0, -3.0].map(Real::wrap), [-pi, -pi, 0.0, 3.0, -3.0]);
+    for far in [4.3e6, 1e30, f32::MAX, f32::INFINITY, f32::NAN] {
+        assert!(Real::wrap(far).is_nan() && Real::wrap(-far).is_nan(), "{far}");
+    }
+    for x in [pi, -pi, 1e15, -1e15] {
+        let wrapped = Real::wrap(f64::from(x));
+        assert!((-std::f64::consts::PI..std::f64::consts::PI).contains(&wrapped), "{x}");
+    }
+}
+
+/// Two million points of the plane, near and far from the axes, in all quadrants.
+#[test]
+fn angles_of_points() {
+    let mut rng = StdRng::seed_from_u64(1);
+    let mut worst = 0.0_f64;
+    for _ in 0..2_000_000 {
+        let mut number = || rng.random_range(-1.0_f32..1.0) * 10.0_f32.powi(rng.random_range(-9..9));
+        let (y, x) = (number(), number());
+        let truth = Real::atan2(f64::from(y), f64::from(x));
+        worst = worst.max((f64::from(Real::atan2(y, x)) - truth).abs());
+    }
+    assert!(worst < 3e-7 && worst > 1e-7, "{worst:e}");
+    let pi = std::f32::consts::PI;
+    for (y, x, angle) in [
+        (0.0, 0.0, 0.0),
+        (-0.0, -0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, -1.0, pi),
+        (-0.0, -1.0, pi),
+        (1.0, 0.0, 0.5 * pi),
+        (-1.0, 0.0, -0.5 * pi),
+        (f32::INFINITY, f32::INFINITY, 0.25 * pi),
+        (f32::NEG_INFINITY, f32::NEG_INFINITY, -0.75 * pi),
+        (f32::INFINITY, 1.0, 0.5 * pi),
+        (1.0, f32::INFINITY, 0.0),
+        (1.0, f32::NEG_INFINITY, pi),
+        (f32::MAX, f32::MAX, 0.25 * pi),
+        (1e-40, -1.0, pi),
+    ] {
+        let found = Real::atan2(y, x);
+        assert!((found - angle).abs() < 3e-7, "{y} {x}: {found}");
+        let found = Real::atan2(f64::from(y), f64::from(x));
+        assert!((found - f64::from(angle)).abs() < 3e-7, "{y} {x}: {found} in f64");
+    }
+}
+
+/// Powers by repeated products, the root, and the exponential of the logarithm.
+#[test]
+fn powers() {
+    for exponent in [-2.5_f32, -0.3, 0.1, 1.5, 3.3] {
+        for x in numbers([1e-20, 1e10]) {
+            let exact = f64::from(x).powf(f64::from(exponent));
+            if exact < f64::from(f32::MIN_POSITIVE) || exact > f64::from(f32::MAX) {
+                continue;
+            }
+            let relative = (f64::from(Real::powf(x, exponent)) / exact - 1.0).abs();
+            let allowed = 3e-7 * (1.0 + (f64::from(exponent) * f64::from(x).ln()).abs());
+            assert!(relative < allowed, "{x}^{exponent}: {relative:e} of {allowed:e}");
+        }
+    }
+    for x in [-3.0_f32, -0.5, 0.7, 2.0, 11.0] {
+        assert_eq!(Real::powi(x, 3), x * (x * x));
+        assert_eq!(Real::powf(x, 2.0), x * x);
+        assert_eq!(Real::powi(x, -1), 1.0 / x);
+        assert_eq!(Real::powf(x, 0.0), 1.0);
+        let sum = (f64::from(Real::powi(x, 13)) / f64::from(x).powi(13) - 1.0).abs();
+        assert!(sum < 5e-7, "{x}: {sum:e}");
+        assert!(x > 0.0 || (Real::powf(x, 0.5).is_nan() && Real::powf(x, 1.7).is_nan()));
+    }
+    assert_eq!(Real::powf(2.0_f32, 0.5), 2.0_f32.sqrt());
+    assert_eq!([Real::powf(0.0_f32, 1.3), Real::powf(0.0_f32, -1.3)], [0.0, f32::INFINITY]);
+    assert!(Real::powi(f32::NAN, 0).is_nan() && Real::powf(1.0_f32, f32::NAN).is_nan());
+    assert_eq!(Real::powi(1.0_f32, i32::MIN), 1.0);
+}
+
+/// Every function at the numbers that formulas may meet, in f32 and in f64, on either side of its domain.
+#[test]
+fn ends_of_the_domains() {
+    let (infinite, nan) = (f32::INFINITY, f32::NAN);
+    assert_eq!([0.0_f32, -infinite, infinite].map(Real::exp), [1.0, 0.0, infinite]);
+    assert_eq!([88.8_f32, -104.0].map(Real::exp), [infinite, 0.0]);
+    assert_eq!(Real::exp(88.722_8_f32), f64::from(88.722_8_f32).exp() as f32);
+    assert_eq!([1.0_f32, infinite].map(Real::ln), [0.0, infinite]);
+    for x in [0.0, -0.0, -1e-45, -1.0, -infinite, nan] {
+        assert!(Real::ln(x).is_nan() && Real::ln(f64::from(x)).is_nan(), "{x}");
+    }
+    assert_eq!([infinite, -infinite].map(Real::sigmoid), [1.0, 0.0]);
+    assert_eq!([1.0_f32, -1.0].map(Real::acos), [0.0, std::f32::consts::PI]);
+    for x in [1.000_000_1_f32, -1.5, infinite, nan] {
+        assert!(Real::asin(x).is_nan() && Real::acos(x).is_nan(), "{x}");
+    }
+    assert_eq!([infinite, -2.0, 3.0, 0.0].map(Real::sign), [1.0, -1.0, 1.0, 0.0]);
+    assert_eq!(Real::atan(infinite), std::f32::consts::FRAC_PI_2);
+    for x in numbers([6e-8, 1.0]) {
+        assert_eq!(Real::ln(x).to_bits(), Real::ln_unit(x).to_bits(), "{x}");
+    }
 }
