@@ -4,6 +4,7 @@ pub mod cpu;
 mod event;
 pub mod gpu;
 mod physics;
+mod program;
 mod softmin;
 
 use crate::cost::Cost;
@@ -19,6 +20,7 @@ use gpu::Gpu;
 
 pub use event::{Action, Event, add_events};
 pub use physics::physics;
+pub use program::Program;
 
 /// The native CPU, or a GPU through wgpu.
 #[derive(Debug)]

@@ -6,15 +6,13 @@ use std::path::{Path, PathBuf};
 use super::args::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
-use crate::config::{Config, Job, PolicySource};
+use crate::config::{Config, PolicySource};
 use crate::error::Result;
 use crate::files::{Staged, check_room, json, npy_bytes};
-use crate::policy::Policy;
-use crate::rollout::Plant;
+use crate::model::Plant;
 use crate::scenario;
 use crate::scenario::record::{DeviationRecord, Record};
 use crate::scenario::settings::Settings;
-use crate::system::System;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-out";
@@ -30,52 +28,40 @@ pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let config = Config::load(path, &global.overrides())?;
     let policy = config.policy_source(folder_of(path))?;
     let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let job = Certify { global, config: &config, out: &out };
-    let (record, mut staged) = config.with_plant(&policy, job)?;
+    let (record, mut staged) = certify(global, &config, &config.plant(&policy)?, &out)?;
     stage(&mut staged, &record, &policy)?;
     let files = staged.publish()?;
     report(global, &record, || summary::text(&record, &files))?;
     Ok(if record.holds { Outcome::Done } else { Outcome::NotObtained })
 }
 
-/// The command for one plant.
-struct Certify<'a> {
-    global: &'a Global,
-    config: &'a Config,
-    out: &'a Path,
-}
-
-impl Job for Certify<'_> {
-    type Output = (Record, Staged);
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<(Record, Staged)>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let settings = self.config.settings(&plant.system.states())?;
-        let stored = self.config.to_json()?;
-        let backend = devices::open(self.global)?;
-        let progress = Progress::new(self.global);
-        // Before the work: a folder that cannot be written to would waste it.
-        let staged = Staged::new(self.out)?;
-        check_room(self.out, estimate(&settings))?;
-        let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
-        record.timing.threads = devices::threads(self.global);
-        devices::note_events(self.global, &backend);
-        progress.check()?;
-        Ok((record.sealed()?, staged))
-    }
+/// The certificate, and the folder that its files are staged for.
+fn certify(
+    global: &Global,
+    config: &Config,
+    plant: &Plant,
+    out: &Path,
+) -> Result<(Record, Staged)> {
+    let settings = config.settings(&plant.model.states)?;
+    let stored = config.to_json()?;
+    let backend = devices::open(global)?;
+    let progress = Progress::new(global);
+    // Before the work: a folder that cannot be written to would waste it.
+    let staged = Staged::new(out)?;
+    check_room(out, estimate(&settings))?;
+    let program = backend.prepare(plant)?;
+    let mut record = scenario::certify(&program, &settings, stored, &progress)?;
+    record.timing.threads = devices::threads(global);
+    devices::note_events(global, &backend);
+    progress.check()?;
+    Ok((record.sealed()?, staged))
 }
 
 /// About what the files of the folder take, bytes: a number takes some 20 characters in a text.
-fn estimate<const NX: usize>(settings: &Settings<NX>) -> u64 {
-    let [x, y] = settings.slice.each_ref().map(|axis| axis.values.len());
+fn estimate(settings: &Settings) -> u64 {
+    let [x, y] = settings.slice_size();
     let states = PICTURED * (settings.spec.horizon as usize + 1);
-    (1 << 20) + 20 * (8 * x * y + NX * states) as u64
+    (1 << 20) + 20 * (8 * x * y + settings.state.len() * states) as u64
 }
 
 /// Writes all files of the folder, the certificate itself last.

@@ -37,8 +37,10 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
     let progress = Progress::new(global);
     let backend = devices::open(global)?;
+    let plant = input.plant()?;
+    let program = backend.prepare(&plant)?;
     let experiment = Experiment {
-        world: input.world(&backend)?,
+        world: input.world(&backend, &program)?,
         names,
         starts,
         source,

@@ -8,15 +8,14 @@ use serde::Serialize;
 use super::args::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
-use crate::backend::{Backend, Event};
-use crate::config::{Config, Job};
+use crate::backend::{Event, Program};
+use crate::config::Config;
 use crate::error::Result;
 use crate::files::{MeasureWriter, StateReader, check_room};
-use crate::policy::Policy;
-use crate::rollout::{NON_FINITE, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
+use crate::model::Plant;
+use crate::rollout::{NON_FINITE, Query, ReachAvoidTask, RolloutSpec, Starts, States, Tightening};
 use crate::scenario::Watch;
 use crate::scenario::bound::interval;
-use crate::system::System;
 
 /// Starts that are held in memory at a time.
 const CHUNK: usize = 1 << 18;
@@ -53,13 +52,13 @@ pub(super) fn run(
     let config = Config::load(config, &global.overrides())?;
     let spec = config.spec()?;
     let policy = config.policy_source(folder)?;
-    let job = Rollout { global, spec, starts, measures };
-    let summary = config.with_plant(&policy, job)?;
+    let work = Rollout { global, spec, starts, measures };
+    let summary = work.run(&config.plant(&policy)?)?;
     report(global, &summary, || text(&summary))?;
     Ok(Outcome::Done)
 }
 
-/// The command for one plant.
+/// The command for a plant.
 struct Rollout<'a> {
     global: &'a Global,
     spec: RolloutSpec,
@@ -67,17 +66,12 @@ struct Rollout<'a> {
     measures: &'a Path,
 }
 
-impl Job for Rollout<'_> {
-    type Output = Summary;
-
-    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Summary>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let names = plant.system.states().map(|axis| axis.name);
-        let mut reader = StateReader::<NX>::open(self.starts, names)?;
+impl Rollout<'_> {
+    fn run(self, plant: &Plant) -> Result<Summary> {
+        let names = plant.model.states.iter().map(|axis| axis.name.clone()).collect();
+        let mut reader = StateReader::open(self.starts, names)?;
         let backend = devices::open(self.global)?;
+        let program = backend.prepare(plant)?;
         let mut writer = MeasureWriter::create(self.measures)?;
         check_room(folder_of(self.measures), MEASURE_BYTES * reader.left().unwrap_or(0))?;
         let progress = Progress::new(self.global);
@@ -89,7 +83,7 @@ impl Job for Rollout<'_> {
             if starts.is_empty() {
                 break;
             }
-            measure(&backend, plant, self.spec, &starts, &mut |values| {
+            measure(&program, self.spec, starts.view(), &mut |values| {
                 count.add(values);
                 writer.add(values)?;
                 progress.advance(values.len() as u64)
@@ -115,25 +109,20 @@ impl Job for Rollout<'_> {
 }
 
 /// Sends the measures of `starts` to `sink`, in order.
-fn measure<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+fn measure(
+    program: &Program<'_>,
     spec: RolloutSpec,
-    starts: &[[f32; NX]],
+    starts: States<'_>,
     sink: &mut dyn FnMut(&[f32]) -> Result<()>,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<()> {
     let task = ReachAvoidTask {
-        starts: Starts::listed(starts),
+        starts: Starts::Listed(starts),
         range: 0..starts.len() as u64,
         spec,
         tightening: &Tightening::none(&spec),
         query: Query::Measure,
     };
-    backend.reach_avoid(plant, &task, &mut |_, values| sink(values))
+    program.reach_avoid(&task, &mut |_, values| sink(values))
 }
 
 /// How the starts fared.

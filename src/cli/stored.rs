@@ -6,14 +6,11 @@ use super::args::Global;
 use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::progress::Progress;
 use super::{Outcome, devices, report};
-use crate::config::{Config, Job, PolicySource};
+use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
 use crate::files::{Staged, StateReader};
-use crate::policy::Policy;
-use crate::rollout::Plant;
 use crate::scenario::record::Record;
 use crate::scenario::{self, CheckReport, Finding, QueryRow};
-use crate::system::System;
 
 /// A stored certificate with the configuration and the policy that it was made with.
 struct Stored {
@@ -54,8 +51,7 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     let stored = Stored::read(global, folder)?;
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
-    let job = Ask { global, stored: &stored, states };
-    let rows = stored.config.with_plant(&stored.policy, job)?;
+    let rows = ask(global, &stored, states)?;
     match staged {
         None => report(global, &rows, || csv(&rows))?,
         Some(staged) => {
@@ -66,33 +62,18 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     Ok(Outcome::Done)
 }
 
-/// `query` for one plant.
-struct Ask<'a> {
-    global: &'a Global,
-    stored: &'a Stored,
-    states: &'a Path,
-}
-
-impl Job for Ask<'_> {
-    type Output = Vec<QueryRow>;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<Vec<QueryRow>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let names = plant.system.states().map(|axis| axis.name);
-        let states = StateReader::<NX>::open(self.states, names)?.rest()?;
-        let Stored { record, config, .. } = self.stored;
-        let settings = config.settings(&plant.system.states())?;
-        let backend = devices::open(self.global)?;
-        let rows = scenario::query(&backend, plant, record, &settings, &states)?;
-        devices::note_events(self.global, &backend);
-        Ok(rows)
-    }
+/// Tier and margins of the states of a file.
+fn ask(global: &Global, stored: &Stored, states: &Path) -> Result<Vec<QueryRow>> {
+    let Stored { record, config, policy } = stored;
+    let plant = config.plant(policy)?;
+    let names = plant.model.states.iter().map(|axis| axis.name.clone()).collect();
+    let states = StateReader::open(states, names)?.rest()?;
+    let settings = config.settings(&plant.model.states)?;
+    let backend = devices::open(global)?;
+    let program = backend.prepare(&plant)?;
+    let rows = scenario::query(&program, record, &settings, states.view())?;
+    devices::note_events(global, &backend);
+    Ok(rows)
 }
 
 /// Writes the rows to `query.csv`.
@@ -125,8 +106,7 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
 /// Verifies the certificate in the folder again.
 pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
     let stored = Stored::read(global, folder)?;
-    let job = Verify { global, stored: &stored };
-    let mut found = stored.config.with_plant(&stored.policy, job)?;
+    let mut found = verify(global, &stored)?;
     // Of a record that does not hold, a page may not even be made.
     if found.holds {
         found.add(files(folder, &stored.record)?);
@@ -160,31 +140,17 @@ fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
-/// `check` for one plant.
-struct Verify<'a> {
-    global: &'a Global,
-    stored: &'a Stored,
-}
-
-impl Job for Verify<'_> {
-    type Output = CheckReport;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<CheckReport>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let Stored { record, config, .. } = self.stored;
-        let settings = config.settings(&plant.system.states())?;
-        let backend = devices::open(self.global)?;
-        let progress = Progress::new(self.global);
-        let found = scenario::check(&backend, plant, record, &settings, &progress)?;
-        devices::note_events(self.global, &backend);
-        Ok(found)
-    }
+/// Computes a certificate again and tries its claims on fresh scenarios.
+fn verify(global: &Global, stored: &Stored) -> Result<CheckReport> {
+    let Stored { record, config, policy } = stored;
+    let plant = config.plant(policy)?;
+    let settings = config.settings(&plant.model.states)?;
+    let backend = devices::open(global)?;
+    let progress = Progress::new(global);
+    let program = backend.prepare(&plant)?;
+    let found = scenario::check(&program, record, &settings, &progress)?;
+    devices::note_events(global, &backend);
+    Ok(found)
 }
 
 /// The findings, a line each, and the verdict.

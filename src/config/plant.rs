@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use super::section::{Config, SystemSection};
 use super::settings::positive_f32;
 use crate::error::{Error, Result};
+use crate::model;
 use crate::policy::{Mlp, Policy};
 use crate::rollout::Plant;
-use crate::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use crate::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
 
 /// Work on a plant of any system and policy.
 pub trait Job {
@@ -79,6 +80,37 @@ impl Config {
             (Some(file), _) => PolicySource::read(folder.join(file)),
             (None, Some(formula)) => Ok(PolicySource::Formula(formula.clone())),
             (None, None) => Err(Error::invalid("policy", "neither `file` nor `formula`")),
+        }
+    }
+
+    /// The plant: model and policy, checked against each other.
+    ///
+    /// # Errors
+    /// Those of [`Config::with_plant`].
+    pub fn plant(&self, policy: &PolicySource) -> Result<model::Plant> {
+        let network = |axes: &[Axis], controls: usize, path: &Path, network: &Mlp| {
+            let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+            network.check_fits(&names, controls).map_err(|problem| Error::file(path, problem))?;
+            Ok(network.clone())
+        };
+        match (self.any_system()?, policy) {
+            (AnySystem::DroneRace(system), PolicySource::Formula(name)) => {
+                Err(no_formula(&system, name, "none"))
+            }
+            (AnySystem::DoubleIntegrator(system), PolicySource::Formula(name)) => {
+                if name != "bang-bang" {
+                    return Err(no_formula(&system, name, "bang-bang"));
+                }
+                let acceleration = system.acceleration;
+                Ok(model::Plant::of(system, BangBang { acceleration }))
+            }
+            (AnySystem::DroneRace(system), PolicySource::Network { path, network: mlp, .. }) => {
+                Ok(model::Plant::of(system, network(&system.states(), 3, path, mlp)?))
+            }
+            (
+                AnySystem::DoubleIntegrator(system),
+                PolicySource::Network { path, network: mlp, .. },
+            ) => Ok(model::Plant::of(system, network(&system.states(), 1, path, mlp)?)),
         }
     }
 

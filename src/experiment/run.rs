@@ -25,7 +25,6 @@ use crate::digest;
 use crate::error::{Error, Result};
 use crate::files::{Staged, claim_folder};
 use crate::policy::Mlp;
-use crate::rollout::Plant;
 use crate::scenario::settings::Joint;
 use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
@@ -37,7 +36,7 @@ const MOST_STREAMS: u64 = 1 << 24;
 const RECORD_BYTES: u64 = 2 << 20;
 
 /// What is to be raced.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Experiment<'a> {
     /// What controllers are made of.
     pub world: World<'a>,
@@ -213,11 +212,9 @@ impl Experiment<'_> {
         absent: Vec<(Name, String)>,
         watch: &dyn Watch,
     ) -> Result<RaceRecord> {
-        let World { backend, system, policy, value, disturbance, ppo, race, certificates } =
-            self.world;
+        let World { program, value, disturbance, ppo, race, certificates, .. } = self.world;
         let hybrid = summaries.iter().find(|(name, _)| *name == Name::Hybrid);
         let hybrid = hybrid.map(|(_, summary)| summary);
-        let plant = Plant { system, policy };
         let absent = absent
             .into_iter()
             .map(|(name, reason)| AbsentRecord { name: name.text().to_owned(), reason });
@@ -233,7 +230,7 @@ impl Experiment<'_> {
         let disturbance = disturbance.filter(|_| tiered);
         Ok(RaceRecord {
             schema: RACE_SCHEMA,
-            provenance: provenance(backend, plant, certificates.seed, self.config.clone()),
+            provenance: provenance(program, certificates.seed, self.config.clone()),
             value_sha256: value.map(Mlp::digest),
             disturbance_sha256: disturbance.map(Mlp::digest),
             ppo_sha256: ppo.map(Mlp::digest),
@@ -273,9 +270,9 @@ impl Experiment<'_> {
 
     /// What V_check is computed with.
     fn bounds(&self) -> Result<BoundsRecord> {
-        let World { backend, system, policy, certificates, .. } = self.world;
+        let World { program, certificates, .. } = self.world;
         let asked = Asked { global: true, local: false, domain: Domain::Anywhere };
-        let certifier = Certifier::new(backend, Plant { system, policy }, certificates, asked)?;
+        let certifier = Certifier::new(program, certificates, asked)?;
         let Tightened { constants, deviation, .. } = certifier.tightened().clone();
         Ok(BoundsRecord { constants, deviation, band: certifier.band() })
     }
@@ -326,11 +323,9 @@ impl Experiment<'_> {
 
     /// Everything that the races depend on but their controller and noise seed, the program included.
     pub(super) fn manifest(&self) -> serde_json::Value {
-        let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
-            self.world;
+        let World { program, value, disturbance, ppo, certificates, .. } = self.world;
         let digest = |network: Option<&Mlp>| network.map(Mlp::digest);
-        let origin =
-            provenance(backend, Plant { system, policy }, certificates.seed, self.config.clone());
+        let origin = provenance(program, certificates.seed, self.config.clone());
         serde_json::json!({
             "schema": RACE_SCHEMA,
             "program_sha256": program_sha256(),

@@ -7,19 +7,20 @@ use std::path::{Path, PathBuf};
 use super::Format;
 use super::array::NpyHeader;
 use crate::error::{Error, Result};
+use crate::rollout::StateList;
 
 /// Longest line of a .csv file, bytes.
 const LONGEST_LINE: u64 = 65_536;
 
-/// States one after the other, `NX` finite numbers each.
+/// States one after the other, as many finite numbers each as there are names.
 ///
-/// A .npy file holds f32 or f64, little-endian, of shape `[N, NX]`. A .csv file holds a state per
+/// A .npy file holds f32 or f64, little-endian, of shape `[N, states]`. A .csv file holds a state per
 /// line; a header, plain or after `#`, has to name the states in order.
 #[derive(Debug)]
-pub struct StateReader<const NX: usize> {
+pub struct StateReader {
     path: PathBuf,
     rows: Rows,
-    names: [String; NX],
+    names: Vec<String>,
     read: u64,
 }
 
@@ -32,12 +33,12 @@ enum Rows {
     Csv { file: BufReader<File>, number: u64 },
 }
 
-impl<const NX: usize> StateReader<NX> {
+impl StateReader {
     /// Opens `path`, .npy or .csv; `names` are those of the states.
     ///
     /// # Errors
     /// [`Error::File`] if it is missing, or its type or shape is not that of states.
-    pub fn open(path: &Path, names: [String; NX]) -> Result<Self> {
+    pub fn open(path: &Path, names: Vec<String>) -> Result<Self> {
         let format = Format::of(path)?;
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         let size = file.metadata().map_err(|e| Error::file(path, e))?.len();
@@ -46,7 +47,7 @@ impl<const NX: usize> StateReader<NX> {
             Format::Csv => Rows::Csv { file, number: 0 },
             Format::Npy => {
                 let (bytes, left) = NpyHeader::read(&mut file)
-                    .and_then(|header| check::<NX>(&header, size))
+                    .and_then(|header| check(&header, names.len(), size))
                     .map_err(|problem| Error::file(path, problem))?;
                 Rows::Npy { file, bytes, left }
             }
@@ -66,11 +67,11 @@ impl<const NX: usize> StateReader<NX> {
     ///
     /// # Errors
     /// [`Error::File`] naming the row that is damaged, of the wrong width, or not finite.
-    pub fn next(&mut self, most: usize) -> Result<Vec<[f32; NX]>> {
-        let mut states = Vec::new();
+    pub fn next(&mut self, most: usize) -> Result<StateList> {
+        let mut states = StateList::new(self.names.len());
         while states.len() < most {
             let row = match &mut self.rows {
-                Rows::Npy { file, bytes, left } => npy_row(file, *bytes, left),
+                Rows::Npy { file, bytes, left } => npy_row(file, self.names.len(), *bytes, left),
                 Rows::Csv { file, number } => csv_row(file, number, &self.names),
             };
             let at = |problem| Error::file(&self.path, problem);
@@ -79,7 +80,7 @@ impl<const NX: usize> StateReader<NX> {
                 let (name, row) = (&self.names[i], self.read);
                 return Err(at(format!("state {row} (from 0): {name} is not a finite f32")));
             }
-            states.push(state);
+            states.push(&state);
             self.read += 1;
         }
         if self.read == 0 {
@@ -92,14 +93,15 @@ impl<const NX: usize> StateReader<NX> {
     ///
     /// # Errors
     /// As [`StateReader::next`].
-    pub fn rest(mut self) -> Result<Vec<[f32; NX]>> {
+    pub fn rest(mut self) -> Result<StateList> {
         self.next(usize::MAX)
     }
 }
 
 /// Bytes of an element and number of rows of an array of states in a file of `size` bytes.
-fn check<const NX: usize>(
+fn check(
     header: &NpyHeader,
+    states: usize,
     size: u64,
 ) -> std::result::Result<(usize, u64), String> {
     let NpyHeader { descr, shape, .. } = header;
@@ -109,15 +111,17 @@ fn check<const NX: usize>(
         other => return Err(format!("dtype {other}, expected <f4 or <f8 (f32 or f64)")),
     };
     let &[rows, columns] = shape.as_slice() else {
-        return Err(format!("shape {shape:?}, expected [N, {NX}]"));
+        return Err(format!("shape {shape:?}, expected [N, {states}]"));
     };
-    if columns != NX as u64 {
-        return Err(format!("shape {shape:?}, expected [N, {NX}]: a state has {NX} numbers"));
+    if columns != states as u64 {
+        return Err(format!(
+            "shape {shape:?}, expected [N, {states}]: a state has {states} numbers"
+        ));
     }
     if header.fortran_order {
         return Err("stored column by column; save it in C order".to_owned());
     }
-    let need = rows.checked_mul((NX * bytes) as u64);
+    let need = rows.checked_mul((states * bytes) as u64);
     if need.is_none_or(|need| need > size) {
         return Err(format!("truncated: {rows} states announced, the file has {size} bytes"));
     }
@@ -125,16 +129,17 @@ fn check<const NX: usize>(
 }
 
 /// The next row of an array.
-fn npy_row<const NX: usize>(
+fn npy_row(
     file: &mut BufReader<File>,
+    states: usize,
     bytes: usize,
     left: &mut u64,
-) -> std::result::Result<Option<[f32; NX]>, String> {
+) -> std::result::Result<Option<Vec<f32>>, String> {
     if *left == 0 {
         return Ok(None);
     }
     *left -= 1;
-    let mut state = [0.0; NX];
+    let mut state = vec![0.0; states];
     for value in &mut state {
         let mut buffer = [0; 8];
         let element = &mut buffer[..bytes];
@@ -148,11 +153,11 @@ fn npy_row<const NX: usize>(
 }
 
 /// The state of the next line that has one; a header is checked against `names`.
-fn csv_row<const NX: usize>(
+fn csv_row(
     file: &mut BufReader<File>,
     number: &mut u64,
-    names: &[String; NX],
-) -> std::result::Result<Option<[f32; NX]>, String> {
+    names: &[String],
+) -> std::result::Result<Option<Vec<f32>>, String> {
     loop {
         let mut line = String::new();
         let limited = &mut file.by_ref().take(LONGEST_LINE);
@@ -174,16 +179,13 @@ fn csv_row<const NX: usize>(
             Some(_) if fields.len() == 1 => {}
             Some(_) => check_names(&fields, names)?,
             None if plain => check_names(&fields, names)?,
-            None => return parse_row(&fields, *number).map(Some),
+            None => return parse_row(&fields, names.len(), *number).map(Some),
         }
     }
 }
 
 /// Refuses a header that does not name the states in order.
-fn check_names<const NX: usize>(
-    fields: &[&str],
-    names: &[String; NX],
-) -> std::result::Result<(), String> {
+fn check_names(fields: &[&str], names: &[String]) -> std::result::Result<(), String> {
     if fields.iter().eq(names) {
         return Ok(());
     }
@@ -192,15 +194,12 @@ fn check_names<const NX: usize>(
 }
 
 /// The numbers of a line.
-fn parse_row<const NX: usize>(
-    fields: &[&str],
-    number: u64,
-) -> std::result::Result<[f32; NX], String> {
-    if fields.len() != NX {
+fn parse_row(fields: &[&str], states: usize, number: u64) -> std::result::Result<Vec<f32>, String> {
+    if fields.len() != states {
         let found = fields.len();
-        return Err(format!("line {number} has {found} numbers, a state has {NX}"));
+        return Err(format!("line {number} has {found} numbers, a state has {states}"));
     }
-    let mut state = [0.0; NX];
+    let mut state = vec![0.0; states];
     for (value, field) in state.iter_mut().zip(fields) {
         // Through f64, as for arrays: one rounding to f32 from the number as written.
         let parsed = field.parse::<f64>();

@@ -1,18 +1,25 @@
 //! The model: a plant and its task as plain data, recorded from Rust or read from text.
 
+mod controller;
+mod identity;
+mod plant;
 mod recorded;
 
-pub use recorded::recorded_policy;
+use std::sync::Arc;
+
+pub use controller::{Controller, Law};
+pub use plant::Plant;
 
 use crate::formula::Graph;
 pub use crate::system::Parameter;
 use crate::system::{Axis, Body};
+use crate::tile::NativeSystem;
 
 /// A plant and its task: what a batch of rollouts is about.
 ///
 /// Every formula takes the inputs that [`Model::inputs`] counts, in this order: the states, the
 /// controls, the parameters, the time in seconds, the number of the step.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Model {
     /// Short name, lower case with hyphens.
     pub name: String,
@@ -32,6 +39,8 @@ pub struct Model {
     pub constraint: Graph,
     /// The bodies that a picture shows.
     pub bodies: Vec<Body>,
+    /// The system as compiled, where it is written in Rust; its parameters are those of the model.
+    pub(crate) native: Option<Arc<dyn NativeSystem>>,
 }
 
 impl Model {

@@ -1,11 +1,12 @@
 //! Models recorded from systems that are written in Rust.
 
 use std::array::from_fn;
+use std::sync::Arc;
 
 use super::Model;
 use crate::formula::{Expr, Graph, record_with};
-use crate::policy::Policy;
 use crate::system::System;
+use crate::tile::CompiledSystem;
 
 impl Model {
     /// The model of `system`: its formulas recorded, its declared parameters as inputs.
@@ -13,17 +14,17 @@ impl Model {
     /// ```
     /// use reachcast::model::Model;
     /// use reachcast::system::DoubleIntegrator;
-    /// let model = Model::of(&DoubleIntegrator::default());
+    /// let model = Model::of(DoubleIntegrator::default());
     /// assert_eq!(model.states.len(), 2);
     /// // Position and velocity; the control; no more than it declares; time and step.
     /// assert_eq!(model.inputs(), 2 + 1 + model.parameters.len() + 2);
     /// ```
-    pub fn of<S, const NX: usize, const NU: usize>(system: &S) -> Self
+    pub fn of<S, const NX: usize, const NU: usize>(system: S) -> Self
     where
-        S: System<NX, NU>,
+        S: System<NX, NU> + Send + Sync + 'static,
     {
         let record = |formula: &dyn Fn([Expr; NX], [Expr; NU]) -> Vec<Expr>| {
-            recorded(system, |x, u| formula(x, u))
+            recorded(&system, |x, u| formula(x, u))
         };
         Self {
             name: system.name().to_owned(),
@@ -35,21 +36,13 @@ impl Model {
             target: record(&|x, _| vec![system.target(x)]),
             constraint: record(&|x, _| vec![system.constraint(x)]),
             bodies: system.bodies(),
+            native: Some(Arc::new(CompiledSystem(system))),
         }
     }
 }
 
-/// The formula of `policy`, with the inputs of the model of `system`.
-pub fn recorded_policy<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Graph
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    recorded(system, |x, _: [Expr; NU]| policy.control(x).to_vec())
-}
-
 /// Records `formula` of state and control with the inputs of the model of `system`.
-fn recorded<S, const NX: usize, const NU: usize>(
+pub(super) fn recorded<S, const NX: usize, const NU: usize>(
     system: &S,
     formula: impl FnOnce([Expr; NX], [Expr; NU]) -> Vec<Expr>,
 ) -> Graph

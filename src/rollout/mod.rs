@@ -5,8 +5,10 @@ mod mppi;
 mod noise;
 mod philox;
 mod reference;
+pub mod replay;
 mod sample;
 mod spec;
+mod states;
 
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
 pub use mppi::{
@@ -17,9 +19,10 @@ pub use noise::{Noise, NoiseShape, SPLINE_SUPPORT, SplineRow};
 pub use philox::philox;
 pub use reference::{measure, pair_measures, trajectory};
 pub use sample::{
-    Ball, GENERATOR, Pairs, Purpose, Region, Starts, States, Stream, normal_pair, sample_ball,
+    Ball, GENERATOR, Pairs, Purpose, Region, Starts, Stream, normal_pair, sample_ball,
 };
 pub use spec::{
     DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Plant, Query, ReachAvoidTask,
     RolloutSpec, Tightening,
 };
+pub use states::{StateList, States};

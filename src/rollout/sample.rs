@@ -1,6 +1,7 @@
 //! Random starts: every sample is a function of seed, stream and index, on every backend.
 
 use super::philox::philox;
+use super::states::States;
 use crate::error::{Error, Result};
 use crate::real::{Lanes, Real, per_lane};
 
@@ -333,67 +334,6 @@ pub fn sample_ball<const N: usize>(
     let scale = one / square.sqrt();
     for z in x {
         *z = *z * scale;
-    }
-}
-
-/// States one after the other: `[count, size]`, borrowed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct States<'a> {
-    size: usize,
-    numbers: &'a [f32],
-}
-
-impl<'a> States<'a> {
-    /// States of `size` numbers each.
-    ///
-    /// # Panics
-    /// If `size` is 0, or the numbers are no whole number of states.
-    pub fn new(numbers: &'a [f32], size: usize) -> Self {
-        assert!(numbers.len().is_multiple_of(size), "states of {size} numbers");
-        Self { size, numbers }
-    }
-
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        self.numbers.len() / self.size
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.numbers.is_empty()
-    }
-
-    /// Numbers of a state.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
-    /// The state number `index`.
-    pub fn row(&self, index: usize) -> &'a [f32] {
-        &self.numbers[index * self.size..][..self.size]
-    }
-
-    /// One after the other.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = &'a [f32]> + use<'a> {
-        self.numbers.chunks_exact(self.size)
-    }
-}
-
-impl<'a, const NX: usize> From<&'a [[f32; NX]]> for States<'a> {
-    fn from(list: &'a [[f32; NX]]) -> Self {
-        Self::new(list.as_flattened(), NX)
-    }
-}
-
-impl<'a, const NX: usize> From<&'a Vec<[f32; NX]>> for States<'a> {
-    fn from(list: &'a Vec<[f32; NX]>) -> Self {
-        list.as_slice().into()
-    }
-}
-
-impl<'a, const NX: usize, const COUNT: usize> From<&'a [[f32; NX]; COUNT]> for States<'a> {
-    fn from(list: &'a [[f32; NX]; COUNT]) -> Self {
-        list.as_slice().into()
     }
 }
 

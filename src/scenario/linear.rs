@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use crate::model::Model;
 use crate::real::bound::{Domain, Enclosure, Interval, enclose};
-use crate::system::System;
+use crate::system::Axis;
 
 /// Width of a derivative, relative to the largest of the matrix, that is taken to be rounding:
 /// 2^-44, five hundred times the spacing of f64, and far below any nonlinearity that matters.
@@ -13,28 +14,22 @@ const ROUNDING: f64 = 1.0 / (1_u64 << 44) as f64;
 const SINGULAR_VALUE: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// The state matrix `A` `[NX, NX]`, if `step` is `A x + b(u)` for every `x` and each `u` in its
-/// bounds.
+/// bounds, at any step up to `horizon`.
 ///
 /// Every derivative by a state, enclosed over the whole state space and all controls, must be one
 /// number up to rounding.
-pub fn state_matrix<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-) -> Option<DMatrix<f64>> {
-    let controls = system.controls();
-    let ends = |state: f64, control: [f32; NU]| -> Vec<f64> {
-        let controls = control.iter().map(|&end| f64::from(end));
-        std::iter::repeat_n(state, NX).chain(controls).collect()
+pub fn state_matrix(model: &Model, horizon: u32) -> Option<DMatrix<f64>> {
+    let states = model.states.len();
+    let ends = |state: f64, side: fn(&Axis) -> f32, step: u32| -> Vec<f64> {
+        let controls: Vec<f64> = model.controls.iter().map(|axis| f64::from(side(axis))).collect();
+        model.arguments(&vec![state; states], &controls, step)
     };
-    let low = ends(f64::NEG_INFINITY, std::array::from_fn(|i| controls[i].low));
-    let high = ends(f64::INFINITY, std::array::from_fn(|i| controls[i].high));
-    let varies: Vec<bool> = (0..NX + NU).map(|i| i < NX).collect();
+    let low = ends(f64::NEG_INFINITY, |axis| axis.low, 0);
+    let high = ends(f64::INFINITY, |axis| axis.high, horizon);
+    let varies: Vec<bool> = (0..low.len()).map(|i| i < states).collect();
     let domain = Domain { low: &low, high: &high, varies: &varies };
-    let outputs = enclose(domain, |inputs| {
-        let x = std::array::from_fn(|i| inputs[i]);
-        let u = std::array::from_fn(|i| inputs[NX + i]);
-        system.step(x, u).to_vec()
-    });
-    constant_derivatives(&outputs, NX)
+    let outputs = enclose(domain, |inputs| model.step.eval(inputs));
+    constant_derivatives(&outputs, states)
 }
 
 /// The matrix of derivatives, if each is one number over all pieces.

@@ -8,13 +8,12 @@ use super::derived::derived;
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
 use super::settings::Settings;
 use super::{Context, Unwatched, Watch, compare, global};
-use crate::backend::Backend;
+use crate::backend::Program;
 use crate::error::{Error, Result};
-use crate::policy::Policy;
+use crate::model::Plant;
 use crate::rollout::{
-    Ball, Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening,
+    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
 };
-use crate::system::System;
 
 /// Fresh starts that a verified ball is tried with.
 const FRESH_STARTS: u64 = 20_000;
@@ -72,12 +71,7 @@ impl CheckReport {
 }
 
 /// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-pub(super) fn tier<const NX: usize>(
-    target_margin: f64,
-    check_margin: f64,
-    growth: &GrowthRecord,
-    x: &[f32; NX],
-) -> u8 {
+pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord, x: &[f32]) -> u8 {
     let local = || verified_ball(growth).is_some_and(|ball| ball.contains(x));
     match () {
         () if target_margin > 0.0 => 0,
@@ -98,14 +92,7 @@ fn verified_ball(growth: &GrowthRecord) -> Option<Ball> {
 }
 
 /// Refuses a record that is not of this plant.
-fn check_identity<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    record: &Record,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
     let refuse = |field: &str, stored: &str, found: &str| {
         Err(Error::Refused(format!(
             "{field} is {stored} in the record, {found} here; certify again"
@@ -116,12 +103,12 @@ where
     if record.schema != SCHEMA {
         return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());
     }
-    if record.system.name != plant.system.name() {
-        return refuse("system.name", &record.system.name, plant.system.name());
+    if record.system.name != plant.model.name {
+        return refuse("system.name", &record.system.name, &plant.model.name);
     }
-    if record.system.states.len() != NX {
+    if record.system.states.len() != plant.model.states.len() {
         let found = record.system.states.len().to_string();
-        return refuse("system.states length", &found, &NX.to_string());
+        return refuse("system.states length", &found, &plant.model.states.len().to_string());
     }
     if stored.physics_sha256 != physics {
         return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
@@ -138,18 +125,9 @@ where
 }
 
 /// Refuses a record of which some field does not follow from its settings and its own counts.
-fn check_derived<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    record: &Record,
-    settings: &Settings<NX>,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let mut again = derived(plant, settings, record)?;
-    let here = provenance(backend, plant, settings.seed, record.provenance.config.clone());
+fn check_derived(program: &Program<'_>, record: &Record, settings: &Settings) -> Result<()> {
+    let mut again = derived(program.plant(), settings, record)?;
+    let here = provenance(program, settings.seed, record.provenance.config.clone());
     again.provenance = here;
     let finding = compare::fields(record, &again);
     if finding.holds {
@@ -163,22 +141,18 @@ where
 /// # Errors
 /// [`Error::Refused`] if the record is of another plant, or if a field does not follow from its
 /// settings and its own counts; those of the backend.
-pub fn query<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+pub fn query(
+    program: &Program<'_>,
     record: &Record,
-    settings: &Settings<NX>,
-    states: &[[f32; NX]],
-) -> Result<Vec<QueryRow>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+    settings: &Settings,
+    states: States<'_>,
+) -> Result<Vec<QueryRow>> {
+    let plant = program.plant();
     check_identity(plant, record)?;
-    check_derived(backend, plant, record, settings)?;
+    check_derived(program, record, settings)?;
     let spec = settings.spec;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
-    let context = Context { backend, plant, watch: &Unwatched };
+    let context = Context { program, watch: &Unwatched };
     let margins = global::check_margins(
         context,
         &spec,
@@ -187,8 +161,8 @@ where
         Query::Measure,
         record.global.band,
     )?;
-    let row = |(x, check_margin): (&[f32; NX], f32)| {
-        let target_margin: f32 = plant.system.target(*x);
+    let row = |(x, check_margin): (&[f32], f32)| {
+        let target_margin: f32 = plant.model.target_at(x, 0);
         let check = f64::from(check_margin);
         let tier = tier(f64::from(target_margin), check, &record.growth, x);
         QueryRow { tier, check_margin, target_margin }
@@ -203,20 +177,15 @@ where
 ///
 /// # Errors
 /// [`Error::Refused`] if the record is of another plant; those of the backend.
-pub fn check<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+pub fn check(
+    program: &Program<'_>,
     record: &Record,
-    settings: &Settings<NX>,
+    settings: &Settings,
     watch: &dyn Watch,
-) -> Result<CheckReport>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    check_identity(plant, record)?;
-    let again = certify(backend, plant, settings, record.provenance.config.clone(), watch)?;
-    let context = Context { backend, plant, watch };
+) -> Result<CheckReport> {
+    check_identity(program.plant(), record)?;
+    let again = certify(program, settings, record.provenance.config.clone(), watch)?;
+    let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
     findings.push(compare::fields(record, &again));
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
@@ -309,15 +278,7 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
 }
 
 /// Failures among fresh starts in the verified ball.
-fn fresh_failures<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    ball: Ball,
-) -> Result<u64>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
     context.watch.begin("fresh starts in the ball", FRESH_STARTS);
     let stream = Stream::new(settings.seed, Purpose::Check, 1);
     let tightening = Tightening::none(&settings.spec);
@@ -329,7 +290,7 @@ where
         query: Query::Sign,
     };
     let mut failures = 0;
-    context.backend.reach_avoid(context.plant, &task, &mut |_, values| {
+    context.program.reach_avoid(&task, &mut |_, values| {
         failures += values.iter().filter(|value| **value <= 0.0).count() as u64;
         context.watch.advance(values.len() as u64)
     })?;

@@ -12,6 +12,7 @@ mod mppi;
 mod mppi_rollout;
 mod mppi_update;
 mod packs;
+mod prepared;
 mod reach_avoid;
 mod schedule;
 mod spread;
@@ -25,17 +26,17 @@ use self::deviation::Deviation;
 use self::dispatch::{rows, run};
 use self::mlp::Packed;
 use self::packs::Packs;
+pub(super) use self::prepared::Prepared;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
 use self::tile::{Drive, Driven};
+use super::program::check_task;
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
 use crate::policy::{Mlp, Policy};
 use crate::real::simd::Instructions;
-use crate::rollout::{
-    DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask, RolloutSpec, Starts, Tightening,
-};
+use crate::rollout::{DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask};
 use crate::system::System;
 use crate::tile::{Clock, CompiledPolicy, CompiledSystem, Layout};
 
@@ -147,7 +148,7 @@ impl Cpu {
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
-        check(&task.starts, task.range.end, task.tightening, &task.spec)?;
+        check_task(&task.starts, task.range.end, task.tightening, &task.spec)?;
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, plant.drive.network());
@@ -169,7 +170,7 @@ impl Cpu {
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
-        check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
+        check_task(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
@@ -229,24 +230,6 @@ impl Cpu {
         let threads = self.pool.current_num_threads();
         Schedule::new(count, threads, network.map(Packed::widest))
     }
-}
-
-/// Checks a task against its list of starts and its horizon.
-fn check(starts: &Starts<'_>, end: u64, tightening: &Tightening, spec: &RolloutSpec) -> Result<()> {
-    if let Starts::Listed(list) = starts
-        && end > list.len() as u64
-    {
-        let problem = format!("ends at {end}, but the list has {} starts", list.len());
-        return Err(Error::invalid("range of starts", problem));
-    }
-    let steps = spec.horizon as usize + 1;
-    for values in [&tightening.target, &tightening.constraint] {
-        if values.len() != steps {
-            let problem = format!("has {} values, expected {steps}, T + 1", values.len());
-            return Err(Error::invalid("tightening", problem));
-        }
-    }
-    Ok(())
 }
 
 /// The processor's name as the system knows it, else its architecture.

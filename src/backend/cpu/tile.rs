@@ -188,11 +188,21 @@ impl<const N: usize> Body for Judge<'_, N> {
         for row in self.frame.states() {
             largest = with_largest(largest, lanes(self.frame, row, self.at));
         }
-        for margin in [target, constraint] {
-            largest = with_largest(largest, margin);
-        }
+        let margins = [target, constraint].map(|margin| {
+            // Infinite margins are satisfied or violated, only a NaN fails the rollout.
+            let numbers = per_lane!(N, i => bounded(margin.0[i]));
+            largest = with_largest(largest, Lanes(numbers));
+            Lanes(numbers)
+        });
+        let [target, constraint] = margins;
         self.score.add(target, constraint, largest, self.gamma);
     }
+}
+
+/// An infinite margin as the largest number; NaN stays.
+#[inline(always)]
+fn bounded(margin: f32) -> f32 {
+    if margin.abs().to_bits() == EXPONENT { f32::MAX.copysign(margin) } else { margin }
 }
 
 /// The larger of `largest` and the bits of `values` without their sign.

@@ -16,6 +16,7 @@ mod mppi_plan;
 mod network;
 mod opened;
 mod plan;
+mod prepared;
 mod reach_avoid;
 mod recover;
 mod run;
@@ -43,6 +44,7 @@ pub use device::{Adapter, AdapterKind, Choice, adapters};
 pub use fault::Injection;
 pub use limits::DeviceLimits;
 pub use plan::NetworkKernels;
+pub(super) use prepared::Prepared;
 pub use timing::KernelTime;
 
 /// An adapter, and what becomes of the work where it fails.

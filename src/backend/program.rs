@@ -1,0 +1,113 @@
+//! A program: a plant prepared on a backend once, and called any number of times.
+
+use super::{Backend, MeasureSink, PairSink, cpu, gpu};
+use crate::error::{Error, Result};
+use crate::model::Plant;
+use crate::rollout::{DeviationTask, Farthest, ReachAvoidTask, RolloutSpec, Starts, Tightening};
+
+/// A plant prepared on a backend: nothing that its calls could share is done again by any of them.
+pub struct Program<'a> {
+    backend: &'a Backend,
+    plant: Plant,
+    prepared: Prepared<'a>,
+}
+
+/// What each backend keeps of a plant.
+enum Prepared<'a> {
+    Cpu(&'a cpu::Cpu, cpu::Prepared),
+    Gpu(gpu::Prepared<'a>),
+}
+
+impl Backend {
+    /// Prepares `plant`: its formulas for this backend, its network packed.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where network and model do not fit each other, and those of the device.
+    pub fn prepare(&self, plant: &Plant) -> Result<Program<'_>> {
+        let prepared = match self {
+            Self::Cpu(cpu) => Prepared::Cpu(cpu, cpu.prepare(plant)?),
+            Self::Gpu(gpu) => Prepared::Gpu(gpu.prepare(plant)?),
+        };
+        Ok(Program { backend: self, plant: plant.clone(), prepared })
+    }
+}
+
+impl Program<'_> {
+    /// The backend that it runs on.
+    pub fn backend(&self) -> &Backend {
+        self.backend
+    }
+
+    /// What it rolls out.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Reach-avoid measure, or its sign, of each start of `task`; sent to `sink` in order.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the parts of the task do not fit, those of the device, and the first
+    /// of the sink.
+    pub fn reach_avoid(&self, task: &ReachAvoidTask<'_>, sink: MeasureSink<'_>) -> Result<()> {
+        self.check(&task.starts, task.range.end, task.tightening, &task.spec)?;
+        match &self.prepared {
+            Prepared::Cpu(cpu, prepared) => prepared.reach_avoid(cpu, task, sink),
+            Prepared::Gpu(prepared) => prepared.reach_avoid(task, sink),
+        }
+    }
+
+    /// Rolls pairs out side by side: the farthest pair of each step, `[T + 1]`, and the measures
+    /// of each pair sent to `sink` in order.
+    ///
+    /// # Errors
+    /// Those of [`Program::reach_avoid`].
+    pub fn deviation(&self, task: &DeviationTask<'_>, sink: PairSink<'_>) -> Result<Vec<Farthest>> {
+        self.check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
+        match &self.prepared {
+            Prepared::Cpu(cpu, prepared) => prepared.deviation(cpu, task, sink),
+            Prepared::Gpu(prepared) => prepared.deviation(task, sink),
+        }
+    }
+
+    /// Checks a task once, in front of both backends.
+    fn check(
+        &self,
+        starts: &Starts<'_>,
+        end: u64,
+        tightening: &Tightening,
+        spec: &RolloutSpec,
+    ) -> Result<()> {
+        let (states, size) = (self.plant.model.states.len(), starts.size());
+        if size != states {
+            let problem = format!("starts of {size} numbers; the model has {states} states");
+            return Err(Error::invalid("starts", problem));
+        }
+        check_task(starts, end, tightening, spec)
+    }
+}
+
+/// Refuses a range beyond its list of starts, and a tightening that has not one entry per step.
+///
+/// # Errors
+/// [`Error::Invalid`] with the figures.
+pub(super) fn check_task(
+    starts: &Starts<'_>,
+    end: u64,
+    tightening: &Tightening,
+    spec: &RolloutSpec,
+) -> Result<()> {
+    if let Starts::Listed(list) = starts
+        && end > list.len() as u64
+    {
+        let problem = format!("ends at {end}, but the list has {} starts", list.len());
+        return Err(Error::invalid("range of starts", problem));
+    }
+    let steps = spec.horizon as usize + 1;
+    for values in [&tightening.target, &tightening.constraint] {
+        if values.len() != steps {
+            let problem = format!("has {} values, expected {steps}, T + 1", values.len());
+            return Err(Error::invalid("tightening", problem));
+        }
+    }
+    Ok(())
+}

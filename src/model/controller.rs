@@ -1,0 +1,75 @@
+//! Who drives a model: a formula, or a network with what stands around it.
+
+use std::sync::Arc;
+
+use crate::formula::Graph;
+use crate::policy::{Mlp, Policy};
+use crate::system::System;
+use crate::tile::{CompiledPolicy, NativeFormula};
+
+use super::recorded::recorded;
+
+/// A policy as data.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    /// Short name for reports.
+    pub name: String,
+    /// How the controls come about.
+    pub law: Law,
+    /// The formula as compiled, where it is written in Rust.
+    native: Option<Arc<dyn NativeFormula>>,
+}
+
+/// How controls come about.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Law {
+    /// A formula, `[controls]`, of the inputs of the model.
+    Formula(Graph),
+    /// A network.
+    Network {
+        /// What it sees, of the inputs of the model; the states in order if nothing is said.
+        observe: Option<Graph>,
+        /// The network.
+        network: Arc<Mlp>,
+        /// The controls, of the inputs of the model followed by what the network says; that itself
+        /// if nothing is said.
+        act: Option<Graph>,
+    },
+}
+
+impl Controller {
+    /// A policy as data, without anything compiled.
+    pub fn new(name: impl Into<String>, law: Law) -> Self {
+        Self { name: name.into(), law, native: None }
+    }
+
+    /// The controller that `policy` is for the model of `system`: its network, or its formula
+    /// recorded and kept as compiled.
+    pub fn of<S, P, const NX: usize, const NU: usize>(system: &S, policy: P) -> Self
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU> + Send + Sync + 'static,
+    {
+        let name = policy.name();
+        if let Some(network) = policy.network() {
+            let network = Arc::new(network.clone());
+            return Self::new(name, Law::Network { observe: None, network, act: None });
+        }
+        let graph = recorded(system, |x, _| policy.control(x).to_vec());
+        let native = Some(Arc::new(CompiledPolicy(policy)) as Arc<dyn NativeFormula>);
+        Self { name, law: Law::Formula(graph), native }
+    }
+
+    /// The network, if there is one.
+    pub fn network(&self) -> Option<&Mlp> {
+        match &self.law {
+            Law::Formula(_) => None,
+            Law::Network { network, .. } => Some(network),
+        }
+    }
+
+    /// The formula as compiled, where it is written in Rust.
+    pub(crate) fn native(&self) -> Option<&Arc<dyn NativeFormula>> {
+        self.native.as_ref()
+    }
+}

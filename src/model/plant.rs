@@ -1,0 +1,98 @@
+//! A model and who drives it: what rolls out, and its formulas one state at a time.
+
+use std::sync::Arc;
+
+use super::{Controller, Law, Model};
+use crate::formula::Graph;
+use crate::policy::Policy;
+use crate::real::Real;
+use crate::system::System;
+
+/// A model and who drives it.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// The model.
+    pub model: Arc<Model>,
+    /// Who drives it.
+    pub controller: Arc<Controller>,
+}
+
+impl Plant {
+    /// A model and who drives it.
+    pub fn new(model: Model, controller: Controller) -> Self {
+        Self { model: Arc::new(model), controller: Arc::new(controller) }
+    }
+
+    /// The plant of a system and a policy that are written in Rust.
+    ///
+    /// ```
+    /// use reachcast::model::Plant;
+    /// use reachcast::system::{BangBang, DoubleIntegrator};
+    /// let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
+    /// // At rest half a metre to the right, it accelerates to the left.
+    /// let u = plant.control(&[0.5_f64, 0.0], 0);
+    /// assert_eq!(plant.model.next(&[0.5, 0.0], &u, 0), [0.5, -f64::from(0.1_f32)]);
+    /// ```
+    pub fn of<S, P, const NX: usize, const NU: usize>(system: S, policy: P) -> Self
+    where
+        S: System<NX, NU> + Send + Sync + 'static,
+        P: Policy<NX, NU> + Send + Sync + 'static,
+    {
+        let controller = Controller::of(&system, policy);
+        Self::new(Model::of(system), controller)
+    }
+
+    /// The controls at `x`, `[controls]`, at a step.
+    pub fn control<R: Real>(&self, x: &[R], step: u32) -> Vec<R> {
+        let zeros = || vec![R::lit(0.0); self.model.controls.len()];
+        match &self.controller.law {
+            Law::Formula(graph) => graph.eval(&self.model.arguments(x, &zeros(), step)),
+            Law::Network { observe, network, act } => {
+                let inputs = || self.model.arguments(x, &zeros(), step);
+                let output = match observe {
+                    Some(observe) => network.forward(&observe.eval(&inputs())),
+                    None => network.forward(x),
+                };
+                match act {
+                    Some(act) => act.eval(&[inputs(), output].concat()),
+                    None => output,
+                }
+            }
+        }
+    }
+}
+
+impl Model {
+    /// The inputs of the formulas.
+    pub(crate) fn arguments<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
+        let parameters = self.parameters.iter().map(|parameter| R::lit(parameter.value));
+        // A step is a whole number below 2^24: exact.
+        let step = R::lit(step as f32);
+        let time = step * R::lit(self.period.unwrap_or(0.0));
+        x.iter().chain(u).copied().chain(parameters).chain([time, step]).collect()
+    }
+
+    /// The state after `x` under the control `u`, `[states]`.
+    pub fn next<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
+        self.step.eval(&self.arguments(x, u, step))
+    }
+
+    /// The target margin at `x`: positive inside the target set.
+    pub fn target_at<R: Real>(&self, x: &[R], step: u32) -> R {
+        self.margin(&self.target, x, step)
+    }
+
+    /// The constraint margin at `x`: positive where safe.
+    pub fn constraint_at<R: Real>(&self, x: &[R], step: u32) -> R {
+        self.margin(&self.constraint, x, step)
+    }
+
+    fn margin<R: Real>(&self, margin: &Graph, x: &[R], step: u32) -> R {
+        margin.eval_first(&self.at_state(x, step), &mut Vec::with_capacity(margin.nodes.len()))
+    }
+
+    /// The inputs of the formulas at a state, where no formula reads a control.
+    pub(crate) fn at_state<R: Real>(&self, x: &[R], step: u32) -> Vec<R> {
+        self.arguments(x, &vec![R::lit(0.0); self.controls.len()], step)
+    }
+}
