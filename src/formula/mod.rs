@@ -3,6 +3,8 @@
 mod expand;
 mod node;
 mod record;
+#[cfg(test)]
+mod tests;
 pub mod wgsl;
 
 pub use node::{Function, Node};

@@ -61,12 +61,15 @@ impl Real for f64 {
         f64::from(value)
     }
     fn hypot(self, rhs: Self) -> Self {
-        f64::hypot(self, rhs)
+        // The platform's is infinite where one side is, whatever the other.
+        self.if_lt(rhs, f64::hypot(self, rhs), f64::hypot(self, rhs))
     }
     fn powf(self, exponent: f32) -> Self {
         match Exponent::of(exponent) {
             Exponent::Whole(exponent) => Real::powi(self, exponent),
             Exponent::Root => f64::sqrt(self),
+            // The platform has 1 for 1 to any power.
+            Exponent::Other if exponent.is_nan() => f64::NAN,
             Exponent::Other => f64::powf(self, f64::from(exponent)),
         }
     }
@@ -115,7 +118,7 @@ impl Real for f64 {
         1.0 / (1.0 + f64::exp(-self))
     }
     fn exp_negative(self) -> Self {
-        f64::exp(self)
+        if self.is_nan() { 0.0 } else { f64::exp(self) }
     }
     fn ln_unit(self) -> Self {
         f64::ln(self)
