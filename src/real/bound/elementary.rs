@@ -189,9 +189,7 @@ pub(super) fn powf(x: Interval, exponent: f64) -> (Interval, Interval) {
     let value = |x: f64| outward(x.powf(exponent), x.powf(exponent));
     let beyond = Interval::point(exponent) * Interval::new(f64::MAX, f64::INFINITY);
     let slope = |x: f64| match (x == 0.0, x == f64::INFINITY) {
-        (false, false) => {
-            Interval::point(exponent) * value(x) * Interval::point(x).reciprocal()
-        }
+        (false, false) => Interval::point(exponent) * value(x) * Interval::point(x).reciprocal(),
         (true, _) if exponent > 1.0 => Interval::ZERO,
         (_, true) if exponent < 1.0 => Interval::ZERO,
         _ => beyond,

@@ -350,7 +350,8 @@ impl Real for Bound {
             Exponent::Root => self.sqrt(),
             Exponent::Other => {
                 let domain = |value: Interval| {
-                    exponent.is_finite() && if exponent > 0.0 { value.low >= 0.0 } else { value.low > 0.0 }
+                    exponent.is_finite()
+                        && if exponent > 0.0 { value.low >= 0.0 } else { value.low > 0.0 }
                 };
                 self.within(domain, |value| elementary::powf(value, f64::from(exponent)))
             }

@@ -23,10 +23,10 @@ mod avx512 {
         _mm512_add_ps as add, _mm512_and_si512 as and_int, _mm512_castps_si512 as as_int,
         _mm512_castsi512_ps as as_float, _mm512_cmp_ps_mask as compare,
         _mm512_cvtepi32_ps as to_float, _mm512_div_ps as div, _mm512_loadu_ps as load,
-        _mm512_mask_blend_ps as choose, _mm512_mul_ps as mul, _mm512_roundscale_ps as round, _mm512_set1_epi32 as splat_int,
-        _mm512_set1_ps as splat, _mm512_sqrt_ps as sqrt, _mm512_srli_epi32 as shift,
-        _mm512_storeu_ps as store, _mm512_sub_epi32 as sub_int, _mm512_sub_ps as sub,
-        _mm512_xor_ps as xor,
+        _mm512_mask_blend_ps as choose, _mm512_mul_ps as mul, _mm512_roundscale_ps as round,
+        _mm512_set1_epi32 as splat_int, _mm512_set1_ps as splat, _mm512_sqrt_ps as sqrt,
+        _mm512_srli_epi32 as shift, _mm512_storeu_ps as store, _mm512_sub_epi32 as sub_int,
+        _mm512_sub_ps as sub, _mm512_xor_ps as xor,
     };
     use std::arch::x86_64::{_mm512_mask_max_ps, _mm512_mask_min_ps, _mm512_max_ps};
 
@@ -69,11 +69,10 @@ mod avx2 {
         __m256 as Register, _mm256_add_epi32 as add_int, _mm256_add_ps as add,
         _mm256_and_si256 as and_int, _mm256_castps_si256 as as_int,
         _mm256_castsi256_ps as as_float, _mm256_cmp_ps as compare, _mm256_cvtepi32_ps as to_float,
-        _mm256_div_ps as div, _mm256_loadu_ps as load,
-        _mm256_mul_ps as mul, _mm256_round_ps as round, _mm256_set1_epi32 as splat_int,
-        _mm256_set1_ps as splat, _mm256_sqrt_ps as sqrt, _mm256_srli_epi32 as shift,
-        _mm256_storeu_ps as store, _mm256_sub_epi32 as sub_int, _mm256_sub_ps as sub,
-        _mm256_xor_ps as xor,
+        _mm256_div_ps as div, _mm256_loadu_ps as load, _mm256_mul_ps as mul,
+        _mm256_round_ps as round, _mm256_set1_epi32 as splat_int, _mm256_set1_ps as splat,
+        _mm256_sqrt_ps as sqrt, _mm256_srli_epi32 as shift, _mm256_storeu_ps as store,
+        _mm256_sub_epi32 as sub_int, _mm256_sub_ps as sub, _mm256_xor_ps as xor,
     };
     use std::arch::x86_64::{
         _mm256_andnot_ps, _mm256_blendv_ps, _mm256_max_ps, _mm256_min_ps, _mm256_or_ps,
