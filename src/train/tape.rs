@@ -268,11 +268,43 @@ mod tests {
                 let moved = |step: f64| {
                     let mut x = x;
                     x[i] += step;
-                    formula().eval(&x)[0]
+                    formula().expanded().eval(&x)[0]
                 };
                 let expected = (moved(1e-6) - moved(-1e-6)) / 2e-6;
                 let error = (found[i] - expected).abs();
                 assert!(error < 1e-6 * (1.0 + expected.abs()), "{x:?} {i}: {found:?} {expected}");
+            }
+        }
+    }
+
+    /// Every function, away from jumps and ends of domains.
+    fn functions() -> Graph {
+        record(3, |x| {
+            let [a, b, c] = [x[0], x[1], x[2]];
+            let positive = c * c + Expr::lit(0.1);
+            let angles = a.tan() + (Expr::lit(0.4) * b).asin() * (Expr::lit(0.3) * a).acos();
+            let turned = a.atan() + b.atan2(c) * (-a).atan2(b) + (Expr::lit(3.0) * a).wrap();
+            let grown = (a * b).exp() + positive.ln() + a.sigmoid();
+            let powers = c.powi(3) + positive.powi(-2) + positive.powf(1.3) + a.hypot(c);
+            vec![angles * turned + grown * powers + a.sign() * b]
+        })
+    }
+
+    /// The polynomials have the slopes of the functions that they stand for.
+    #[test]
+    fn functions_have_their_slopes() {
+        let tape = Tape::hard(&functions());
+        for x in [[0.7_f64, 0.3, 1.9], [-1.3, 0.8, 0.4], [1.2, -0.6, -1.5]] {
+            let (_, found) = slopes(&tape, &x, 1.0);
+            for i in 0..3 {
+                let moved = |step: f64| {
+                    let mut x = x;
+                    x[i] += step;
+                    functions().eval(&x)[0]
+                };
+                let expected = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                let error = (found[i] - expected).abs();
+                assert!(error < 1e-5 * (1.0 + expected.abs()), "{x:?} {i}: {found:?} {expected}");
             }
         }
     }
