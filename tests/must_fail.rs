@@ -7,15 +7,19 @@ mod common;
 #[path = "oracle/drive.rs"]
 mod drive;
 mod models;
+#[path = "oracle/functions.rs"]
+mod functions;
 #[path = "oracle/mppi.rs"]
 mod oracle;
 
 use std::array::from_fn;
 
 use common::{adapter, race_policy};
+use functions::{Case, disagreement};
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
+use reachcast::formula::Function;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::rollout::{
@@ -407,7 +411,7 @@ mutants! {
     largest_is_smallest: "b.x > a.x ||" => "b.x < a.x ||";
     perturbed_is_nominal: "perturbed = advance(perturbed, replayed, t);" => "perturbed = advance(nominal, replayed, t);";
     states_swapped: "let v1 = x[1];" => "let v1 = x[0];";
-    branches_turned: " < v" => " > v";
+    branches_turned: "a < b)" => "a > b)";
 }
 
 mutants! {
@@ -486,4 +490,51 @@ mutants! {
     beyond_the_last_row_as_in_it: "= 10.0f;" => "= 9.0f;";
     map_of_the_next_state: "total = charge(total, x, u, context_at(stage), nominal);" => "total = charge(total, advance(x, u), u, context_at(stage), nominal);";
     contexts_read_from_the_map: "let at = 165u + row" => "let at = row";
+}
+
+/// A mutant of what is printed of one function.
+macro_rules! function_mutants {
+    ($($name:ident: $case:expr, $old:expr => $new:expr;)*) => {
+        $(
+            #[test]
+            fn $name() {
+                if let Some(gpu) = adapter() {
+                    disagreement(&Backend::Gpu(gpu), $case).unwrap_or_else(|error| panic!("{error}"));
+                }
+                caught(|gpu| disagreement(&Backend::Gpu(gpu), $case).is_ok(), $old, $new);
+            }
+        )*
+    };
+}
+
+function_mutants! {
+    sine_reduced_by_too_little: Case::Of(Function::Sin), "= 6.28125f;" => "= 6.28f;";
+    tangent_reduced_by_too_little: Case::Of(Function::Tan), "= 1.5703125f;" => "= 1.57f;";
+    arc_sine_of_another_series: Case::Of(Function::Asin), "= 0.16666752f;" => "= 0.1667f;";
+    arc_cosine_not_turned: Case::Of(Function::Acos), "= 3.1415927f;" => "= 3.0f;";
+    arc_tangent_not_moved: Case::Of(Function::Atan), "= 0.7853982f;" => "= 0.7853f;";
+    angle_not_turned: Case::Angle, "= 3.1415927f;" => "= 3.0f;";
+    angle_of_a_steep_point: Case::AngleBehind, "= 1.5707964f;" => "= 1.57f;";
+    wrapped_by_too_little: Case::Of(Function::Wrap), "= 6.28125f;" => "= 6.28f;";
+    exponential_held_too_low: Case::Of(Function::Exp), "= 89.0f;" => "= 6.0f;";
+    logarithm_of_another_base: Case::Of(Function::Ln), "= 0.69314575f;" => "= 0.6931f;";
+    logarithm_below_zero: Case::Of(Function::Ln), "bitcast<f32>(b" => "0.0 * f32(b";
+    sigmoid_of_another_base: Case::Of(Function::Sigmoid), "= 0.69314575f;" => "= 0.6931f;";
+    tangent_held_too_low: Case::Of(Function::Tanh), "= 8.2f;" => "= 2.0f;";
+    power_of_another_exponent: Case::Power(1.5), "= 1.5f;" => "= 1.4f;";
+    product_forgotten: Case::Whole(3), "* v" => "+ v";
+    sign_turned: Case::Sign, "1.0, 0.0 < x" => "1.0, 0.0 > x";
+    smaller_is_larger: Case::Smaller, "select(b, a, a < b)" => "select(a, b, a < b)";
+    larger_is_smaller: Case::Larger, "select(b, a, b < a)" => "select(a, b, b < a)";
+    not_held_below: Case::Held, "select(x, low, x < low)" => "x";
+    not_held_above: Case::Held, "select(floored, high, high < floored)" => "floored";
+    nan_lost_in_a_minimum: Case::Smaller, "largest > INFINITE" => "largest > ~0u";
+    nan_lost_in_a_maximum: Case::Larger, "largest > INFINITE" => "largest > ~0u";
+    nan_lost_in_a_clip: Case::Held, "largest > INFINITE" => "largest > ~0u";
+    nan_lost_in_a_bound: Case::HeldBelow, "largest > INFINITE" => "largest > ~0u";
+    nan_lost_in_a_condition: Case::Less, "largest > INFINITE" => "largest > ~0u";
+    nan_lost_in_a_comparison: Case::Equal, "largest > INFINITE" => "largest > ~0u";
+    nan_of_the_first_lost: Case::Smaller, "max(size_of(a), size_of(b))" => "size_of(b)";
+    nan_of_the_second_lost: Case::Less, "max(size_of(a), size_of(b))" => "size_of(a)";
+    nan_of_the_bounds_lost: Case::HeldBelow, "max(size_of(x), bounds)" => "size_of(x)";
 }

@@ -5,16 +5,19 @@
 //! multiple of the worst distance of f32 from f64, and its sign is right outside that band.
 
 mod common;
+#[path = "oracle/functions.rs"]
+mod functions;
 
 use std::array::from_fn;
 use std::sync::LazyLock;
 
 use common::backends;
+use functions::{Case, disagreement};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::backend::Backend;
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid};
-use reachcast::formula::record;
+use reachcast::formula::{Function, record};
 use reachcast::policy::Policy;
 use reachcast::real::{Lanes, Real};
 use reachcast::rollout::{
@@ -259,4 +262,35 @@ suite! {
     logarithm_and_normals: Formula::Logarithm, Formula::Normal(0), Formula::Normal(1);
     branches: Formula::Branches;
     arithmetic: Formula::Arithmetic;
+}
+
+/// Everything that holds for a function over special numbers on every evaluator of this machine.
+fn check_special(cases: &[Case]) {
+    for backend in backends() {
+        for case in cases {
+            disagreement(&backend, *case).unwrap_or_else(|error| panic!("{error}"));
+        }
+    }
+}
+
+macro_rules! special {
+    ($($name:ident: $($case:expr),+;)*) => {
+        $(
+            #[test]
+            fn $name() {
+                check_special(&[$($case),+]);
+            }
+        )*
+    };
+}
+
+special! {
+    special_sines: Case::Of(Function::Sin), Case::Of(Function::Cos), Case::Of(Function::Tan);
+    special_arcs: Case::Of(Function::Asin), Case::Of(Function::Acos), Case::Of(Function::Atan);
+    special_angles: Case::Angle, Case::AngleBehind, Case::Of(Function::Wrap);
+    special_exponentials: Case::Of(Function::Exp), Case::Of(Function::Sigmoid), Case::Of(Function::Tanh);
+    special_logarithms: Case::Of(Function::Ln);
+    special_powers: Case::Whole(3), Case::Whole(-2), Case::Whole(0), Case::Power(0.5), Case::Power(1.5), Case::Power(-0.3);
+    special_signs: Case::Sign, Case::Floor, Case::Length;
+    special_choices: Case::Smaller, Case::Larger, Case::Held, Case::HeldBelow, Case::Less, Case::NotMore, Case::Equal;
 }

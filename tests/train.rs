@@ -490,8 +490,12 @@ fn the_loss_is_the_mean_gain() {
     assert!((loss - expected).abs() < 1e-5, "{loss} {expected}");
 }
 
-/// A graph on tensors, one operation of burn per node: what one operation per graph stands for.
+/// A graph on tensors, one operation of burn per node of its expansion: what one operation per graph
+/// stands for.
 fn node_by_node(graph: &Graph, inputs: &Tensor<2>) -> Tensor<2> {
+    let graph = graph.expanded();
+    let chosen =
+        |a: Tensor<2>, b: Tensor<2>, [yes, no]: [Tensor<2>; 2]| no.mask_where(a.lower(b), yes);
     let rows = inputs.dims()[0];
     let mut values: Vec<Tensor<2>> = Vec::new();
     for node in &graph.nodes {
@@ -507,7 +511,16 @@ fn node_by_node(graph: &Graph, inputs: &Tensor<2>) -> Tensor<2> {
             Node::Abs(a) => at(a).abs(),
             Node::Sqrt(a) => at(a).sqrt(),
             Node::Floor(a) => at(a).floor(),
-            Node::IfLt(a, b, yes, no) => at(no).mask_where(at(a).lower(at(b)), at(yes)),
+            Node::Min(a, b) => chosen(at(a), at(b), [at(a), at(b)]),
+            Node::Max(a, b) => chosen(at(b), at(a), [at(a), at(b)]),
+            Node::Clamp(a, low, high) => {
+                let floored = chosen(at(a), at(low), [at(low), at(a)]);
+                chosen(at(high), floored.clone(), [at(high), floored])
+            }
+            Node::IfLt(a, b, yes, no) | Node::SelectLt(a, b, yes, no) => {
+                chosen(at(a), at(b), [at(yes), at(no)])
+            }
+            other => panic!("no operation of burn for {other:?}"),
         };
         values.push(value);
     }

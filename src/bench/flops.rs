@@ -22,10 +22,14 @@ const UNIFORMS: f64 = 3.0;
 /// the sums of weights, squares and costs.
 const WEIGHT: f64 = 7.0;
 
-/// Of a recorded formula.
+/// Of a recorded formula, its functions as polynomials; a clip or a sign is two comparisons.
 pub fn formula(graph: &Graph) -> f64 {
-    let operation = |node: &&Node| !matches!(node, Node::Input(_) | Node::Literal(_));
-    graph.nodes.iter().filter(operation).count() as f64
+    let operations = |node: &Node| match node {
+        Node::Input(_) | Node::Literal(_) => 0.0,
+        Node::Clamp(..) | Node::Sign(_) => 2.0,
+        _ => 1.0,
+    };
+    graph.expanded().nodes.iter().map(operations).sum()
 }
 
 /// Of a network's layers: two for each weight.

@@ -1,7 +1,12 @@
 //! Formulas as data: graphs recorded from Rust or text, replayed over any scalar, printed as WGSL.
 
+mod expand;
+mod node;
 mod record;
 pub mod text;
+#[cfg(test)]
+mod tests;
 pub mod wgsl;
 
-pub use record::{Expr, Graph, Node, record, record_with};
+pub use node::{Function, Node};
+pub use record::{Expr, Graph, record, record_with};

@@ -4,55 +4,8 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use super::node::{Function, Node};
 use crate::real::Real;
-
-/// One operation of a graph; operands are indices of earlier nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Node {
-    /// The input of that number.
-    Input(u32),
-    /// A literal, as the bits of its f32.
-    Literal(u32),
-    /// Sum.
-    Add(u32, u32),
-    /// Difference.
-    Sub(u32, u32),
-    /// Product.
-    Mul(u32, u32),
-    /// Quotient.
-    Div(u32, u32),
-    /// Negation.
-    Neg(u32),
-    /// Absolute value.
-    Abs(u32),
-    /// Square root.
-    Sqrt(u32),
-    /// Floor.
-    Floor(u32),
-    /// `if a < b { yes } else { no }`, in this order.
-    IfLt(u32, u32, u32, u32),
-}
-
-impl Node {
-    /// Its value for `inputs`, given the `values` of the earlier nodes.
-    #[inline(always)]
-    pub fn value<R: Real>(self, inputs: &[R], values: &[R]) -> R {
-        let at = |i: u32| values[i as usize];
-        match self {
-            Self::Input(i) => inputs[i as usize],
-            Self::Literal(bits) => R::lit(f32::from_bits(bits)),
-            Self::Add(a, b) => at(a) + at(b),
-            Self::Sub(a, b) => at(a) - at(b),
-            Self::Mul(a, b) => at(a) * at(b),
-            Self::Div(a, b) => at(a) / at(b),
-            Self::Neg(a) => -at(a),
-            Self::Abs(a) => at(a).abs(),
-            Self::Sqrt(a) => at(a).sqrt(),
-            Self::Floor(a) => at(a).floor(),
-            Self::IfLt(a, b, yes, no) => at(a).if_lt(at(b), at(yes), at(no)),
-        }
-    }
-}
 
 /// A recorded formula: nodes in order of evaluation, and which of them are the outputs.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,20 +33,29 @@ thread_local! {
     static ARENA: RefCell<Arena> = RefCell::default();
 }
 
-/// A number of the recording in progress on this thread.
+/// Adds a node to the recording in progress on this thread, if it is not there yet.
+pub(super) fn push(node: Node) -> u32 {
+    ARENA.with_borrow_mut(|Arena { nodes, known, .. }| {
+        let next = nodes.len() as u32;
+        let index = *known.entry(node).or_insert(next);
+        if index == next {
+            nodes.push(node);
+        }
+        index
+    })
+}
+
+/// A number of the recording in progress on this thread; its functions stay whole.
 #[derive(Clone, Copy, Debug)]
 pub struct Expr(u32);
 
 impl Expr {
     fn new(node: Node) -> Self {
-        ARENA.with_borrow_mut(|Arena { nodes, known, .. }| {
-            let next = nodes.len() as u32;
-            let index = *known.entry(node).or_insert(next);
-            if index == next {
-                nodes.push(node);
-            }
-            Self(index)
-        })
+        Self(push(node))
+    }
+
+    fn apply(self, function: Function) -> Self {
+        Self::new(Node::Apply(function, self.0))
     }
 }
 
@@ -119,20 +81,28 @@ pub fn record_with(
     parameters: &[(&str, usize)],
     formula: impl FnOnce(&[Expr]) -> Vec<Expr>,
 ) -> Graph {
+    recorded(inputs, |places| {
+        let arguments: Vec<Expr> = places.iter().map(|place| Expr(*place)).collect();
+        let named = parameters.iter().map(|(name, place)| ((*name).to_owned(), arguments[*place]));
+        ARENA.with_borrow_mut(|arena| arena.parameters = named.collect());
+        formula(&arguments).into_iter().map(|output| output.0).collect()
+    })
+}
+
+/// The graph of what `formula` pushes, from the indices of the inputs to those of the outputs.
+pub(super) fn recorded(inputs: usize, formula: impl FnOnce(&[u32]) -> Vec<u32>) -> Graph {
     let outer = ARENA.take();
-    let arguments: Vec<Expr> = (0..inputs).map(|i| Expr::new(Node::Input(i as u32))).collect();
-    let named = parameters.iter().map(|(name, place)| ((*name).to_owned(), arguments[*place]));
-    ARENA.with_borrow_mut(|arena| arena.parameters = named.collect());
+    let arguments: Vec<u32> = (0..inputs).map(|i| push(Node::Input(i as u32))).collect();
     let outputs = formula(&arguments);
     let recorded = ARENA.replace(outer);
     prune(inputs, &recorded.nodes, &outputs)
 }
 
 /// Keeps the nodes that the outputs need, in order.
-fn prune(inputs: usize, nodes: &[Node], outputs: &[Expr]) -> Graph {
+fn prune(inputs: usize, nodes: &[Node], outputs: &[u32]) -> Graph {
     let mut needed = vec![false; nodes.len()];
     for output in outputs {
-        needed[output.0 as usize] = true;
+        needed[*output as usize] = true;
     }
     for i in (0..nodes.len()).rev() {
         if needed[i] {
@@ -145,34 +115,8 @@ fn prune(inputs: usize, nodes: &[Node], outputs: &[Expr]) -> Graph {
         place[i] = kept.len() as u32;
         kept.push(node.renumbered(|operand| place[operand as usize]));
     }
-    let outputs = outputs.iter().map(|output| place[output.0 as usize]).collect();
+    let outputs = outputs.iter().map(|output| place[*output as usize]).collect();
     Graph { inputs, nodes: kept, outputs }
-}
-
-impl Node {
-    /// Calls `see` with each operand.
-    fn operands(self, mut see: impl FnMut(u32)) {
-        self.renumbered(|operand| {
-            see(operand);
-            operand
-        });
-    }
-
-    /// The node with its operands replaced.
-    fn renumbered(self, mut new: impl FnMut(u32) -> u32) -> Self {
-        match self {
-            Self::Input(_) | Self::Literal(_) => self,
-            Self::Add(a, b) => Self::Add(new(a), new(b)),
-            Self::Sub(a, b) => Self::Sub(new(a), new(b)),
-            Self::Mul(a, b) => Self::Mul(new(a), new(b)),
-            Self::Div(a, b) => Self::Div(new(a), new(b)),
-            Self::Neg(a) => Self::Neg(new(a)),
-            Self::Abs(a) => Self::Abs(new(a)),
-            Self::Sqrt(a) => Self::Sqrt(new(a)),
-            Self::Floor(a) => Self::Floor(new(a)),
-            Self::IfLt(a, b, yes, no) => Self::IfLt(new(a), new(b), new(yes), new(no)),
-        }
-    }
 }
 
 impl Graph {
@@ -260,5 +204,74 @@ impl Real for Expr {
     }
     fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
         Self::new(Node::IfLt(self.0, rhs.0, yes.0, no.0))
+    }
+    fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
+        Self::new(Node::SelectLt(self.0, rhs.0, yes.0, no.0))
+    }
+    fn min(self, rhs: Self) -> Self {
+        Self::new(Node::Min(self.0, rhs.0))
+    }
+    fn max(self, rhs: Self) -> Self {
+        Self::new(Node::Max(self.0, rhs.0))
+    }
+    fn clamp(self, low: Self, high: Self) -> Self {
+        Self::new(Node::Clamp(self.0, low.0, high.0))
+    }
+    fn sign(self) -> Self {
+        Self::new(Node::Sign(self.0))
+    }
+    fn hypot(self, rhs: Self) -> Self {
+        Self::new(Node::Hypot(self.0, rhs.0))
+    }
+    fn powi(self, exponent: i32) -> Self {
+        Self::new(Node::Powi(self.0, exponent))
+    }
+    fn powf(self, exponent: f32) -> Self {
+        Self::new(Node::Powf(self.0, exponent.to_bits()))
+    }
+    fn sin(self) -> Self {
+        self.apply(Function::Sin)
+    }
+    fn cos(self) -> Self {
+        self.apply(Function::Cos)
+    }
+    fn principal_sin_cos(self) -> [Self; 2] {
+        [self.apply(Function::PrincipalSin), self.apply(Function::PrincipalCos)]
+    }
+    fn tan(self) -> Self {
+        self.apply(Function::Tan)
+    }
+    fn asin(self) -> Self {
+        self.apply(Function::Asin)
+    }
+    fn acos(self) -> Self {
+        self.apply(Function::Acos)
+    }
+    fn atan(self) -> Self {
+        self.apply(Function::Atan)
+    }
+    fn atan2(self, x: Self) -> Self {
+        Self::new(Node::Atan2(self.0, x.0))
+    }
+    fn wrap(self) -> Self {
+        self.apply(Function::Wrap)
+    }
+    fn exp(self) -> Self {
+        self.apply(Function::Exp)
+    }
+    fn ln(self) -> Self {
+        self.apply(Function::Ln)
+    }
+    fn tanh(self) -> Self {
+        self.apply(Function::Tanh)
+    }
+    fn sigmoid(self) -> Self {
+        self.apply(Function::Sigmoid)
+    }
+    fn exp_negative(self) -> Self {
+        self.apply(Function::ExpNegative)
+    }
+    fn ln_unit(self) -> Self {
+        self.apply(Function::LnUnit)
     }
 }

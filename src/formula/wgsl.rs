@@ -1,8 +1,9 @@
 //! Prints a recorded graph as a WGSL function.
 
-use std::fmt::Write;
-
 use super::{Graph, Node};
+
+/// The functions that printed formulas call: choices that hand a NaN on.
+pub const CHOICES: &str = include_str!("../../shaders/choices.wgsl");
 
 /// How a product is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +14,8 @@ pub enum Product<'a> {
     Call(&'a str),
 }
 
-/// The WGSL function `name`, one `let` per operation, products printed plainly.
+/// The WGSL function `name`, one `let` per operation of the expanded graph ([`Graph::expanded`]),
+/// products printed plainly. It calls what [`CHOICES`] holds.
 ///
 /// `arguments` are names and lengths of the array arguments, whose elements are the graph's
 /// inputs in order; an argument of length 1 is a plain f32. The result is an f32, or an array of
@@ -27,8 +29,7 @@ pub enum Product<'a> {
 /// ```
 ///
 /// # Panics
-/// If the arguments do not add up to the graph's inputs, or a literal is not finite (WGSL has no
-/// such literal).
+/// If the arguments do not add up to the graph's inputs.
 pub fn function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
     function_with(name, arguments, graph, Product::Plain)
 }
@@ -54,18 +55,17 @@ pub fn function_with(
         arguments.iter().map(|(name, length)| format!("{name}: {}", float_type(*length))).collect();
     let result = float_type(graph.outputs.len());
     let mut text = format!("fn {name}({}) -> {result} {{\n", parameters.join(", "));
+    let graph = graph.expanded();
     for (i, node) in graph.nodes.iter().enumerate() {
-        writeln!(text, "    let v{i} = {};", operation(node, &inputs, product))
-            .expect("a String grows");
+        text += &match *node {
+            Node::Literal(bits) => literal(i, f32::from_bits(bits)),
+            node => format!("    let v{i} = {};\n", operation(node, &inputs, product)),
+        };
     }
     let outputs: Vec<String> = graph.outputs.iter().map(|i| format!("v{i}")).collect();
-    if outputs.len() == 1 {
-        writeln!(text, "    return {};\n}}", outputs[0])
-    } else {
-        writeln!(text, "    return {result}({});\n}}", outputs.join(", "))
-    }
-    .expect("a String grows");
-    text
+    let outputs = outputs.join(", ");
+    let value = if graph.outputs.len() == 1 { outputs } else { format!("{result}({outputs})") };
+    text + &format!("    return {value};\n}}\n")
 }
 
 /// `f32` or an array of them.
@@ -73,11 +73,10 @@ fn float_type(length: usize) -> String {
     if length == 1 { "f32".to_owned() } else { format!("array<f32, {length}>") }
 }
 
-/// The right-hand side of a node.
-fn operation(node: &Node, inputs: &[String], product: Product<'_>) -> String {
-    match *node {
+/// The right-hand side of a primitive other than a literal.
+fn operation(node: Node, inputs: &[String], product: Product<'_>) -> String {
+    match node {
         Node::Input(i) => inputs[i as usize].clone(),
-        Node::Literal(bits) => literal(f32::from_bits(bits)),
         Node::Add(a, b) => format!("v{a} + v{b}"),
         Node::Sub(a, b) => format!("v{a} - v{b}"),
         Node::Mul(a, b) => match product {
@@ -89,12 +88,23 @@ fn operation(node: &Node, inputs: &[String], product: Product<'_>) -> String {
         Node::Abs(a) => format!("abs(v{a})"),
         Node::Sqrt(a) => format!("sqrt(v{a})"),
         Node::Floor(a) => format!("floor(v{a})"),
-        Node::IfLt(a, b, yes, no) => format!("select(v{no}, v{yes}, v{a} < v{b})"),
+        Node::Sign(a) => format!("sign_of(v{a})"),
+        Node::Min(a, b) => format!("lesser(v{a}, v{b})"),
+        Node::Max(a, b) => format!("greater(v{a}, v{b})"),
+        Node::Clamp(a, low, high) => format!("held(v{a}, v{low}, v{high})"),
+        Node::IfLt(a, b, yes, no) => format!("choose(v{a}, v{b}, v{yes}, v{no})"),
+        Node::SelectLt(a, b, yes, no) => format!("select(v{no}, v{yes}, v{a} < v{b})"),
+        other => unreachable!("an expanded graph has no {other:?}"),
     }
 }
 
-/// The shortest decimal that is read back as the same f32.
-fn literal(value: f32) -> String {
-    assert!(value.is_finite(), "the literal {value} has no WGSL form");
-    format!("{value:?}f")
+/// The statements of literal number `i`: the shortest decimal that is read back as the same f32. What
+/// is not finite has none, and no constant expression may come to it, so its bits go through a
+/// variable.
+fn literal(i: usize, value: f32) -> String {
+    if value.is_finite() {
+        return format!("    let v{i} = {value:?}f;\n");
+    }
+    let bits = value.to_bits();
+    format!("    var b{i} = {bits}u;\n    let v{i} = bitcast<f32>(b{i});\n")
 }

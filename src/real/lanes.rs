@@ -70,12 +70,22 @@ impl<const N: usize> Real for Lanes<N> {
     }
     #[inline(always)]
     fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self(per_lane!(N, i => {
-            if self.0[i] < rhs.0[i] {
-                yes.0[i]
-            } else {
-                no.0[i]
-            }
-        }))
+        Self(per_lane!(N, i => Real::if_lt(self.0[i], rhs.0[i], yes.0[i], no.0[i])))
+    }
+    #[inline(always)]
+    fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
+        Self(per_lane!(N, i => Real::select_lt(self.0[i], rhs.0[i], yes.0[i], no.0[i])))
+    }
+    #[inline(always)]
+    fn min(self, rhs: Self) -> Self {
+        Self(per_lane!(N, i => Real::min(self.0[i], rhs.0[i])))
+    }
+    #[inline(always)]
+    fn max(self, rhs: Self) -> Self {
+        Self(per_lane!(N, i => Real::max(self.0[i], rhs.0[i])))
+    }
+    #[inline(always)]
+    fn clamp(self, low: Self, high: Self) -> Self {
+        Self(per_lane!(N, i => Real::clamp(self.0[i], low.0[i], high.0[i])))
     }
 }

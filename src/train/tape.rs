@@ -23,10 +23,11 @@ enum Op {
 }
 
 impl Tape {
-    /// The graph as it is.
+    /// The graph as it is, its functions as polynomials.
     pub fn hard(graph: &Graph) -> Self {
+        let graph = graph.expanded();
         let ops = folded(&graph.nodes).into_iter().map(Op::Plain).collect();
-        Self { inputs: graph.inputs, ops, outputs: graph.outputs.clone() }
+        Self { inputs: graph.inputs, ops, outputs: graph.outputs }
     }
 
     /// The graph with soft choices in place of every minimum and maximum that an output is made
@@ -56,13 +57,23 @@ impl Tape {
             Op::Plain(Node::Literal(bits)) => Some(f32::from_bits(bits)),
             _ => None,
         };
-        match node {
-            Node::IfLt(a, b, yes, no) if (a, b) == (yes, no) || (a, b) == (no, yes) => {
-                let smaller = (a, b) == (yes, no);
-                self.ops[i] =
-                    if smaller { Op::SoftMin(a, b, factor) } else { Op::SoftMax(a, b, factor) };
-                (factors[a as usize], factors[b as usize]) = (Some(factor), Some(factor));
+        let choice = match node {
+            Node::Min(a, b) => Some((a, b, Op::SoftMin(a, b, factor))),
+            Node::IfLt(a, b, yes, no) if (a, b) == (yes, no) => {
+                Some((a, b, Op::SoftMin(a, b, factor)))
             }
+            Node::Max(b, a) => Some((a, b, Op::SoftMax(a, b, factor))),
+            Node::IfLt(a, b, yes, no) if (a, b) == (no, yes) => {
+                Some((a, b, Op::SoftMax(a, b, factor)))
+            }
+            _ => None,
+        };
+        if let Some((a, b, soft)) = choice {
+            self.ops[i] = soft;
+            (factors[a as usize], factors[b as usize]) = (Some(factor), Some(factor));
+            return;
+        }
+        match node {
             Node::Mul(a, b) => match (constant(a), constant(b)) {
                 (Some(k), None) if k > 0.0 => factors[b as usize] = Some(factor * k),
                 (None, Some(k)) if k > 0.0 => factors[a as usize] = Some(factor * k),
@@ -110,7 +121,7 @@ impl Tape {
     /// The derivative of `sum of seeds * outputs` by each input, written to `slopes`, from the
     /// `values` of a forward sweep at the same temperature; `adjoints` is working memory.
     ///
-    /// A branch has the derivative of the side taken; `|x|` at 0 has 1, and the root at 0 none.
+    /// A branch has the derivative of the side taken; `|x|` at 0 has 1, the root at 0 and a sign none.
     #[inline(always)]
     pub fn backward<R: Real>(
         &self,
@@ -144,7 +155,7 @@ impl Tape {
                 }
                 Op::Plain(node) => match node {
                     Node::Input(i) => slopes[i as usize] = slopes[i as usize] + slope,
-                    Node::Literal(_) | Node::Floor(_) => {}
+                    Node::Literal(_) | Node::Floor(_) | Node::Sign(_) => {}
                     Node::Add(a, b) => {
                         add(a, slope);
                         add(b, slope);
@@ -162,15 +173,31 @@ impl Tape {
                         add(b, -(slope * value / at(b)));
                     }
                     Node::Neg(a) => add(a, -slope),
-                    Node::Abs(a) => add(a, at(a).if_lt(zero, -slope, slope)),
+                    Node::Abs(a) => add(a, at(a).select_lt(zero, -slope, slope)),
                     Node::Sqrt(a) => {
                         let half = R::lit(0.5) * slope / value;
-                        add(a, zero.if_lt(value, half, zero));
+                        add(a, zero.select_lt(value, half, zero));
                     }
-                    Node::IfLt(a, b, yes, no) => {
-                        add(yes, at(a).if_lt(at(b), slope, zero));
-                        add(no, at(a).if_lt(at(b), zero, slope));
+                    Node::Min(a, b) => {
+                        add(a, at(a).select_lt(at(b), slope, zero));
+                        add(b, at(a).select_lt(at(b), zero, slope));
                     }
+                    Node::Max(a, b) => {
+                        add(a, at(b).select_lt(at(a), slope, zero));
+                        add(b, at(b).select_lt(at(a), zero, slope));
+                    }
+                    Node::Clamp(a, low, high) => {
+                        let floored = at(a).select_lt(at(low), at(low), at(a));
+                        let below = at(high).select_lt(floored, zero, slope);
+                        add(high, at(high).select_lt(floored, slope, zero));
+                        add(low, at(a).select_lt(at(low), below, zero));
+                        add(a, at(a).select_lt(at(low), zero, below));
+                    }
+                    Node::IfLt(a, b, yes, no) | Node::SelectLt(a, b, yes, no) => {
+                        add(yes, at(a).select_lt(at(b), slope, zero));
+                        add(no, at(a).select_lt(at(b), zero, slope));
+                    }
+                    other => unreachable!("an expanded graph has no {other:?}"),
                 },
             }
         }
@@ -241,11 +268,43 @@ mod tests {
                 let moved = |step: f64| {
                     let mut x = x;
                     x[i] += step;
-                    formula().eval(&x)[0]
+                    formula().expanded().eval(&x)[0]
                 };
                 let expected = (moved(1e-6) - moved(-1e-6)) / 2e-6;
                 let error = (found[i] - expected).abs();
                 assert!(error < 1e-6 * (1.0 + expected.abs()), "{x:?} {i}: {found:?} {expected}");
+            }
+        }
+    }
+
+    /// Every function, away from jumps and ends of domains.
+    fn functions() -> Graph {
+        record(3, |x| {
+            let [a, b, c] = [x[0], x[1], x[2]];
+            let positive = c * c + Expr::lit(0.1);
+            let angles = a.tan() + (Expr::lit(0.4) * b).asin() * (Expr::lit(0.3) * a).acos();
+            let turned = a.atan() + b.atan2(c) * (-a).atan2(b) + (Expr::lit(3.0) * a).wrap();
+            let grown = (a * b).exp() + positive.ln() + a.sigmoid();
+            let powers = c.powi(3) + positive.powi(-2) + positive.powf(1.3) + a.hypot(c);
+            vec![angles * turned + grown * powers + a.sign() * b]
+        })
+    }
+
+    /// The polynomials have the slopes of the functions that they stand for.
+    #[test]
+    fn functions_have_their_slopes() {
+        let tape = Tape::hard(&functions());
+        for x in [[0.7_f64, 0.3, 1.9], [-1.3, 0.8, 0.4], [1.2, -0.6, -1.5]] {
+            let (_, found) = slopes(&tape, &x, 1.0);
+            for i in 0..3 {
+                let moved = |step: f64| {
+                    let mut x = x;
+                    x[i] += step;
+                    functions().eval(&x)[0]
+                };
+                let expected = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                let error = (found[i] - expected).abs();
+                assert!(error < 1e-5 * (1.0 + expected.abs()), "{x:?} {i}: {found:?} {expected}");
             }
         }
     }

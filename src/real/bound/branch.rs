@@ -1,9 +1,11 @@
-//! Operations that choose between pieces: branches, minimum, absolute value, floor.
+//! Operations that choose between pieces or jump: branches, minimum, absolute value, floor, angles.
 
+use std::f64::consts::PI;
 use std::rc::Rc;
 
 use super::interval::Interval;
 use super::pieces::{Caveats, Enclosure, Piece};
+use super::{direction, elementary};
 
 /// The pieces of `a` that may have values in `window`, cut to it; `None` if there is none.
 fn within(a: &Enclosure, window: Interval) -> Option<Rc<Enclosure>> {
@@ -65,18 +67,68 @@ pub(super) fn abs(a: &Rc<Enclosure>) -> Rc<Enclosure> {
     choice([a, &negated], |_| Interval::new(0.0, f64::INFINITY))
 }
 
-/// Floor: flat where no integer is crossed, else a jump.
-pub(super) fn floor(a: &Rc<Enclosure>) -> Enclosure {
-    let steps = |piece: &Piece| piece.value.low.floor() != piece.value.high.floor();
-    let range = |value: Interval| Interval::new(value.low.floor(), value.high.floor());
-    if a.pieces.iter().any(|piece| steps(piece) && !piece.flat()) {
+/// A function of slope `slope` but for its jumps: `jumps` says whether there may be one between the
+/// values of a piece, `range` what its values are.
+fn stepped(
+    a: &Rc<Enclosure>,
+    slope: Interval,
+    jumps: impl Fn(Interval) -> bool,
+    range: impl Fn(Interval) -> Interval,
+) -> Enclosure {
+    if a.pieces.iter().any(|piece| jumps(piece.value) && !piece.flat()) {
         let mut jumping = a.without_bound();
         for piece in &mut jumping.pieces {
             piece.value = range(a.value());
         }
         return jumping;
     }
-    a.map(|value| (range(value), Interval::ZERO))
+    a.map(|value| (range(value), slope))
+}
+
+/// Floor: flat where no integer is crossed, else a jump.
+pub(super) fn floor(a: &Rc<Enclosure>) -> Enclosure {
+    let range = |value: Interval| Interval::new(value.low.floor(), value.high.floor());
+    stepped(a, Interval::ZERO, |value| value.low.floor() != value.high.floor(), range)
+}
+
+/// Sign: flat where zero is not met, else a jump.
+pub(super) fn sign(a: &Rc<Enclosure>) -> Enclosure {
+    let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
+    let range = |value: Interval| Interval::new(sign(value.low), sign(value.high));
+    stepped(a, Interval::ZERO, |value| sign(value.low) != sign(value.high), range)
+}
+
+/// Wrapped angle: a shift where no odd half turn is met, else a jump.
+pub(super) fn wrap(a: &Rc<Enclosure>) -> Enclosure {
+    stepped(a, Interval::ONE, |value| elementary::turns(value).is_none(), elementary::wrap)
+}
+
+/// The angle of the point `(x, y)`, whose gradient is the direction of the point, turned by a quarter,
+/// over the distance from the origin; nothing is known at the origin and across the cut.
+pub(super) fn atan2(y: &Rc<Enclosure>, x: &Rc<Enclosure>) -> Enclosure {
+    let (up, across) = (y.value(), x.value());
+    let origin = up.contains(0.0) && across.contains(0.0);
+    let cut = across.low < 0.0 && up.low < 0.0 && up.high >= 0.0;
+    if origin || cut {
+        let anything = |_, _| (Interval::ENTIRE, [Interval::ENTIRE; 2]);
+        let mut lost = Enclosure::combine(y, x, anything).without_bound();
+        let half_turn = PI.next_up();
+        lost.pieces.iter_mut().for_each(|piece| {
+            piece.value = Interval::new(-half_turn, half_turn);
+        });
+        return lost;
+    }
+    Enclosure::paired(y, x, direction::ARCS, |y, x, pieces| {
+        let value = elementary::atan2(y.value, x.value);
+        if y.flat() && x.flat() {
+            pieces.push(Piece::sum(value, [Interval::ZERO; 2], y, x));
+            return;
+        }
+        let inverse = (y.value.square() + x.value.square()).sqrt().reciprocal();
+        for [across, up] in direction::directions([x.value, y.value]) {
+            pieces.push(Piece::sum(value, [across * inverse, -(up * inverse)], y, x));
+        }
+    })
 }
 
 /// `yes` where `a < b`, else `no`.

@@ -1,6 +1,6 @@
 //! Ranges of the elementary functions over an interval.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::interval::Interval;
 
@@ -12,13 +12,19 @@ const SLACK: f64 = 1e-9;
 /// Angles beyond this take the whole range of the waves.
 const FAR: f64 = 1e6;
 
-/// The range of a rising function of the platform, from its values at the ends.
-fn rising(x: Interval, function: fn(f64) -> f64) -> Interval {
-    let (low, high) = (function(x.low), function(x.high));
+/// From `low` to `high`, values of the platform: widened by its error, an overflow unknown.
+fn outward(low: f64, high: f64) -> Interval {
+    let down = (low - low.abs() * PLATFORM).next_down();
+    let up = (high + high.abs() * PLATFORM).next_up();
     Interval::new(
-        (low - low.abs() * PLATFORM).next_down(),
-        (high + high.abs() * PLATFORM).next_up(),
+        if low.is_finite() { down } else { low.min(f64::MAX) },
+        if high.is_finite() { up } else { high.max(f64::MIN) },
     )
+}
+
+/// The range of a rising function of the platform, from its values at the ends.
+fn rising(x: Interval, function: impl Fn(f64) -> f64) -> Interval {
+    outward(function(x.low), function(x.high))
 }
 
 /// Whether an angle of `x` may be `phase` turns and a whole number of turns.
@@ -57,6 +63,139 @@ pub(crate) fn tanh(x: Interval) -> Interval {
 /// Natural logarithms of `x`, which must be above zero.
 pub(super) fn ln(x: Interval) -> Interval {
     rising(x, f64::ln)
+}
+
+/// Exponentials of `x`.
+pub(super) fn exp(x: Interval) -> Interval {
+    let range = rising(x, f64::exp);
+    Interval::new(range.low.max(0.0), range.high)
+}
+
+/// Values of the logistic function, and its slopes.
+pub(super) fn sigmoid(x: Interval) -> (Interval, Interval) {
+    let value = |x: f64| match x < 0.0 {
+        true => x.exp() / (1.0 + x.exp()),
+        false => 1.0 / (1.0 + (-x).exp()),
+    };
+    let range = rising(x, value);
+    let range = Interval::new(range.low.max(0.0), range.high.min(1.0));
+    // s (1 - s) rises up to 1/2 and falls from there.
+    let at = |s: f64| Interval::point(s) * (Interval::ONE - Interval::point(s));
+    let ends = at(range.low).hull(at(range.high));
+    let steepest = if range.contains(0.5) { 0.25 } else { ends.high.min(0.25) };
+    (range, Interval::new(ends.low.max(0.0), steepest))
+}
+
+/// Whether no angle of `x` is an odd quarter of a turn.
+pub(super) fn tan_defined(x: Interval) -> bool {
+    x.magnitude() <= FAR && !passes(x, 0.25) && !passes(x, 0.75)
+}
+
+/// Tangents of the angles in `x`, which must be between two poles, and their slopes.
+pub(super) fn tan(x: Interval) -> (Interval, Interval) {
+    let range = rising(x, f64::tan);
+    (range, Interval::ONE + range.square())
+}
+
+/// Whether `x` lies in `[-1, 1]`.
+pub(super) fn within_one(x: Interval) -> bool {
+    x.magnitude() <= 1.0
+}
+
+/// Slopes of the arc sine over `x` in `[-1, 1]`.
+fn asin_slope(x: Interval) -> Interval {
+    let rest = Interval::ONE - x.square();
+    Interval::new(rest.low.max(0.0), rest.high.max(0.0)).sqrt().reciprocal()
+}
+
+/// Arc sines of `x` in `[-1, 1]`, and their slopes.
+pub(super) fn asin(x: Interval) -> (Interval, Interval) {
+    (rising(x, f64::asin), asin_slope(x))
+}
+
+/// Arc cosines of `x` in `[-1, 1]`, and their slopes.
+pub(super) fn acos(x: Interval) -> (Interval, Interval) {
+    (outward(x.high.acos(), x.low.acos()), -asin_slope(x))
+}
+
+/// Arc tangents of `x`, and their slopes.
+pub(super) fn atan(x: Interval) -> (Interval, Interval) {
+    (rising(x, f64::atan), (Interval::ONE + x.square()).reciprocal())
+}
+
+/// Angles of the points `(x, y)`, none of them the origin or on the two sides of the cut: the largest
+/// and the smallest are those of corners.
+pub(super) fn atan2(y: Interval, x: Interval) -> Interval {
+    let corners = [(y.low, x.low), (y.low, x.high), (y.high, x.low), (y.high, x.high)];
+    // A negative zero plus zero is zero.
+    let angles = corners.map(|(y, x)| f64::atan2(y + 0.0, x + 0.0));
+    let low = angles.into_iter().fold(f64::INFINITY, f64::min);
+    let high = angles.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    outward(low, high)
+}
+
+/// Turns to take off all angles of `x` that bring them into `[-pi, pi)`, if one number does.
+pub(super) fn turns(x: Interval) -> Option<f64> {
+    let low = (x.low / TAU + 0.5 - SLACK).floor();
+    let high = (x.high / TAU + 0.5 + SLACK).floor();
+    (x.magnitude() <= FAR && low == high).then_some(low)
+}
+
+/// The angles of `x` in `[-pi, pi)`.
+pub(super) fn wrap(x: Interval) -> Interval {
+    let half_turn = PI.next_up();
+    // The float is below the true number.
+    let turn = Interval::new(TAU, TAU.next_up());
+    let moved = turns(x).map_or(Interval::ENTIRE, |turns| x - turn * Interval::point(turns));
+    Interval::new(moved.low.max(-half_turn), moved.high.min(half_turn))
+}
+
+/// `x` to a power above 0.
+fn positive_power(x: Interval, exponent: u32) -> Interval {
+    let at = |x: f64| {
+        let (mut left, mut square, mut product) = (exponent, Interval::point(x), Interval::ONE);
+        while left > 0 {
+            product = if left % 2 == 1 { product * square } else { product };
+            square = square.square();
+            left /= 2;
+        }
+        product
+    };
+    if exponent % 2 == 1 {
+        return Interval::new(at(x.low).low, at(x.high).high);
+    }
+    Interval::new(at(x.smallest()).low.max(0.0), at(x.magnitude()).high)
+}
+
+/// `x` to a whole power, which must have no 0 in it where that is negative.
+fn power(x: Interval, exponent: i64) -> Interval {
+    let size = u32::try_from(exponent.unsigned_abs()).unwrap_or(u32::MAX);
+    match exponent {
+        0 => Interval::ONE,
+        1.. => positive_power(x, size),
+        _ => positive_power(x, size).reciprocal(),
+    }
+}
+
+/// The powers of `x` with a whole exponent, and their slopes; no 0 in `x` where that is negative.
+pub(super) fn powi(x: Interval, exponent: i32) -> (Interval, Interval) {
+    let exponent = i64::from(exponent);
+    let slope = Interval::point(exponent as f64) * power(x, exponent - 1);
+    (power(x, exponent), slope)
+}
+
+/// The powers of `x >= 0`, above 0 where `exponent` is negative, and their slopes; both are monotone.
+pub(super) fn powf(x: Interval, exponent: f64) -> (Interval, Interval) {
+    let value = |x: f64| outward(x.powf(exponent), x.powf(exponent));
+    let beyond = Interval::point(exponent) * Interval::new(f64::MAX, f64::INFINITY);
+    let slope = |x: f64| match (x == 0.0, x == f64::INFINITY) {
+        (false, false) => Interval::point(exponent) * value(x) * Interval::point(x).reciprocal(),
+        (true, _) if exponent > 1.0 => Interval::ZERO,
+        (_, true) if exponent < 1.0 => Interval::ZERO,
+        _ => beyond,
+    };
+    let range = value(x.low).hull(value(x.high));
+    (Interval::new(range.low.max(0.0), range.high), slope(x.low).hull(slope(x.high)))
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
 
 use super::Real;
+use super::approx::Exponent;
 pub(crate) use elementary::tanh;
 pub use interval::Interval;
 pub use pieces::{Caveats, Enclosure, Piece};
@@ -31,9 +32,8 @@ struct Arena {
 
 /// A number of the formula in progress on this thread; of no use outside [`enclose`].
 ///
-/// It stands for the exact functions of real arithmetic with f32 literals widened, so `sin`,
-/// `cos`, `tanh` and `ln_unit` are those that the polynomials of the other instances
-/// approximate.
+/// It stands for the exact functions of real arithmetic with f32 literals widened, so `sin` and the
+/// like are those that the polynomials of the other instances approximate.
 #[derive(Clone, Copy, Debug)]
 pub struct Bound(u32);
 
@@ -137,6 +137,19 @@ impl Bound {
     fn map(self, range: impl Fn(Interval) -> (Interval, Interval)) -> Self {
         Self::new(self.get().map(range))
     }
+
+    /// A function of which nothing is known where its operand may lie outside its domain.
+    fn within(
+        self,
+        domain: impl Fn(Interval) -> bool,
+        range: impl Fn(Interval) -> (Interval, Interval),
+    ) -> Self {
+        let a = self.get();
+        if a.pieces.iter().all(|piece| domain(piece.value)) {
+            return self.map(range);
+        }
+        Self::new(a.without_bound())
+    }
 }
 
 impl Add for Bound {
@@ -203,16 +216,14 @@ impl Real for Bound {
         Self::new(branch::abs(&self.get()))
     }
 
-    /// Nothing is known of the root of what may be negative.
     fn sqrt(self) -> Self {
-        let a = self.get();
-        if a.value().low < 0.0 {
-            return Self::new(a.without_bound());
-        }
-        self.map(|value| {
-            let root = value.sqrt();
-            (root, (root + root).reciprocal())
-        })
+        self.within(
+            |value| value.low >= 0.0,
+            |value| {
+                let root = value.sqrt();
+                (root, (root + root).reciprocal())
+            },
+        )
     }
 
     fn floor(self) -> Self {
@@ -221,6 +232,23 @@ impl Real for Bound {
 
     fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
         Self::new(branch::if_lt(&self.get(), &rhs.get(), &yes.get(), &no.get()))
+    }
+
+    /// No bound has a NaN.
+    fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
+        self.if_lt(rhs, yes, no)
+    }
+
+    fn sign(self) -> Self {
+        Self::new(branch::sign(&self.get()))
+    }
+
+    fn wrap(self) -> Self {
+        Self::new(branch::wrap(&self.get()))
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        Self::new(branch::atan2(&self.get(), &x.get()))
     }
 
     fn min(self, rhs: Self) -> Self {
@@ -268,12 +296,65 @@ impl Real for Bound {
         })
     }
 
-    /// Nothing is known of the logarithm of what may be zero or negative.
+    fn principal_sin_cos(self) -> [Self; 2] {
+        [self.sin(), self.cos()]
+    }
+
+    fn tan(self) -> Self {
+        self.within(elementary::tan_defined, elementary::tan)
+    }
+
+    fn asin(self) -> Self {
+        self.within(elementary::within_one, elementary::asin)
+    }
+
+    fn acos(self) -> Self {
+        self.within(elementary::within_one, elementary::acos)
+    }
+
+    fn atan(self) -> Self {
+        self.map(elementary::atan)
+    }
+
+    fn exp(self) -> Self {
+        self.map(|value| {
+            let range = elementary::exp(value);
+            (range, range)
+        })
+    }
+
+    fn exp_negative(self) -> Self {
+        self.exp()
+    }
+
+    fn sigmoid(self) -> Self {
+        self.map(elementary::sigmoid)
+    }
+
+    fn ln(self) -> Self {
+        self.within(|value| value.low > 0.0, |value| (elementary::ln(value), value.reciprocal()))
+    }
+
     fn ln_unit(self) -> Self {
-        let a = self.get();
-        if a.value().low <= 0.0 {
-            return Self::new(a.without_bound());
+        self.ln()
+    }
+
+    fn powi(self, exponent: i32) -> Self {
+        let domain = |value: Interval| exponent >= 0 || !value.contains(0.0);
+        self.within(domain, |value| elementary::powi(value, exponent))
+    }
+
+    fn powf(self, exponent: f32) -> Self {
+        match Exponent::of(exponent) {
+            Exponent::Whole(exponent) => self.powi(exponent),
+            Exponent::Root => self.sqrt(),
+            Exponent::Other => {
+                let domain = |value: Interval| {
+                    exponent.is_finite()
+                        && if exponent > 0.0 { value.low >= 0.0 } else { value.low > 0.0 }
+                };
+                self.within(domain, |value| elementary::powf(value, f64::from(exponent)))
+            }
         }
-        self.map(|value| (elementary::ln(value), value.reciprocal()))
     }
 }

@@ -24,7 +24,8 @@ const CASES: [f32; 12] = [
 ];
 
 /// The results of every operation on `a`, `b` and `c`.
-fn operations<R: Real>(a: R, b: R, c: R) -> [R; 14] {
+fn operations<R: Real>(a: R, b: R, c: R) -> [R; 36] {
+    let [sine, cosine] = a.principal_sin_cos();
     [
         a + b,
         a - b,
@@ -35,11 +36,33 @@ fn operations<R: Real>(a: R, b: R, c: R) -> [R; 14] {
         a.sqrt(),
         a.floor(),
         a.if_lt(b, b, c),
+        a.select_lt(b, b, c),
+        a.if_le(b, c, a),
+        a.if_eq(b, c, a),
         a.min(b),
         a.max(b),
         a.clamp(b, c),
+        a.sign(),
         a.hypot(b),
+        a.powi(3),
+        a.powi(-2),
+        a.powi(0),
+        a.powf(0.5),
+        a.powf(-1.3),
+        sine,
+        cosine,
+        a.sin(),
+        a.cos(),
+        a.tan(),
+        a.asin(),
+        a.acos(),
+        a.atan(),
+        a.atan2(b),
+        a.wrap(),
+        a.exp(),
+        a.ln(),
         a.tanh(),
+        a.sigmoid(),
     ]
 }
 

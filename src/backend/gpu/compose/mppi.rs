@@ -5,7 +5,7 @@ use std::array::from_fn;
 use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
 use crate::cost::{Cost, CostMap};
-use crate::formula::wgsl::function;
+use crate::formula::wgsl::{CHOICES, function};
 use crate::formula::{Expr, Graph, record};
 use crate::real::Real;
 use crate::rollout::{Disturbance, MppiSpec, MppiTask, NoiseShape, SPLINE_SUPPORT, ValueTerm};
@@ -112,7 +112,8 @@ impl MppiText {
             Kernel::MppiRollout => ROLLOUT,
             _ => UPDATE,
         };
-        let shared = vec![constants(self.states, self.controls), PARAMS.to_owned()];
+        let sizes = constants(self.states, self.controls);
+        let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts, vec![body.to_owned()]].concat().join("\n")
     }
 }

@@ -7,7 +7,7 @@ use super::layers::{Fused, activation_glue, fused_text, layer_text};
 use super::physics_glue::{Driver, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
-use crate::formula::wgsl::{Product, function, function_with};
+use crate::formula::wgsl::{CHOICES, Product, function, function_with};
 use crate::formula::{Expr, record};
 use crate::model::{Controller, Law, Model};
 use crate::policy::Mlp;
@@ -131,7 +131,8 @@ impl PlantText {
             Kernel::Observe => vec![self.observation(), OBSERVE.to_owned()],
             other => panic!("{other:?} is no kernel of a plant"),
         };
-        let shared = vec![constants(states, self.outline.controls), PARAMS.to_owned()];
+        let sizes = constants(states, self.outline.controls);
+        let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts].concat().join("\n")
     }
 
@@ -227,7 +228,7 @@ impl PlantText {
 pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
     let Driver { activations, inputs, outputs, .. } = Driver::new(mlp);
     let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
-    [constants(inputs, outputs), PARAMS.to_owned(), text].join("\n")
+    [constants(inputs, outputs), PARAMS.to_owned(), CHOICES.to_owned(), text].join("\n")
 }
 
 /// The sizes of every formula must be those of its place: kernels do not check.

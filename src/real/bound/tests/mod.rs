@@ -8,6 +8,7 @@ use rand::{RngExt, SeedableRng};
 use self::sampling::{Sides, Tree, steepest};
 use super::pieces::LIMIT;
 use super::{Bound, Domain, Lipschitz, enclose, lipschitz};
+use crate::formula::Function;
 use crate::real::Real;
 
 /// Soundness on random formulas, and that the bounds say something: most are finite, and of
@@ -114,6 +115,16 @@ fn jumps_and_lost_domains_have_no_constant() {
     infinite(|x| (x[0] / x[1]).tanh());
     infinite(|x| x[0].ln_unit().min(Bound::lit(3.0)));
     infinite(|x| x[0] + Bound::lit(f32::NAN));
+    infinite(|x| x[0].sign());
+    infinite(|x| (Bound::lit(4.0) * x[0]).wrap());
+    infinite(|x| x[0].atan2(x[1]));
+    infinite(|x| x[0].atan2(x[1] - Bound::lit(2.0)));
+    infinite(|x| (Bound::lit(2.0) * x[0]).tan());
+    infinite(|x| (Bound::lit(1.1) * x[0]).asin());
+    infinite(|x| x[0].acos());
+    infinite(|x| x[0].powi(-1));
+    infinite(|x| x[0].powf(1.5));
+    infinite(|x| x[0].abs().powf(0.3));
     // What does not touch a varying coordinate does not jump along it.
     let across = Sides { varies: vec![false, true], ..Sides::cube(2, 1.0) };
     let found =
@@ -167,6 +178,19 @@ fn gradients_over_a_point_are_derivatives() {
             x[1].sqrt(),
             x[0] / x[1],
             x[0] * x[1],
+            x[0].tan(),
+            x[0].asin(),
+            x[0].acos(),
+            x[0].atan(),
+            x[0].exp(),
+            x[1].ln(),
+            x[0].sigmoid(),
+            (x[0] - Bound::lit(8.0)).wrap(),
+            x[1].sign(),
+            x[0].powi(5),
+            x[1].powi(-3),
+            x[1].powf(-1.5),
+            x[1].powf(2.5),
         ]
     });
     let (x, y): (f64, f64) = (0.3, 0.7);
@@ -178,13 +202,68 @@ fn gradients_over_a_point_are_derivatives() {
         [0.0, 0.5 / y.sqrt()],
         [1.0 / y, -x / y / y],
         [y, x],
+        [1.0 + x.tan().powi(2), 0.0],
+        [1.0 / (1.0 - x * x).sqrt(), 0.0],
+        [-1.0 / (1.0 - x * x).sqrt(), 0.0],
+        [1.0 / (1.0 + x * x), 0.0],
+        [x.exp(), 0.0],
+        [0.0, 1.0 / y],
+        [(-x).exp() / (1.0 + (-x).exp()).powi(2), 0.0],
+        [1.0, 0.0],
+        [0.0, 0.0],
+        [5.0 * x.powi(4), 0.0],
+        [0.0, -3.0 * y.powi(-4)],
+        [0.0, -1.5 * y.powf(-2.5)],
+        [0.0, 2.5 * y.powf(1.5)],
     ];
     for (output, expected) in outputs.iter().zip(expected) {
         let [piece] = &output.pieces[..] else {
             panic!("a smooth function has one piece");
         };
         for (side, expected) in piece.gradient.iter().zip(expected) {
-            assert!(side.contains(expected) && side.high - side.low < 1e-14, "{side:?} {expected}");
+            let slack = 4.0 * f64::EPSILON * expected.abs();
+            let holds = side.low - slack <= expected && expected <= side.high + slack;
+            assert!(holds && side.high - side.low < 1e-13, "{side:?} {expected}");
+        }
+    }
+}
+
+/// The gradient of an angle is one over the distance from the origin, in any direction.
+#[test]
+fn angles_turn_by_one_over_the_distance() {
+    let domain = Domain { low: &[-1.0, 2.0], high: &[1.0, 3.0], varies: &[true, true] };
+    let found = lipschitz(domain, |x| x[0].atan2(x[1]));
+    assert!(found.constant >= 0.5 && found.constant < 0.501, "{found:?}");
+    let across = Domain { low: &[0.0, -3.0], high: &[0.5, -2.0], varies: &[true, true] };
+    let up_to_the_cut = lipschitz(across, |x| x[0].atan2(x[1]));
+    assert!(up_to_the_cut.constant < 0.501, "{up_to_the_cut:?}");
+}
+
+/// What is known of no end: no panic, and ends that are numbers or infinite.
+#[test]
+fn functions_of_unbounded_intervals_have_ends() {
+    let ends = [f64::NEG_INFINITY, -1e300, -2.0, -0.0, 0.0, 0.5, 1.0, 1e300, f64::INFINITY];
+    let pairs = ends.iter().flat_map(|low| ends.iter().map(move |high| (*low, *high)));
+    for (low, high) in pairs.filter(|(low, high)| low <= high && *low < 1e301 && *high > -1e301) {
+        let domain = Domain { low: &[low, low], high: &[high, high], varies: &[true, true] };
+        let outputs = enclose(domain, |x| {
+            let mut all: Vec<Bound> = Function::ALL.map(|function| function.apply(x[0])).to_vec();
+            let powers = [-3, -2, -1, 0, 1, 2, 3, i32::MAX, i32::MIN];
+            all.extend(powers.map(|exponent| x[0].powi(exponent)));
+            let powers = [-1.5, -1e-30, 0.5, 0.3, 1.7, 1e30, f32::NAN, f32::INFINITY];
+            all.extend(powers.map(|exponent| x[0].powf(exponent)));
+            all.extend([x[0].sign(), x[0].atan2(x[1]), x[0].hypot(x[1]), x[0].abs().sqrt()]);
+            all
+        });
+        for (number, output) in outputs.iter().enumerate() {
+            for piece in &output.pieces {
+                let sides = piece.gradient.iter().chain([&piece.value]);
+                for side in sides {
+                    let sound = side.low <= side.high && side.low < f64::INFINITY;
+                    let sound = sound && side.high > f64::NEG_INFINITY;
+                    assert!(sound, "{number} over {low}..{high}: {output:?}");
+                }
+            }
         }
     }
 }

@@ -16,8 +16,8 @@ pub(super) enum Tree {
     Ternary(u32, Box<[Tree; 3]>),
 }
 
-const UNARY: u32 = 12;
-const BINARY: u32 = 9;
+const UNARY: u32 = 29;
+const BINARY: u32 = 11;
 const TERNARY: u32 = 4;
 
 fn unary<R: Real>(kind: u32, a: R) -> R {
@@ -33,7 +33,32 @@ fn unary<R: Real>(kind: u32, a: R) -> R {
         8 => a.floor(),
         9 => a * a,
         10 => a.if_lt(R::lit(0.0), R::lit(0.0), a),
-        _ => R::lit(1.0) / (a * a + R::lit(0.5)),
+        11 => R::lit(1.0) / (a * a + R::lit(0.5)),
+        _ => function(kind, a),
+    }
+}
+
+/// Functions, most of them over what lies in their domain.
+fn function<R: Real>(kind: u32, a: R) -> R {
+    let within_one = |a: R| R::lit(0.9) * a.tanh();
+    match kind {
+        12 => (R::lit(0.5) * a).tan(),
+        13 => within_one(a).asin(),
+        14 => within_one(a).acos(),
+        15 => a.asin(),
+        16 => a.atan(),
+        17 => a.exp(),
+        18 => (a.abs() + R::lit(0.2)).ln(),
+        19 => a.ln(),
+        20 => a.sigmoid(),
+        21 => a.sign(),
+        22 => a.wrap(),
+        23 => a.powi(3),
+        24 => a.powi(4),
+        25 => a.powi(-1),
+        26 => (a * a + R::lit(0.5)).powi(-2),
+        27 => a.abs().powf(1.5),
+        _ => (a.abs() + R::lit(0.3)).powf(-0.7),
     }
 }
 
@@ -46,6 +71,8 @@ fn binary<R: Real>(kind: u32, a: R, b: R) -> R {
         5 => a.min(b),
         6 => a.max(b),
         7 => a.hypot(b),
+        8 => a.atan2(b),
+        9 => a.atan2(b.abs() + R::lit(0.5)),
         _ => a.if_lt(b, a, b),
     }
 }
