@@ -25,8 +25,8 @@ pub enum Law {
         observe: Option<Graph>,
         /// The network.
         network: Arc<Mlp>,
-        /// The controls, with the inputs of the model followed by the network's outputs; without it,
-        /// the outputs.
+        /// The controls, with the inputs of the model followed by the network's outputs; without
+        /// it, the outputs.
         act: Option<Graph>,
     },
 }
