@@ -98,7 +98,7 @@ fn the_race_is_the_one_in_rust() {
     assert_eq!(*network, Mlp::load(file).expect("a network"));
 }
 
-/// Another value of a parameter is another system in Rust and the same graph, there and in the text.
+/// Another value of a parameter is another system in Rust and the same graph.
 #[test]
 fn a_parameter_is_data() {
     let text = std::fs::read_to_string("configs/models/drone_race.toml").expect("a file");

@@ -78,6 +78,8 @@ fn conditions_choose() {
         ("0 > y", 1.0),
         ("y == 3", 2.0),
         ("y != 3", 1.0),
+        ("x == y", 2.0),
+        ("x != y", 1.0),
         ("y >= x", 2.0),
         ("y <= x", 1.0),
     ] {
@@ -245,9 +247,9 @@ proptest! {
         }
     }
 
-    /// Sums and products with brackets wherever they may be, against the same without a grammar.
+    /// Sums, products and powers in one line against the same in Rust.
     #[test]
-    fn brackets_change_nothing_where_they_say_what_is(a in -9..9_i32, b in -9..9_i32, c in 1..9_i32) {
+    fn chains_are_what_they_are_without_a_grammar(a in -9..9_i32, b in -9..9_i32, c in 1..9_i32) {
         let plain = format!("{a} - {b} * {c} - {a} / {c} ^ 2");
         let (a, b, c) = (f64::from(a), f64::from(b), f64::from(c));
         let expected = a - b * c - a / (c * c);

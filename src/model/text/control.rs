@@ -16,8 +16,9 @@ impl Description {
     /// The policy: its formulas recorded over the inputs of the model, its network read.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there is no policy, a formula is too large or asks for an output that the
-    /// network does not have; [`Error::File`] if the network cannot be read or has another width.
+    /// [`Error::Invalid`] if there is no policy, a formula is too large or asks for an output that
+    /// the network does not have; [`Error::File`] if the network cannot be read or has another
+    /// width.
     pub fn controller(&self) -> Result<Controller> {
         let missing = || self.origin.refuse("policy", "missing; expected a section with a policy");
         match self.policy.as_ref().ok_or_else(missing)? {

@@ -15,10 +15,8 @@ use crate::formula::text::{LONGEST_TEXT, shown};
 use crate::system::{Axis, Body, Parameter};
 
 /// Keys of `[model]`.
-const KEYS: [&str; 9] =
-    ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task"];
-/// Sections of `[model]` that pictures alone need.
-const PICTURES: [&str; 1] = ["bodies"];
+const KEYS: [&str; 10] =
+    ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task", "bodies"];
 /// Sections of `[model]` that are refused by name, and what they would be.
 const LATER: [(&str, &str); 6] = [
     ("disturbances", "numbers that are drawn at every step"),
@@ -94,7 +92,7 @@ impl Description {
 /// Refuses keys of `[model]` that are unknown, and those that do not work yet.
 fn check_keys(model: &Section<'_>) -> Result<()> {
     let later = LATER.iter().map(|(key, _)| *key);
-    model.only(KEYS.into_iter().chain(PICTURES).chain(later))?;
+    model.only(KEYS.into_iter().chain(later))?;
     match LATER.iter().find(|(key, _)| model.has(key)) {
         Some((key, what)) => {
             Err(model.refuse(key, format!("{what} do not work yet; leave the section out")))

@@ -61,8 +61,8 @@ impl Lets {
             .collect()
     }
 
-    /// Finds the order of evaluation: as in the text, but for what has to come before. On a stack of
-    /// its own, as chains may be long.
+    /// Finds the order of evaluation: as in the text, but for what has to come before. On a stack
+    /// of its own, as chains may be long.
     fn sort(&mut self, section: &Section<'_>) -> Result<()> {
         let mut marks = vec![Mark::New; self.formulas.len()];
         let mut stack: Vec<Open> = Vec::new();

@@ -29,8 +29,8 @@ use toml::Table;
 use crate::error::{Error, Result};
 use crate::formula::text::LONGEST_TEXT;
 
-/// The sections `model` and `policy` of the TOML document `text`, which errors call `origin`; paths in
-/// it are relative to `folder`. Other sections are not looked at.
+/// The sections `model` and `policy` of the TOML document `text`, which errors call `origin`; paths
+/// in it are relative to `folder`. Other sections are not looked at.
 ///
 /// ```
 /// use std::path::Path;
@@ -63,8 +63,8 @@ use crate::formula::text::LONGEST_TEXT;
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] naming file, line, key and, in a formula, the column of the first thing that is
-/// wrong, with what was expected and the nearest name.
+/// [`Error::Invalid`] naming file, line, key and, in a formula, the column of the first thing that
+/// is wrong, with what was expected and the nearest name.
 pub fn read(text: &str, origin: &str, folder: &Path) -> Result<Description> {
     if text.len() > LONGEST_TEXT {
         let problem = format!("a model of {} bytes, at most {LONGEST_TEXT} are read", text.len());
@@ -75,8 +75,8 @@ pub fn read(text: &str, origin: &str, folder: &Path) -> Result<Description> {
     read_table(&table, &origin)
 }
 
-/// The sections `model` and `policy` of `table`, as [`read`] reads them: what a configuration is after
-/// values were laid over its text.
+/// The sections `model` and `policy` of `table`, as [`read`] reads them: what a configuration is
+/// after values were laid over its text.
 ///
 /// # Errors
 /// As for [`read`].

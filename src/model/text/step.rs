@@ -182,8 +182,8 @@ impl<'a> Formulas<'a> {
         moment.iter().zip(self.formulas).map(next).collect()
     }
 
-    /// `x + h / 6 (k1 + 2 k2 + 2 k3 + k4)`, with the slopes at the beginning, twice in the middle, and at
-    /// the end of the substep that begins `begin` seconds after `inputs`.
+    /// `x + h / 6 (k1 + 2 k2 + 2 k3 + k4)`, with the slopes at the beginning, twice in the middle,
+    /// and at the end of the substep that begins `begin` seconds after `inputs`.
     fn rk4<R: Real>(&self, moment: &[R], inputs: &[R], begin: f64, seconds: f64) -> Vec<R> {
         let slope = |from: &[R], after: f64, slopes: &[R]| {
             let mut there = moment.to_vec();
