@@ -1,20 +1,20 @@
 //! The command `certify`: a certificate, its tables and its report in one folder.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::args::Global;
+use super::inputs::inputs;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
-use crate::config::{Config, Job, PolicySource};
+use crate::config::{Config, PolicySource};
 use crate::error::Result;
-use crate::files::{Staged, check_room, json, npy_bytes};
-use crate::policy::Policy;
-use crate::rollout::Plant;
+use crate::files::{Existing, MANIFEST, Staged, check_room, is_free, json, make_way, npy_bytes};
+use crate::model::Plant;
 use crate::scenario;
+use crate::scenario::check_settings;
 use crate::scenario::record::{DeviationRecord, Record};
 use crate::scenario::settings::Settings;
-use crate::system::System;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-out";
@@ -29,41 +29,57 @@ pub(super) const POLICY: &str = "policy.safetensors";
 pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let config = Config::load(path, &global.overrides())?;
     let policy = config.policy_source(folder_of(path))?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let job = Certify { global, config: &config, out: &out };
-    let (record, mut staged) = config.with_plant(&policy, job)?;
+    let out = global.folder(DEFAULT_OUT);
+    inputs(path, &policy, []).spare_folder(&out)?;
+    let manifest = manifest(&config, &policy)?;
+    let work = Certify { global, config: &config, out: &out, manifest: &manifest };
+    let (record, mut staged) = work.run(&config.plant(&policy)?)?;
+    staged.add(MANIFEST, manifest.as_bytes())?;
     stage(&mut staged, &record, &policy)?;
+    // Again: the work may have taken hours.
+    match global.existing {
+        Existing::Kept => is_free(&out, &manifest).map(drop)?,
+        Existing::Replaced => make_way(&out, &manifest)?,
+    }
     let files = staged.publish()?;
     report(global, &record, || summary::text(&record, &files))?;
     Ok(if record.holds { Outcome::Done } else { Outcome::NotObtained })
 }
 
-/// The command for one plant.
+/// What the folder of a certificate says that it holds: the same for a run that repeats it.
+fn manifest(config: &Config, policy: &PolicySource) -> Result<String> {
+    let digest = match policy {
+        PolicySource::Network { network, .. } => Some(network.digest()),
+        PolicySource::Formula(_) => None,
+    };
+    let work = serde_json::json!({ "config": config.to_json()?, "policy_sha256": digest });
+    json(MANIFEST, &serde_json::json!({ "certificate": work }))
+}
+
+/// The command for a plant.
 struct Certify<'a> {
     global: &'a Global,
     config: &'a Config,
     out: &'a Path,
+    manifest: &'a str,
 }
 
-impl Job for Certify<'_> {
-    type Output = (Record, Staged);
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<(Record, Staged)>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let settings = self.config.settings(&plant.system.states())?;
+impl Certify<'_> {
+    /// The certificate, and the folder that its files are staged for.
+    fn run(self, plant: &Plant) -> Result<(Record, Staged)> {
+        let settings = self.config.settings(&plant.model.states)?;
+        check_settings(&settings)?;
         let stored = self.config.to_json()?;
+        if self.global.existing == Existing::Kept {
+            is_free(self.out, self.manifest)?;
+        }
         let backend = devices::open(self.global)?;
         let progress = Progress::new(self.global);
         // Before the work: a folder that cannot be written to would waste it.
         let staged = Staged::new(self.out)?;
         check_room(self.out, estimate(&settings))?;
-        let mut record = scenario::certify(&backend, plant, &settings, stored, &progress)?;
+        let program = backend.prepare(plant)?;
+        let mut record = scenario::certify(&program, &settings, stored, &progress)?;
         record.timing.threads = devices::threads(self.global);
         devices::note_events(self.global, &backend);
         progress.check()?;
@@ -72,10 +88,10 @@ impl Job for Certify<'_> {
 }
 
 /// About what the files of the folder take, bytes: a number takes some 20 characters in a text.
-fn estimate<const NX: usize>(settings: &Settings<NX>) -> u64 {
-    let [x, y] = settings.slice.each_ref().map(|axis| axis.values.len());
+fn estimate(settings: &Settings) -> u64 {
+    let [x, y] = settings.slice_size();
     let states = PICTURED * (settings.spec.horizon as usize + 1);
-    (1 << 20) + 20 * (8 * x * y + NX * states) as u64
+    (1 << 20) + 20 * (8 * x * y + settings.state.len() * states) as u64
 }
 
 /// Writes all files of the folder, the certificate itself last.

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::folder_of;
-use crate::backend::Backend;
+use super::inputs::inputs;
+use crate::backend::{Backend, Program};
 use crate::config::{Config, Overrides, PolicySource};
 use crate::error::{Error, Result};
 use crate::experiment::controller::{Name, World};
 use crate::experiment::settings::RaceSettings;
-use crate::files::StateReader;
+use crate::files::{Inputs, StateReader};
+use crate::model::Plant;
 use crate::policy::Mlp;
 use crate::rollout::{Purpose, Region, Starts, Stream};
 use crate::scenario::settings::Settings;
@@ -27,7 +29,7 @@ pub(super) struct RaceInput {
     pub(super) config: Config,
     folder: PathBuf,
     race: RaceSettings,
-    certificates: Settings<12>,
+    certificates: Settings,
     system: DroneRace,
     policy: PolicySource,
     networks: Networks,
@@ -50,11 +52,39 @@ impl RaceInput {
         Ok(Self { config, folder, race, certificates, system, policy, networks })
     }
 
-    /// What controllers are made of.
-    pub(super) fn world<'a>(&'a self, backend: &'a Backend) -> Result<World<'a>> {
+    /// The files that this and the starts `asked` for were read from; the configuration is at `path`.
+    pub(super) fn inputs(&self, path: &Path, asked: Option<&str>) -> Inputs {
+        let named = &self.race.networks;
+        let networks = [&named.value, &named.disturbance, &named.ppo];
+        let networks = networks.into_iter().filter(|file| !file.is_empty());
+        let networks = networks.map(|file| self.folder.join(file));
+        inputs(path, &self.policy, networks.chain(self.starts_file(asked)))
+    }
+
+    /// The file of the starts `asked` for; none if they are drawn.
+    fn starts_file(&self, asked: Option<&str>) -> Option<PathBuf> {
+        match asked {
+            Some(text) if text.parse::<u64>().is_ok() => None,
+            Some(path) => Some(PathBuf::from(path)),
+            None => Some(self.folder.join(&self.race.starts)),
+        }
+    }
+
+    /// The plant under the policy.
+    pub(super) fn plant(&self) -> Result<Plant> {
+        self.config.plant(&self.policy)
+    }
+
+    /// What controllers are made of; `program` is the plant as prepared on `backend`.
+    pub(super) fn world<'a>(
+        &'a self,
+        backend: &'a Backend,
+        program: &'a Program<'a>,
+    ) -> Result<World<'a>> {
         let (_, policy) = self.config.race_plant(&self.policy)?;
         Ok(World {
             backend,
+            program,
             system: &self.system,
             policy,
             value: self.networks.value.as_ref(),
@@ -72,7 +102,7 @@ impl RaceInput {
         }
         let path = asked.map_or_else(|| self.folder.join(&self.race.starts), PathBuf::from);
         let names = DroneRace::default().states().map(|axis| axis.name);
-        let starts = StateReader::<12>::open(&path, names)?.rest()?;
+        let starts = StateReader::open(&path, names.to_vec())?.rest()?.arrays();
         // Its name alone: the same starts elsewhere are the same experiment.
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok((starts, name))

@@ -2,18 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use super::args::Global;
+use super::options::Global;
+use serde::Serialize;
+
 use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::progress::Progress;
 use super::{Outcome, devices, report};
-use crate::config::{Config, Job, PolicySource};
+use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
-use crate::files::{Staged, StateReader};
-use crate::policy::Policy;
-use crate::rollout::Plant;
+use crate::files::{Existing, Inputs, Staged, StateReader};
 use crate::scenario::record::Record;
-use crate::scenario::{self, CheckReport, Finding, QueryRow};
-use crate::system::System;
+use crate::scenario::{self, CheckReport, Figure, Finding, QueryRow};
+
+/// Name of the file with a line per state.
+const ANSWERS: &str = "query.csv";
+
+/// What the lines of `check` mean.
+const FRESH: &str = "\
+stored: what the certificate says; found: computed again from its seed, or on fresh pairs and starts, which
+are drawn anew and may refute a claim, not prove it";
 
 /// A stored certificate with the configuration and the policy that it was made with.
 struct Stored {
@@ -24,11 +31,7 @@ struct Stored {
 
 impl Stored {
     /// Reads what `certify` wrote to `folder`.
-    fn read(global: &Global, folder: &Path) -> Result<Self> {
-        if global.profile.is_some() || global.seed.is_some() || !global.set.is_empty() {
-            let problem = "a stored certificate has its own; leave these flags out";
-            return Err(Error::invalid("--profile, --seed and --set", problem));
-        }
+    fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CERTIFICATE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;
@@ -51,64 +54,64 @@ fn at(path: &Path, error: Error) -> Error {
 
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
-    let stored = Stored::read(global, folder)?;
+    let stored = Stored::read(folder)?;
+    if let Some(out) = &global.out {
+        let read = [states.to_owned(), folder.join(CERTIFICATE), folder.join(POLICY)];
+        Inputs::new(read).spare_file(&out.join(ANSWERS))?;
+    }
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
-    let job = Ask { global, stored: &stored, states };
-    let rows = stored.config.with_plant(&stored.policy, job)?;
+    let rows = ask(global, &stored, states)?;
     match staged {
-        None => report(global, &rows, || csv(&rows))?,
+        None => report(global, &numbered(&rows), || csv(&rows))?,
         Some(staged) => {
-            let path = write(staged, &rows)?;
-            report(global, &rows, || counts(&rows, &path))?;
+            let path = write(staged, &rows, global.existing)?;
+            report(global, &numbered(&rows), || counts(&rows, &path))?;
         }
     }
     Ok(Outcome::Done)
 }
 
-/// `query` for one plant.
-struct Ask<'a> {
-    global: &'a Global,
-    stored: &'a Stored,
-    states: &'a Path,
+/// Tier and margins of the states of a file.
+fn ask(global: &Global, stored: &Stored, states: &Path) -> Result<Vec<QueryRow>> {
+    let Stored { record, config, policy } = stored;
+    let plant = config.plant(policy)?;
+    let names = plant.model.states.iter().map(|axis| axis.name.clone()).collect();
+    let states = StateReader::open(states, names)?.rest()?;
+    let settings = config.settings(&plant.model.states)?;
+    let backend = devices::open(global)?;
+    let program = backend.prepare(&plant)?;
+    let rows = scenario::query(&program, record, &settings, states.view())?;
+    devices::note_events(global, &backend);
+    Ok(rows)
 }
 
-impl Job for Ask<'_> {
-    type Output = Vec<QueryRow>;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<Vec<QueryRow>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let names = plant.system.states().map(|axis| axis.name);
-        let states = StateReader::<NX>::open(self.states, names)?.rest()?;
-        let Stored { record, config, .. } = self.stored;
-        let settings = config.settings(&plant.system.states())?;
-        let backend = devices::open(self.global)?;
-        let rows = scenario::query(&backend, plant, record, &settings, &states)?;
-        devices::note_events(self.global, &backend);
-        Ok(rows)
-    }
+/// Writes the rows to [`ANSWERS`].
+fn write(mut staged: Staged, rows: &[QueryRow], existing: Existing) -> Result<PathBuf> {
+    staged.add(ANSWERS, csv(rows).as_bytes())?;
+    Ok(staged.publish_sparing(existing)?.remove(0))
 }
 
-/// Writes the rows to `query.csv`.
-fn write(mut staged: Staged, rows: &[QueryRow]) -> Result<PathBuf> {
-    staged.add("query.csv", csv(rows).as_bytes())?;
-    Ok(staged.publish()?.remove(0))
+/// A row with the number of its state in the file, from 0.
+#[derive(Serialize)]
+struct Numbered<'a> {
+    index: usize,
+    #[serde(flatten)]
+    row: &'a QueryRow,
+}
+
+fn numbered(rows: &[QueryRow]) -> Vec<Numbered<'_>> {
+    rows.iter().enumerate().map(|(index, row)| Numbered { index, row }).collect()
 }
 
 /// A line per state.
 fn csv(rows: &[QueryRow]) -> String {
-    let line = |row: &QueryRow| {
+    let line = |(index, row): (usize, &QueryRow)| {
         let QueryRow { tier, check_margin, target_margin } = row;
-        format!("{tier},{check_margin},{target_margin}\n")
+        format!("{index},{tier},{check_margin},{target_margin}\n")
     };
-    let lines: String = rows.iter().map(line).collect();
-    format!("tier,check_margin,target_margin\n{lines}")
+    let lines: String = rows.iter().enumerate().map(line).collect();
+    format!("index,tier,check_margin,target_margin\n{lines}")
 }
 
 /// How many states are of each tier.
@@ -119,14 +122,15 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
         format!("tier {tier} ({name}): {count}\n")
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();
-    format!("{lines}rows: {}\n", path.display())
+    let words =
+        "V_check: the reach-avoid measure with its margins tightened, certified where positive";
+    format!("{lines}{words}\nrows: {}\n", path.display())
 }
 
 /// Verifies the certificate in the folder again.
 pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
-    let stored = Stored::read(global, folder)?;
-    let job = Verify { global, stored: &stored };
-    let mut found = stored.config.with_plant(&stored.policy, job)?;
+    let stored = Stored::read(folder)?;
+    let mut found = verify(global, &stored)?;
     // Of a record that does not hold, a page may not even be made.
     if found.holds {
         found.add(files(folder, &stored.record)?);
@@ -152,39 +156,25 @@ fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
         let holds = found == bytes;
         findings.push(Finding {
             name: name.to_owned(),
-            stored: format!("as {CERTIFICATE} gives it"),
-            found: if holds { "the same" } else { "other content" }.to_owned(),
+            stored: Figure::Words(format!("as {CERTIFICATE} gives it")),
+            found: Figure::Words(if holds { "the same" } else { "other content" }.to_owned()),
             holds,
         });
     }
     Ok(findings)
 }
 
-/// `check` for one plant.
-struct Verify<'a> {
-    global: &'a Global,
-    stored: &'a Stored,
-}
-
-impl Job for Verify<'_> {
-    type Output = CheckReport;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<CheckReport>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let Stored { record, config, .. } = self.stored;
-        let settings = config.settings(&plant.system.states())?;
-        let backend = devices::open(self.global)?;
-        let progress = Progress::new(self.global);
-        let found = scenario::check(&backend, plant, record, &settings, &progress)?;
-        devices::note_events(self.global, &backend);
-        Ok(found)
-    }
+/// Computes a certificate again and tries its claims on fresh scenarios.
+fn verify(global: &Global, stored: &Stored) -> Result<CheckReport> {
+    let Stored { record, config, policy } = stored;
+    let plant = config.plant(policy)?;
+    let settings = config.settings(&plant.model.states)?;
+    let backend = devices::open(global)?;
+    let progress = Progress::new(global);
+    let program = backend.prepare(&plant)?;
+    let found = scenario::check(&program, record, &settings, &progress)?;
+    devices::note_events(global, &backend);
+    Ok(found)
 }
 
 /// The findings, a line each, and the verdict.
@@ -198,5 +188,5 @@ fn findings(found: &CheckReport) -> String {
         true => "the certificate holds",
         false => "the certificate no longer holds",
     };
-    format!("{lines}{verdict}\n")
+    format!("{lines}{FRESH}\n{verdict}\n")
 }

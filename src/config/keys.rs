@@ -66,8 +66,11 @@ pub(super) fn overlay(base: &mut Table, over: Table) {
 /// The keys of `defaults` and those that have no default.
 pub(super) fn with_optional(defaults: &Table) -> Table {
     let mut valid = defaults.clone();
-    let policy = ["file", "formula"].map(|key| (key.to_owned(), Value::String(String::new())));
-    valid.insert("policy".to_owned(), Value::Table(Table::from_iter(policy)));
+    // Of a model, the description knows which keys its policy has.
+    if !defaults.contains_key("model") {
+        let policy = ["file", "formula"].map(|key| (key.to_owned(), Value::String(String::new())));
+        valid.insert("policy".to_owned(), Value::Table(Table::from_iter(policy)));
+    }
     with_tagged(&mut valid);
     valid
 }

@@ -1,6 +1,9 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
+mod counts;
 mod keys;
+mod layers;
+mod model;
 mod plant;
 mod profile;
 mod race;
@@ -13,9 +16,9 @@ mod value;
 
 pub use plant::{Job, PolicySource, SystemJob};
 pub use section::{
-    BoxSection, Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection,
-    PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection, StateSection,
-    SystemSection,
+    BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
+    GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,
+    StateSection, SystemSection,
 };
 pub use value::{Constant, Coordinates, Named};
 
@@ -25,6 +28,8 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use crate::error::{Error, Result};
+use crate::model::text::Origin;
+use layers::Layers;
 
 /// What the command line lays over a configuration file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,7 +52,7 @@ impl Config {
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
-        Self::from_table(table, &path.display().to_string(), overrides)
+        Self::from_layers(table, Some(text), &path.display().to_string(), overrides)
     }
 
     /// The configuration of the TOML document `table`, which errors call `origin`.
@@ -55,34 +60,26 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`], as for [`Config::load`].
     pub fn from_table(table: Table, origin: &str, overrides: &Overrides) -> Result<Self> {
-        let mut given = table.clone();
-        let mut layers = vec![(origin.to_owned(), table)];
-        for text in &overrides.set {
-            let assignment = keys::parse_assignment(text)?;
-            keys::overlay(&mut given, assignment.clone());
-            layers.push((format!("--set {text}"), assignment));
-        }
-        if let Some(profile) = overrides.profile {
-            given.insert("profile".to_owned(), profile.name().into());
-        }
-        let trains = given.contains_key("train");
-        let mut merged = defaults(&given, origin)?;
-        let valid = keys::with_optional(&merged);
-        for (origin, layer) in &layers {
-            keys::check_known(&valid, layer, origin)?;
-        }
-        keys::overlay(&mut merged, given);
-        for section in ["race", "train"] {
-            merged.get(section).map_or(Ok(()), |keys| keys::check_finite(section, keys))?;
-        }
-        // Without a source text, the message ends with a line that names the key.
-        let wrong_kind = |e: toml::de::Error| {
-            Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
-        };
-        let mut config: Self = merged.try_into().map_err(wrong_kind)?;
+        Self::from_layers(table, None, origin, overrides)
+    }
+
+    /// The configuration of the document `table`, whose text makes errors name lines.
+    fn from_layers(
+        table: Table,
+        text: Option<String>,
+        origin: &str,
+        overrides: &Overrides,
+    ) -> Result<Self> {
+        let sets = overrides.set.iter().map(|text| {
+            keys::parse_assignment(text).map(|assignment| (format!("--set {text}"), assignment))
+        });
+        let sets = sets.collect::<Result<Vec<_>>>()?;
+        let file = (origin.to_owned(), table);
+        let layers = Layers { file, text, sets, profile: overrides.profile };
+        let mut config = layers.config()?;
         config.seed = overrides.seed.unwrap_or(config.seed);
         // What is about to be trained is not there yet.
-        config.policy.check(trains)?;
+        config.policy.check(layers.trains())?;
         Ok(config)
     }
 
@@ -109,19 +106,43 @@ impl Config {
     /// [`Error::Refused`] if it is not complete or not of this version.
     pub fn from_json(value: &serde_json::Value) -> Result<Self> {
         let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("provenance.config: {e}"));
+        unknown_plant(value).map_or(Ok(()), Err)?;
         let config = Self::deserialize(value).map_err(|e| refused(&e))?;
         config.policy.check(config.train.is_some()).map_err(|e| refused(&e))?;
         Ok(config)
     }
 }
 
+/// The refusal of what is no configuration of a system that this program knows.
+fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
+    let system = value.pointer("/system/name").and_then(serde_json::Value::as_str);
+    if value.get("model").is_some_and(serde_json::Value::is_object)
+        || system.is_some_and(|name| profile::SYSTEMS.contains(&name))
+    {
+        return None;
+    }
+    let plant = match (system, value) {
+        (Some(name), _) => format!("the system `{name}`"),
+        (None, serde_json::Value::String(words)) => format!("`{words}`"),
+        (None, _) => "a system without a name".to_owned(),
+    };
+    Some(Error::Refused(format!(
+        "the certificate is of {plant}, which another program defines; this one knows {}. Its numbers \
+         can be read, and the program that made it can check it (`reachcast::scenario::check`)",
+        profile::SYSTEMS.join(" and ")
+    )))
+}
+
 /// A configuration as JSON.
 fn stored(config: &Config) -> Result<serde_json::Value> {
-    serde_json::to_value(config).map_err(|e| Error::invalid("configuration", e.to_string()))
+    // By way of the text, in which an f32 is the shortest decimal that stands for it.
+    let text = serde_json::to_string(config);
+    text.and_then(|text| serde_json::from_str(&text))
+        .map_err(|e| Error::invalid("configuration", e.to_string()))
 }
 
 /// The defaults of the profile and the system that the table `given` names.
-fn defaults(given: &Table, origin: &str) -> Result<Table> {
+fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
     let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
     let profile = match given.get("profile").cloned() {
         Some(name) => {
@@ -129,7 +150,13 @@ fn defaults(given: &Table, origin: &str) -> Result<Table> {
         }
         None => Profile::default(),
     };
-    let expected = format!("expected \"{}\"", profile::SYSTEMS.join("\" or \""));
+    if model::is_described(given) {
+        let place = Origin::new(origin, Path::new(""));
+        let place = text.map_or(place.clone(), |text| place.with_text(text));
+        return model::defaults(profile, given, place);
+    }
+    let systems = profile::SYSTEMS.join("\" or \"");
+    let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
     let name = given.get("system").and_then(|system| system.get("name"));
     let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
     let config = known.ok_or_else(|| {

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::section::{Config, SystemSection};
+use super::section::{Config, FormulaSection, SystemSection};
 use super::settings::positive_f32;
 use crate::error::{Error, Result};
+use crate::model;
 use crate::policy::{Mlp, Policy};
 use crate::rollout::Plant;
-use crate::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use crate::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
 
 /// Work on a plant of any system and policy.
 pub trait Job {
@@ -77,8 +78,45 @@ impl Config {
     pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
         match (&self.policy.file, &self.policy.formula) {
             (Some(file), _) => PolicySource::read(folder.join(file)),
-            (None, Some(formula)) => Ok(PolicySource::Formula(formula.clone())),
+            (None, Some(FormulaSection::Name(name))) => Ok(PolicySource::Formula(name.clone())),
+            (None, Some(FormulaSection::Controls(_))) => {
+                Ok(PolicySource::Formula("formula".to_owned()))
+            }
             (None, None) => Err(Error::invalid("policy", "neither `file` nor `formula`")),
+        }
+    }
+
+    /// The plant: model and policy, checked against each other.
+    ///
+    /// # Errors
+    /// Those of [`Config::with_plant`].
+    pub fn plant(&self, policy: &PolicySource) -> Result<model::Plant> {
+        if let Some(model) = &self.model {
+            return self.described_plant(model, policy);
+        }
+        let network = |axes: &[Axis], controls: usize, path: &Path, network: &Mlp| {
+            let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+            network.check_fits(&names, controls).map_err(|problem| Error::file(path, problem))?;
+            Ok(network.clone())
+        };
+        match (self.any_system()?, policy) {
+            (AnySystem::DroneRace(system), PolicySource::Formula(name)) => {
+                Err(no_formula(&system, name, "none"))
+            }
+            (AnySystem::DoubleIntegrator(system), PolicySource::Formula(name)) => {
+                if name != "bang-bang" {
+                    return Err(no_formula(&system, name, "bang-bang"));
+                }
+                let acceleration = system.acceleration;
+                Ok(model::Plant::of(system, BangBang { acceleration }))
+            }
+            (AnySystem::DroneRace(system), PolicySource::Network { path, network: mlp, .. }) => {
+                Ok(model::Plant::of(system, network(&system.states(), 3, path, mlp)?))
+            }
+            (
+                AnySystem::DoubleIntegrator(system),
+                PolicySource::Network { path, network: mlp, .. },
+            ) => Ok(model::Plant::of(system, network(&system.states(), 1, path, mlp)?)),
         }
     }
 
@@ -139,8 +177,13 @@ impl Config {
 
     /// The system, its parameters checked.
     fn any_system(&self) -> Result<AnySystem> {
+        let carried = || {
+            let problem = "works for the systems that the program carries, not yet for a model; \
+                           `certify`, `rollout`, `query` and `check` do, and `sweep --of certificate`";
+            Error::invalid("this command", problem)
+        };
         let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
-        Ok(match self.system {
+        Ok(match self.system.clone().ok_or_else(carried)? {
             SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } => {
                 AnySystem::DroneRace(DroneRace {
                     ego_gain: number("ego_gain", ego_gain)?,

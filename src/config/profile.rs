@@ -8,11 +8,15 @@ use super::section::{
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
+use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::system::{Axis, Cone, DoubleIntegrator, DroneRace, System};
 
 /// Names of the systems that a configuration can ask for.
 pub(super) const SYSTEMS: [&str; 2] = ["drone-race", "double-integrator"];
+
+/// Steps of a slice that nobody asked for.
+const SLICE_STEPS: f64 = 20.0;
 
 /// First of the 500 starts of the published study, `configs/race_starts_500.csv`.
 const RACE_STATE: [f64; 12] = [
@@ -56,7 +60,7 @@ fn drone_race(profile: Profile) -> Config {
         opponent_gain: 1.0,
         speed_limit: profile == Profile::Study,
     };
-    let mut config = common(profile, system, &states, &RACE_STATE, slice);
+    let mut config = common(profile, Some(system), &states, &RACE_STATE, slice);
     config.constants = ConstantsSection { target: given(10.0), constraint: given(20.0) };
     config.growth.heading = names(["ego_x", "ego_vx", "ego_y", "ego_vy"]);
     config.race = Some(race(profile));
@@ -80,17 +84,42 @@ fn double_integrator(profile: Profile) -> Config {
     };
     let slice =
         SliceSection { x: axis("position", -1.2, 1.2, 0.05), y: axis("velocity", -1.5, 1.5, 0.05) };
-    let mut config = common(profile, system, &plain.states(), &[0.6, 0.0], slice);
+    let mut config = common(profile, Some(system), &plain.states(), &[0.6, 0.0], slice);
     config.deviation.radius = 0.02;
     config.growth.radius = 0.2;
     config.train = Some(train::double_integrator());
     config
 }
 
+/// A plant of the user's own with these states. Its state is the middle of the box, its slice that of
+/// the first two states over their box in twenty steps; perturbations have a fiftieth of the
+/// narrowest side of the box as their radius, growth begins with a quarter of it.
+pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
+    let middle = |axis: &Axis| 0.5 * (decimal(axis.low) + decimal(axis.high));
+    let state: Vec<f64> = states.iter().map(middle).collect();
+    let side = |axis: &Axis| {
+        let (from, to) = (decimal(axis.low), decimal(axis.high));
+        // A frozen state has no side to cut; its slice shows what lies around.
+        if from < to { (from, to) } else { (from - 0.5, from + 0.5) }
+    };
+    let cut = |axis: &Axis| {
+        let (from, to) = side(axis);
+        SliceAxisSection { state: axis.name.clone(), from, to, step: (to - from) / SLICE_STEPS }
+    };
+    let [x, y] = [0, states.len().min(2) - 1].map(|i| cut(&states[i]));
+    let widths = states.iter().map(|axis| decimal(axis.high) - decimal(axis.low));
+    let narrowest = widths.filter(|width| *width > 0.0).fold(f64::INFINITY, f64::min);
+    let narrowest = if narrowest.is_finite() { narrowest } else { 1.0 };
+    let mut config = common(profile, None, states, &state, SliceSection { x, y });
+    config.deviation.radius = narrowest / 50.0;
+    config.growth.radius = narrowest / 4.0;
+    config
+}
+
 /// What all systems share.
 fn common(
     profile: Profile,
-    system: SystemSection,
+    system: Option<SystemSection>,
     states: &[Axis],
     state: &[f64],
     slice: SliceSection,
@@ -103,6 +132,7 @@ fn common(
         profile,
         seed: 1,
         system,
+        model: None,
         policy: PolicySection::default(),
         rollout: RolloutSection { horizon: 30, gamma: 0.95 },
         bounds: by_name(states, |axis, _| [decimal(axis.low), decimal(axis.high)]),
@@ -156,10 +186,4 @@ fn by_name<T>(states: &[Axis], value: impl Fn(&Axis, usize) -> T) -> Named<T> {
 /// Owned names.
 fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
     names.map(str::to_owned).to_vec()
-}
-
-/// The decimal that the f32 was written as, so that a configuration says 0.1 and not
-/// 0.10000000149.
-fn decimal(value: f32) -> f64 {
-    value.to_string().parse().unwrap_or(f64::from(value))
 }

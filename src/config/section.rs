@@ -23,8 +23,12 @@ pub struct Config {
     pub profile: Profile,
     /// Seed of every random stream.
     pub seed: u64,
-    /// The system and its parameters.
-    pub system: SystemSection,
+    /// The system and its parameters, where it is one that the program carries.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub system: Option<SystemSection>,
+    /// The plant and its task as text (`docs/models.md`), where it is one of the user's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<toml::Table>,
     /// The policy.
     pub policy: PolicySection,
     /// Length and discount of a rollout.
@@ -103,15 +107,32 @@ pub enum SystemSection {
 }
 
 /// The policy: a file or a formula.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolicySection {
     /// Safetensors file, relative to the configuration file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
-    /// Name of a formula: `bang-bang`, for the double integrator.
+    /// Name of a formula: `bang-bang`, for the double integrator; for a model a formula for each
+    /// control.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub formula: Option<String>,
+    pub formula: Option<FormulaSection>,
+    /// What the network of a model sees, a formula for each of its inputs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observe: Option<Vec<String>>,
+    /// The controls of a model from what its network says, a formula for each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub act: Option<toml::Table>,
+}
+
+/// A policy that is a formula.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum FormulaSection {
+    /// One that the program carries, by name.
+    Name(String),
+    /// A formula for each control.
+    Controls(toml::Table),
 }
 
 impl PolicySection {

@@ -39,7 +39,7 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`] naming the key whose value is out of range, not finite or no name of a
     /// state. Whether the scenarios are enough is for [`crate::scenario::certify`] to say.
-    pub fn settings<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Settings<NX>> {
+    pub fn settings(&self, axes: &[Axis]) -> Result<Settings> {
         let (low, high) = self.corners(axes)?;
         let constant = |key: &str, constant: Constant| match constant {
             Constant::Computed => Ok(None),
@@ -59,19 +59,17 @@ impl Config {
                 draws: sample_size("global.draws", self.global.draws)?,
                 beta: share("global.beta", self.global.beta)?,
             },
-            slice: self.slice_axes(axes)?,
+            slice: if axes.len() > 1 { Some(self.slice_axes(axes)?) } else { None },
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
         })
     }
 
     /// Lower and upper corner of the box.
-    pub(super) fn corners<const NX: usize>(
-        &self,
-        axes: &[Axis; NX],
-    ) -> Result<([f32; NX], [f32; NX])> {
+    pub(super) fn corners(&self, axes: &[Axis]) -> Result<(Vec<f32>, Vec<f32>)> {
         let intervals = in_order("box", &self.bounds, axes, finite_interval)?;
-        let (low, high) = (intervals.map(|[low, _]| low), intervals.map(|[_, high]| high));
+        let (low, high): (Vec<f32>, Vec<f32>) =
+            intervals.into_iter().map(|[low, high]| (low, high)).unzip();
         if low == high {
             let problem = "empty: no interval has any length, so there is nothing to draw from";
             return Err(Error::invalid("box", problem));
@@ -80,7 +78,7 @@ impl Config {
     }
 
     /// The deviation bound.
-    fn deviation_settings(&self) -> Result<DeviationSettings> {
+    pub(super) fn deviation_settings(&self) -> Result<DeviationSettings> {
         let asked = self.deviation;
         Ok(DeviationSettings {
             radius: positive_f32("deviation.radius", asked.radius)?,
@@ -95,7 +93,7 @@ impl Config {
     }
 
     /// Local growth.
-    fn growth_settings<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<GrowthSettings<NX>> {
+    fn growth_settings(&self, axes: &[Axis]) -> Result<GrowthSettings> {
         let asked = &self.growth;
         if !(1..=MOST_ROUNDS).contains(&asked.rounds) {
             let problem = format!("{} is not within 1..={MOST_ROUNDS}", asked.rounds);
@@ -115,16 +113,16 @@ impl Config {
     }
 
     /// The coordinates of growth that vary.
-    fn varies<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<[bool; NX]> {
+    fn varies(&self, axes: &[Axis]) -> Result<Vec<bool>> {
         let place = "growth.coordinates";
         match &self.growth.coordinates {
-            Coordinates::All => Ok([true; NX]),
+            Coordinates::All => Ok(vec![true; axes.len()]),
             Coordinates::Named(names) if names.is_empty() => {
                 let problem = "empty; name the states that vary, or say \"all\"";
                 Err(Error::invalid(place, problem))
             }
             Coordinates::Named(names) => {
-                let mut varies = [false; NX];
+                let mut varies = vec![false; axes.len()];
                 for name in names {
                     varies[state_index(place, name, axes)?] = true;
                 }
@@ -218,20 +216,19 @@ pub(super) fn state_index(place: &str, name: &str, axes: &[Axis]) -> Result<usiz
 }
 
 /// The values of all states in order, each checked with its key.
-fn in_order<T: Copy, U: Copy, const NX: usize>(
+fn in_order<T: Copy, U>(
     section: &str,
     values: &Named<T>,
-    axes: &[Axis; NX],
+    axes: &[Axis],
     check: impl Fn(&str, T) -> Result<U>,
-) -> Result<[U; NX]> {
+) -> Result<Vec<U>> {
     let value = |axis: &Axis| {
         let key = format!("{section}.{}", axis.name);
         let entry = values.0.iter().find(|(name, _)| *name == axis.name);
         let &(_, value) = entry.ok_or_else(|| Error::invalid(&key, "missing"))?;
         check(&key, value)
     };
-    let checked = axes.iter().map(value).collect::<Result<Vec<U>>>()?;
-    Ok(std::array::from_fn(|i| checked[i]))
+    axes.iter().map(value).collect()
 }
 
 /// `value` as an f32, finite.

@@ -159,7 +159,7 @@ impl Config {
     pub fn mixture<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Mixture<NX>> {
         let (low, high) = self.corners(axes)?;
         let part = |(number, part): (usize, &StartsSection)| {
-            let (mut low, mut high) = (low, high);
+            let (mut low, mut high) = (low.clone(), high.clone());
             let place = format!("train.starts[{number}].box");
             for (name, interval) in &part.bounds {
                 let i = state_index(&place, name, axes)?;

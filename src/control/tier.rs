@@ -1,9 +1,8 @@
 //! The tier of many states at once: certificates that are made while the plant moves.
 
-use crate::backend::Backend;
+use crate::backend::Program;
 use crate::error::{Error, Result};
-use crate::policy::Policy;
-use crate::rollout::{Ball, Plant, Query};
+use crate::rollout::{Ball, Query, StateList, States};
 use crate::scenario::boundary::on_slice;
 use crate::scenario::global::{band, check_margins, slice_through};
 use crate::scenario::growth::{Growth, check_scenarios};
@@ -11,7 +10,6 @@ use crate::scenario::growth_batch::{Request, grow_each};
 use crate::scenario::ledger::{Entry, Ledger, Spend};
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, Tightened, Unwatched, tightened};
-use crate::system::System;
 
 /// Who controls at a state, section 6 of `docs/method.md` and Algorithm 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -57,7 +55,7 @@ pub enum Domain {
 
 /// What the certificates say of a state.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Standing<const NX: usize> {
+pub struct Standing {
     /// Tier 1, 2 or 3.
     pub tier: Tier,
     /// `V_check`.
@@ -65,14 +63,14 @@ pub struct Standing<const NX: usize> {
     /// The certified cells of the slice through the state, row by row; empty if it was not needed.
     pub certified: Vec<bool>,
     /// The ball of local growth; none if there was nothing to grow from, or no beta left.
-    pub growth: Option<LocalGrowth<NX>>,
+    pub growth: Option<LocalGrowth>,
     /// Whether growth was not called because no beta was left.
     pub refused: bool,
 }
 
 /// A ball grown for a state.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LocalGrowth<const NX: usize> {
+pub struct LocalGrowth {
     /// The ball: verified, or the last one tried.
     pub ball: Ball,
     /// Whether it passed clean.
@@ -85,9 +83,9 @@ pub struct LocalGrowth<const NX: usize> {
 
 /// A state to be judged, with the identity of its run.
 #[derive(Debug)]
-pub struct Case<'a, const NX: usize> {
+pub struct Case<'a> {
     /// The state.
-    pub state: [f32; NX],
+    pub state: Vec<f32>,
     /// Seed of the run's random numbers.
     pub seed: u64,
     /// Number of the control step: each has samples of its own.
@@ -97,35 +95,25 @@ pub struct Case<'a, const NX: usize> {
 }
 
 /// Everything that is known before the plant moves: constants, deviation bound, band.
-pub struct Certifier<'a, S, P, const NX: usize> {
-    backend: &'a Backend,
-    plant: Plant<'a, S, P>,
-    settings: &'a Settings<NX>,
+pub struct Certifier<'a> {
+    program: &'a Program<'a>,
+    settings: &'a Settings,
     tightened: Tightened,
     band: f64,
     asked: Asked,
 }
 
-impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
+impl<'a> Certifier<'a> {
     /// Computes the constants, draws the deviation bound and measures the f32 error.
     ///
     /// # Errors
     /// [`Error::TooFewScenarios`] for local growth, those of [`tightened`], and [`Error::Refused`] if a
     /// pair met a state that is not finite.
-    pub fn new<const NU: usize>(
-        backend: &'a Backend,
-        plant: Plant<'a, S, P>,
-        settings: &'a Settings<NX>,
-        asked: Asked,
-    ) -> Result<Self>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+    pub fn new(program: &'a Program<'a>, settings: &'a Settings, asked: Asked) -> Result<Self> {
         if asked.local {
             check_scenarios(&settings.growth)?;
         }
-        let context = Context { backend, plant, watch: &Unwatched };
+        let context = Context { program, watch: &Unwatched };
         let tightened = tightened(context, settings)?;
         let lost = tightened.deviation.non_finite;
         if lost > 0 {
@@ -133,11 +121,11 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
             return Err(Error::Refused(problem));
         }
         let band = band(context, settings, &tightened.losses)?;
-        Ok(Self { backend, plant, settings, tightened, band, asked })
+        Ok(Self { program, settings, tightened, band, asked })
     }
 
     /// The settings of the certificates.
-    pub fn settings(&self) -> &Settings<NX> {
+    pub fn settings(&self) -> &Settings {
         self.settings
     }
 
@@ -156,17 +144,10 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     ///
     /// # Errors
     /// Those of the backend.
-    pub fn standings<const NU: usize>(
-        &self,
-        cases: &mut [Case<'_, NX>],
-    ) -> Result<Vec<Standing<NX>>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let states: Vec<[f32; NX]> = cases.iter().map(|case| case.state).collect();
-        let margins = self.margins(&states, Query::Measure)?;
-        let standing = |(state, check_margin): (&[f32; NX], f32)| Standing {
+    pub fn standings(&self, cases: &mut [Case<'_>]) -> Result<Vec<Standing>> {
+        let states = self.list().with(cases.iter().map(|case| &*case.state));
+        let margins = self.margins(states.view(), Query::Measure)?;
+        let standing = |(state, check_margin): (&[f32], f32)| Standing {
             tier: match self.asked.global && check_margin > 0.0 && self.covers(state) {
                 true => Tier::Global,
                 false => Tier::Recovery,
@@ -176,50 +157,42 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
             growth: None,
             refused: false,
         };
-        let mut standings: Vec<Standing<NX>> = states.iter().zip(margins).map(standing).collect();
-        let open = |standing: &Standing<NX>| standing.tier == Tier::Recovery;
+        let mut standings: Vec<Standing> = states.iter().zip(margins).map(standing).collect();
+        let open = |standing: &Standing| standing.tier == Tier::Recovery;
         let left: Vec<usize> = (0..cases.len()).filter(|&i| open(&standings[i])).collect();
-        self.slices(&states, &left, &mut standings)?;
+        self.slices(states.view(), &left, &mut standings)?;
         if self.asked.local {
             self.grow(cases, &left, &mut standings)?;
         }
         Ok(standings)
     }
 
+    /// No state yet.
+    fn list(&self) -> StateList {
+        StateList::new(self.settings.state.len())
+    }
+
     /// Whether the deviation bound speaks of `state`, as far as that is asked.
-    fn covers(&self, state: &[f32; NX]) -> bool {
+    fn covers(&self, state: &[f32]) -> bool {
         let Settings { low, high, .. } = self.settings;
-        let inside = || (0..NX).all(|i| low[i] <= state[i] && state[i] <= high[i]);
+        let inside = || (0..state.len()).all(|i| low[i] <= state[i] && state[i] <= high[i]);
         self.asked.domain == Domain::Anywhere || inside()
     }
 
     /// `V_check` of each state, or its sign.
-    fn margins<const NU: usize>(&self, states: &[[f32; NX]], query: Query) -> Result<Vec<f32>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let context = Context { backend: self.backend, plant: self.plant, watch: &Unwatched };
+    fn margins(&self, states: States<'_>, query: Query) -> Result<Vec<f32>> {
+        let context = Context { program: self.program, watch: &Unwatched };
         let (spec, losses) = (&self.settings.spec, &self.tightened.losses);
         check_margins(context, spec, losses, states, query, self.band)
     }
 
     /// The certified cells of the slices through the states `left`. Signs in f32: a cell says
     /// where to grow a ball and where to steer, and claims nothing.
-    fn slices<const NU: usize>(
-        &self,
-        states: &[[f32; NX]],
-        left: &[usize],
-        standings: &mut [Standing<NX>],
-    ) -> Result<()>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let cells: Vec<[f32; NX]> =
-            left.iter().flat_map(|&i| slice_through(self.settings, &states[i])).collect();
+    fn slices(&self, states: States<'_>, left: &[usize], standings: &mut [Standing]) -> Result<()> {
+        let slices = left.iter().map(|&i| slice_through(self.settings, states.row(i)));
+        let cells = slices.fold(self.list(), |cells, slice| cells.with(slice.iter()));
         let per_slice = cells.len() / left.len().max(1);
-        let signs = self.margins(&cells, Query::Sign)?;
+        let signs = self.margins(cells.view(), Query::Sign)?;
         for (&i, signs) in left.iter().zip(signs.chunks(per_slice.max(1))) {
             standings[i].certified = signs.iter().map(|sign| *sign > 0.0).collect();
         }
@@ -229,16 +202,12 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
     /// Grows a ball for each of the cases `left` whose slice has a boundary and whose ledger
     /// allows it. The centre is the boundary cell of the slice that the study's rule picks: the ray
     /// search of a stored certificate costs a hundred times as many rollouts.
-    fn grow<const NU: usize>(
+    fn grow(
         &self,
-        cases: &mut [Case<'_, NX>],
+        cases: &mut [Case<'_>],
         left: &[usize],
-        standings: &mut [Standing<NX>],
-    ) -> Result<()>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+        standings: &mut [Standing],
+    ) -> Result<()> {
         let mut requests = Vec::new();
         let mut asking = Vec::new();
         for &i in left {
@@ -259,14 +228,14 @@ impl<'a, S, P, const NX: usize> Certifier<'a, S, P, NX> {
             requests.push(Request { center: boundary.point, seed: case.seed, call: case.step });
             asking.push(i);
         }
-        let context = Context { backend: self.backend, plant: self.plant, watch: &Unwatched };
+        let context = Context { program: self.program, watch: &Unwatched };
         let grown = grow_each(context, self.settings, &requests, self.band)?;
         for ((i, request), grown) in asking.into_iter().zip(requests).zip(grown) {
             let (ball, verified) = match grown.outcome {
                 Growth::Verified(ball) => (ball, true),
                 Growth::Exhausted { last_radius: radius } => {
-                    let varies = self.settings.growth.varies.to_vec();
-                    (Ball { center: request.center.to_vec(), radius, varies }, false)
+                    let varies = self.settings.growth.varies.clone();
+                    (Ball { center: request.center.clone(), radius, varies }, false)
                 }
             };
             if verified && ball.contains(&cases[i].state) {

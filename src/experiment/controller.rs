@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::settings::RaceSettings;
-use crate::backend::Backend;
+use crate::backend::{Backend, Program};
 use crate::control::FilterStatus;
 use crate::control::tier::{LocalGrowth, Tier};
 use crate::error::Result;
@@ -172,10 +172,12 @@ impl Name {
 }
 
 /// What controllers are made of.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct World<'a> {
     /// Who runs the rollouts.
     pub backend: &'a Backend,
+    /// The plant under the reachability policy, prepared.
+    pub program: &'a Program<'a>,
     /// The plant.
     pub system: &'a DroneRace,
     /// The reachability policy.
@@ -189,7 +191,7 @@ pub struct World<'a> {
     /// The race.
     pub race: &'a RaceSettings,
     /// The certificates.
-    pub certificates: &'a Settings<12>,
+    pub certificates: &'a Settings,
 }
 
 /// A race under way.
@@ -213,7 +215,7 @@ pub struct Decision {
     /// `V_check`, where it was computed.
     pub check_margin: Option<f32>,
     /// The ball of local growth, where one was grown.
-    pub growth: Option<LocalGrowth<12>>,
+    pub growth: Option<LocalGrowth>,
     /// The certified cells of the slice, where they were computed.
     pub certified: Vec<bool>,
     /// The point that recovery steers to.

@@ -11,7 +11,7 @@ use crate::control::mppi::{policy_plan, shifted};
 use crate::control::tier::{Asked, Case, Certifier, Standing, Tier};
 use crate::cost::RaceReference;
 use crate::error::Result;
-use crate::policy::{Mlp, Policy};
+use crate::policy::Policy;
 use crate::rollout::{Disturbance, ValueTerm};
 use crate::scenario::global::slice_through;
 use crate::scenario::ledger::Ledger;
@@ -29,7 +29,7 @@ const DISTURBED: [(usize, f32); 3] = [(7, 0.01), (9, 0.01), (11, 0.01)];
 /// The four tiers.
 pub(super) struct Hybrid<'a> {
     world: World<'a>,
-    certifier: Certifier<'a, DroneRace, Mlp, 12>,
+    certifier: Certifier<'a>,
     fast: Plan<'a>,
     recovery: Plan<'a>,
     paths: Paths,
@@ -52,8 +52,7 @@ impl<'a> Hybrid<'a> {
         let asked = &world.race.hybrid;
         let HybridSettings { global, local, domain, .. } = *asked;
         let certificates = Asked { global, local, domain };
-        let plant = crate::rollout::Plant { system: world.system, policy: world.policy };
-        let certifier = Certifier::new(world.backend, plant, world.certificates, certificates)?;
+        let certifier = Certifier::new(world.program, world.certificates, certificates)?;
         let fast = Plan::new("race.hybrid.fast", &asked.fast, world.system)?;
         let mut recovery = Plan::new("race.hybrid.recovery", &asked.recovery, world.system)?;
         let (weight, threshold) = (asked.value_weight, asked.value_threshold);
@@ -133,7 +132,7 @@ impl<'a> Hybrid<'a> {
     }
 
     /// The standings of the races outside of tier 0, and what each spent on them.
-    fn standings(&mut self, step: u32, races: &[Active]) -> Result<(Vec<Standing<12>>, Vec<f64>)> {
+    fn standings(&mut self, step: u32, races: &[Active]) -> Result<(Vec<Standing>, Vec<f64>)> {
         let places: Vec<usize> = races.iter().map(|race| race.place).collect();
         let spent = |races: &[Memory], place: usize| races[place].ledger.total();
         let before: Vec<f64> = places.iter().map(|&place| spent(&self.races, place)).collect();
@@ -142,7 +141,7 @@ impl<'a> Hybrid<'a> {
         let mut cases = Vec::with_capacity(races.len());
         for race in races {
             let ledger = ledgers[race.place].take().expect("a race has one place");
-            cases.push(Case { state: race.state, seed: race.seed, step, ledger });
+            cases.push(Case { state: race.state.to_vec(), seed: race.seed, step, ledger });
         }
         let standings = self.certifier.standings(&mut cases)?;
         drop(cases);
@@ -159,10 +158,10 @@ impl<'a> Hybrid<'a> {
     fn recover(
         &self,
         step: u32,
-        races: &[(Active, &Standing<12>)],
+        races: &[(Active, &Standing)],
     ) -> Result<Vec<(Decision, [f32; 3])>> {
         let horizon = self.recovery.planner.horizon();
-        let begin = |(race, standing): &(Active, &Standing<12>)| {
+        let begin = |(race, standing): &(Active, &Standing)| {
             let (plan, states) = self.policy_plan(race.state, horizon);
             let point = self.recovery_point(&race.state, standing, &states);
             let reference = |t: usize| RaceReference {
@@ -192,7 +191,7 @@ impl<'a> Hybrid<'a> {
     fn recovery_point(
         &self,
         x: &[f32; 12],
-        standing: &Standing<12>,
+        standing: &Standing,
         planned: &[[f32; 12]],
     ) -> [f32; 3] {
         let gate = [0.0, 0.0, x[4]];
@@ -212,7 +211,7 @@ impl<'a> Hybrid<'a> {
     }
 
     /// The certified cells of the slice through `x`.
-    fn cells(&self, x: &[f32; 12], standing: &Standing<12>) -> Vec<[f32; 2]> {
+    fn cells(&self, x: &[f32; 12], standing: &Standing) -> Vec<[f32; 2]> {
         let states = slice_through(self.certifier.settings(), x);
         let certified = states.iter().zip(&standing.certified).filter(|(_, certified)| **certified);
         certified.map(|(x, _)| [x[0], x[2]]).collect()
@@ -241,10 +240,9 @@ impl Hybrid<'_> {
     fn decide_outside(&mut self, step: u32, races: &[Active]) -> Result<Vec<Decision>> {
         let begun = Instant::now();
         let (standings, spent) = self.standings(step, races)?;
-        let recovers = |standing: &Standing<12>| {
-            standing.tier == Tier::Recovery && self.settings().recovery_tier
-        };
-        let lost: Vec<(Active, &Standing<12>)> = races
+        let recovers =
+            |standing: &Standing| standing.tier == Tier::Recovery && self.settings().recovery_tier;
+        let lost: Vec<(Active, &Standing)> = races
             .iter()
             .zip(&standings)
             .filter(|(_, standing)| recovers(standing))

@@ -25,14 +25,17 @@ pub(super) fn picture(
     let verdicts = Judge::ALL.map(|judge| (judge, verdict(judge, &flight.states)));
     let decided = flight.decisions.iter().map(Some).chain(std::iter::once(None));
     let frames = flight.states.iter().zip(decided).enumerate();
-    let [across, along] = &world.certificates.slice;
+    let axis = |i: usize| {
+        let axes = world.certificates.slice.as_ref();
+        axes.map_or_else(Vec::new, |axes| axes[i].values.clone())
+    };
     Ok(PictureRecord {
         controller: name.text().to_owned(),
         start: number as u64,
         noise_seed,
         verdicts: verdicts.to_vec(),
-        slice_x: across.values.clone(),
-        slice_y: along.values.clone(),
+        slice_x: axis(0),
+        slice_y: axis(1),
         frames: frames.map(|(step, (x, decision))| frame(step as u32, x, decision)).collect(),
     })
 }

@@ -19,13 +19,15 @@ use super::record::{
 use super::roster::{absent, certifies, controller, settings, values};
 use super::settings::RaceSettings;
 use super::summary::Summary;
+use super::weights::note;
 use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, claim_folder};
+use crate::files::{Staged, claim_folder, make_way};
 use crate::policy::Mlp;
-use crate::rollout::Plant;
+use crate::rollout::States;
+use crate::scenario::sampling::sampling;
 use crate::scenario::settings::Joint;
 use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
@@ -33,11 +35,13 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
+/// Starts whose rollouts under the policy are looked at for what samples do not tell.
+const LOOKED_AT: usize = 16;
 /// Room for record, page and manifest, bytes.
 const RECORD_BYTES: u64 = 2 << 20;
 
 /// What is to be raced.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Experiment<'a> {
     /// What controllers are made of.
     pub world: World<'a>,
@@ -72,6 +76,15 @@ pub struct TimingRecord {
 }
 
 impl Experiment<'_> {
+    /// Removes the results of other work from the folder, once nothing is wrong with this.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::run`] before any race.
+    pub fn make_way(&self) -> Result<()> {
+        self.check(&[])?;
+        make_way(&self.folder, &format!("{:#}\n", self.manifest()))
+    }
+
     /// Runs what is not stored yet and makes the record of all.
     ///
     /// # Errors
@@ -213,11 +226,9 @@ impl Experiment<'_> {
         absent: Vec<(Name, String)>,
         watch: &dyn Watch,
     ) -> Result<RaceRecord> {
-        let World { backend, system, policy, value, disturbance, ppo, race, certificates } =
-            self.world;
+        let World { program, value, disturbance, ppo, race, certificates, .. } = self.world;
         let hybrid = summaries.iter().find(|(name, _)| *name == Name::Hybrid);
         let hybrid = hybrid.map(|(_, summary)| summary);
-        let plant = Plant { system, policy };
         let absent = absent
             .into_iter()
             .map(|(name, reason)| AbsentRecord { name: name.text().to_owned(), reason });
@@ -233,7 +244,7 @@ impl Experiment<'_> {
         let disturbance = disturbance.filter(|_| tiered);
         Ok(RaceRecord {
             schema: RACE_SCHEMA,
-            provenance: provenance(backend, plant, certificates.seed, self.config.clone()),
+            provenance: provenance(program, certificates.seed, self.config.clone()),
             value_sha256: value.map(Mlp::digest),
             disturbance_sha256: disturbance.map(Mlp::digest),
             ppo_sha256: ppo.map(Mlp::digest),
@@ -246,7 +257,20 @@ impl Experiment<'_> {
             absent: absent.collect(),
             picture: shown,
             events: self.events(&ran)?,
+            notes: self.notes(summaries),
         })
+    }
+
+    /// What has to be said beside the figures: of states at samples, and of plans whose weights say
+    /// little.
+    fn notes(&self, summaries: &[(Name, Summary)]) -> Vec<String> {
+        let World { program, race, certificates, .. } = self.world;
+        let few = &self.starts[..self.starts.len().min(LOOKED_AT)];
+        let mut notes = sampling(program.plant(), States::from(few), certificates.spec.horizon);
+        notes.extend(summaries.iter().filter_map(|(name, summary)| {
+            note(*name, &settings(*name, race), summary.plan_means())
+        }));
+        notes
     }
 
     /// What failed on the adapter, in this run and in those that stored races of `names` before it.
@@ -273,9 +297,9 @@ impl Experiment<'_> {
 
     /// What V_check is computed with.
     fn bounds(&self) -> Result<BoundsRecord> {
-        let World { backend, system, policy, certificates, .. } = self.world;
+        let World { program, certificates, .. } = self.world;
         let asked = Asked { global: true, local: false, domain: Domain::Anywhere };
-        let certifier = Certifier::new(backend, Plant { system, policy }, certificates, asked)?;
+        let certifier = Certifier::new(program, certificates, asked)?;
         let Tightened { constants, deviation, .. } = certifier.tightened().clone();
         Ok(BoundsRecord { constants, deviation, band: certifier.band() })
     }
@@ -326,11 +350,9 @@ impl Experiment<'_> {
 
     /// Everything that the races depend on but their controller and noise seed, the program included.
     pub(super) fn manifest(&self) -> serde_json::Value {
-        let World { backend, system, policy, value, disturbance, ppo, certificates, .. } =
-            self.world;
+        let World { program, value, disturbance, ppo, certificates, .. } = self.world;
         let digest = |network: Option<&Mlp>| network.map(Mlp::digest);
-        let origin =
-            provenance(backend, Plant { system, policy }, certificates.seed, self.config.clone());
+        let origin = provenance(program, certificates.seed, self.config.clone());
         serde_json::json!({
             "schema": RACE_SCHEMA,
             "program_sha256": program_sha256(),

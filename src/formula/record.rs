@@ -181,12 +181,28 @@ impl Graph {
     /// # Panics
     /// If the number of inputs is not the graph's.
     pub fn eval<R: Real>(&self, inputs: &[R]) -> Vec<R> {
-        assert_eq!(inputs.len(), self.inputs, "inputs of the graph");
         let mut values: Vec<R> = Vec::with_capacity(self.nodes.len());
-        for node in &self.nodes {
-            values.push(node.value(inputs, &values));
-        }
+        self.replay(inputs, &mut values);
         self.outputs.iter().map(|&i| values[i as usize]).collect()
+    }
+
+    /// The first output for `inputs`; `values` is room that calls may share.
+    ///
+    /// # Panics
+    /// If the number of inputs is not the graph's, or there is no output.
+    pub fn eval_first<R: Real>(&self, inputs: &[R], values: &mut Vec<R>) -> R {
+        self.replay(inputs, values);
+        values[self.outputs[0] as usize]
+    }
+
+    /// The values of all nodes for `inputs`.
+    fn replay<R: Real>(&self, inputs: &[R], values: &mut Vec<R>) {
+        assert_eq!(inputs.len(), self.inputs, "inputs of the graph");
+        values.clear();
+        for node in &self.nodes {
+            let value = node.value(inputs, values);
+            values.push(value);
+        }
     }
 }
 

@@ -64,7 +64,7 @@ impl Plant {
 
 impl Model {
     /// The inputs of the formulas.
-    fn arguments<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
+    pub(crate) fn arguments<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
         let parameters = self.parameters.iter().map(|parameter| R::lit(parameter.value));
         // A step is a whole number below 2^24: exact.
         let step = R::lit(step as f32);
@@ -88,7 +88,11 @@ impl Model {
     }
 
     fn margin<R: Real>(&self, margin: &Graph, x: &[R], step: u32) -> R {
-        let u = vec![R::lit(0.0); self.controls.len()];
-        margin.eval(&self.arguments(x, &u, step))[0]
+        margin.eval_first(&self.at_state(x, step), &mut Vec::with_capacity(margin.nodes.len()))
+    }
+
+    /// The inputs of the formulas at a state, where no formula reads a control.
+    pub(crate) fn at_state<R: Real>(&self, x: &[R], step: u32) -> Vec<R> {
+        self.arguments(x, &vec![R::lit(0.0); self.controls.len()], step)
     }
 }

@@ -17,6 +17,14 @@ impl<'a> States<'a> {
         Self { size, numbers }
     }
 
+    /// A single state.
+    ///
+    /// # Panics
+    /// If it has no number.
+    pub fn one(state: &'a [f32]) -> Self {
+        Self::new(state, state.len())
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         self.numbers.len() / self.size
@@ -112,6 +120,14 @@ impl StateList {
     /// One after the other.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[f32]> {
         self.view().iter()
+    }
+
+    /// All of them as arrays of `NX` numbers.
+    ///
+    /// # Panics
+    /// If a state has fewer.
+    pub fn arrays<const NX: usize>(&self) -> Vec<[f32; NX]> {
+        self.iter().map(|state| std::array::from_fn(|i| state[i])).collect()
     }
 
     /// All of them.

@@ -5,10 +5,8 @@ use super::record::SliceRecord;
 use super::settings::Settings;
 use super::{Context, settings::BoundarySearch};
 use crate::error::Result;
-use crate::policy::Policy;
 use crate::real::Lanes;
-use crate::rollout::{Purpose, Query, Stream, Tightening, sample_ball};
-use crate::system::System;
+use crate::rollout::{Purpose, Query, StateList, States, Stream, Tightening, sample_ball};
 
 /// Directions of each sweep of the ray search.
 const DIRECTIONS: u64 = 512;
@@ -26,24 +24,20 @@ const STRAIGHT: f64 = 0.9;
 
 /// A certified state next to one that is not, and its distance from the state searched from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Boundary<const NX: usize> {
+pub struct Boundary {
     /// The certified state.
-    pub point: [f32; NX],
+    pub point: Vec<f32>,
     /// Its Euclidean distance.
     pub distance: f64,
 }
 
 /// The closest boundary point by the method that `settings` ask for; none if there is none.
-pub fn search<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+pub fn search(
+    context: Context<'_>,
+    settings: &Settings,
     tightening: &Tightening,
     slice: &SliceRecord,
-) -> Result<Option<Boundary<NX>>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Option<Boundary>> {
     match settings.growth.boundary {
         BoundarySearch::Slice => {
             let certified: Vec<bool> = slice.check_margin.iter().map(|v| *v > 0.0).collect();
@@ -57,24 +51,20 @@ where
 /// slice counts as uncertified), cells ahead of the velocity preferred, then the nearest.
 ///
 /// `certified` says it of each cell of the slice through `state`, row by row.
-pub(crate) fn on_slice<const NX: usize>(
-    settings: &Settings<NX>,
-    state: &[f32; NX],
-    certified: &[bool],
-) -> Option<Boundary<NX>> {
-    let [columns, rows] = [0, 1].map(|axis| settings.slice[axis].values.len());
+pub(crate) fn on_slice(settings: &Settings, state: &[f32], certified: &[bool]) -> Option<Boundary> {
+    let [columns, rows] = settings.slice_size();
     let certified = |row: usize, column: usize| {
         row < rows && column < columns && certified[row * columns + column]
     };
     let states = slice_through(settings, state);
-    let mut cells = Vec::new();
+    let mut cells: Vec<&[f32]> = Vec::new();
     for row in 0..rows {
         for column in 0..columns {
             let surrounded = NEIGHBOURS.iter().all(|(dr, dc)| {
                 certified(row.wrapping_add_signed(*dr), column.wrapping_add_signed(*dc))
             });
             if certified(row, column) && !surrounded {
-                cells.push(states[row * columns + column]);
+                cells.push(states.row(row * columns + column));
             }
         }
     }
@@ -82,14 +72,10 @@ pub(crate) fn on_slice<const NX: usize>(
 }
 
 /// The nearest of `cells`, of those ahead of the velocity if there are any.
-fn nearest<const NX: usize>(
-    heading: Option<[usize; 4]>,
-    state: &[f32; NX],
-    mut cells: Vec<[f32; NX]>,
-) -> Option<Boundary<NX>> {
+fn nearest(heading: Option<[usize; 4]>, state: &[f32], mut cells: Vec<&[f32]>) -> Option<Boundary> {
     if let Some([x, vx, y, vy]) = heading {
         let speed = f64::from(state[vx]).hypot(f64::from(state[vy]));
-        let ahead = |cell: &[f32; NX], least_cosine: f64| {
+        let ahead = |cell: &[f32], least_cosine: f64| {
             let (dx, dy) = (f64::from(cell[x] - state[x]), f64::from(cell[y] - state[y]));
             let projection = dx * f64::from(state[vx]) + dy * f64::from(state[vy]);
             projection > 0.0 && projection > least_cosine * speed * dx.hypot(dy)
@@ -100,13 +86,14 @@ fn nearest<const NX: usize>(
             }
         }
     }
-    let measured =
-        cells.into_iter().map(|point| Boundary { point, distance: distance(&point, state) });
+    let measured = cells
+        .into_iter()
+        .map(|point| Boundary { point: point.to_vec(), distance: distance(point, state) });
     measured.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
 /// Euclidean distance.
-pub(super) fn distance<const NX: usize>(a: &[f32; NX], b: &[f32; NX]) -> f64 {
+pub(super) fn distance(a: &[f32], b: &[f32]) -> f64 {
     let square = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).powi(2);
     a.iter().zip(b).map(square).sum::<f64>().sqrt()
 }
@@ -115,81 +102,84 @@ pub(super) fn distance<const NX: usize>(a: &[f32; NX], b: &[f32; NX]) -> f64 {
 /// ever closer to the best one.
 ///
 /// Searches inside the box only: the certificate says nothing outside.
-fn along_rays<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+fn along_rays(
+    context: Context<'_>,
+    settings: &Settings,
     tightening: &Tightening,
-) -> Result<Option<Boundary<NX>>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Option<Boundary>> {
     let rays = DIRECTIONS * (POINTS + BISECTIONS) as u64;
     context.watch.begin("boundary search", rays * SPREADS.len() as u64);
-    let certified = |states: &[[f32; NX]]| -> Result<Vec<bool>> {
+    let certified = |states: States<'_>| -> Result<Vec<bool>> {
         let margins = check_margins(context, &settings.spec, tightening, states, Query::Sign, 0.0)?;
         let inside =
-            |x: &[f32; NX]| (0..NX).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
+            |x: &[f32]| (0..x.len()).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
         Ok(states.iter().zip(margins).map(|(x, margin)| margin > 0.0 && inside(x)).collect())
     };
-    let start_certified = certified(&[settings.state])?[0];
-    let mut best: Option<(Boundary<NX>, [f32; NX])> = None;
+    let start_certified = certified(States::one(&settings.state))?[0];
+    let mut best: Option<Found> = None;
     for (sweep, spread) in SPREADS.into_iter().enumerate() {
-        let around = best.as_ref().map(|(_, direction)| (*direction, spread));
+        let around = best.as_ref().map(|found| (&*found.direction, spread));
         let directions = directions(settings, sweep as u32, around);
-        let found = sweep_rays(settings, &directions, start_certified, certified)?;
-        let nearer = |boundary: &Boundary<NX>| {
-            best.as_ref().is_none_or(|(best, _)| boundary.distance < best.distance)
+        let found = sweep_rays(settings, directions.view(), start_certified, certified)?;
+        let nearer = |found: &Found| {
+            best.as_ref().is_none_or(|best| found.boundary.distance < best.boundary.distance)
         };
-        if let Some(found) = found.filter(|(boundary, _)| nearer(boundary)) {
+        if let Some(found) = found.filter(nearer) {
             best = Some(found);
         }
     }
-    Ok(best.map(|(boundary, _)| boundary))
+    Ok(best.map(|found| found.boundary))
 }
 
 /// Unit directions in the coordinates that vary: uniform, or spread around a given one.
-fn directions<const NX: usize>(
-    settings: &Settings<NX>,
-    sweep: u32,
-    around: Option<([f32; NX], f32)>,
-) -> Vec<[f32; NX]> {
+fn directions(settings: &Settings, sweep: u32, around: Option<(&[f32], f32)>) -> StateList {
     let stream = Stream::new(settings.seed, Purpose::Direction, sweep);
     let draw = |index: u64| {
-        let mut offset = [Lanes([0.0]); NX];
+        let mut offset = vec![Lanes([0.0]); settings.state.len()];
         sample_ball::<1>(stream, index, |i| settings.growth.varies[i], &mut offset);
-        let mut direction = unit(offset.map(|lane| lane.0[0]));
-        if let Some((center, spread)) = around {
-            direction = unit(std::array::from_fn(|i| center[i] + spread * direction[i]));
+        let direction = unit(offset.into_iter().map(|lane| lane.0[0]).collect());
+        match around {
+            Some((center, spread)) => {
+                let both = center.iter().zip(direction);
+                unit(both.map(|(center, direction)| center + spread * direction).collect())
+            }
+            None => direction,
         }
-        direction
     };
-    (0..DIRECTIONS).map(draw).collect()
+    StateList::new(settings.state.len()).with((0..DIRECTIONS).map(draw))
 }
 
 /// `vector` scaled to length one.
-fn unit<const NX: usize>(vector: [f32; NX]) -> [f32; NX] {
+fn unit(mut vector: Vec<f32>) -> Vec<f32> {
     let length = vector.iter().map(|x| x * x).sum::<f32>().sqrt();
-    vector.map(|x| x / length)
+    vector.iter_mut().for_each(|x| *x /= length);
+    vector
+}
+
+/// A boundary point and the direction that it lies in.
+struct Found {
+    boundary: Boundary,
+    direction: Vec<f32>,
 }
 
 /// The closest change of `certified` along the rays, with its direction.
-fn sweep_rays<const NX: usize>(
-    settings: &Settings<NX>,
-    directions: &[[f32; NX]],
+fn sweep_rays(
+    settings: &Settings,
+    directions: States<'_>,
     start_certified: bool,
-    certified: impl Fn(&[[f32; NX]]) -> Result<Vec<bool>>,
-) -> Result<Option<(Boundary<NX>, [f32; NX])>> {
-    let at = |direction: &[f32; NX], length: f32| -> [f32; NX] {
-        std::array::from_fn(|i| settings.state[i] + length * direction[i])
+    certified: impl Fn(States<'_>) -> Result<Vec<bool>>,
+) -> Result<Option<Found>> {
+    let at = |direction: &[f32], length: f32| -> Vec<f32> {
+        let both = settings.state.iter().zip(direction);
+        both.map(|(state, direction)| state + length * direction).collect()
     };
-    let reach = settings.low.iter().zip(settings.high).map(|(low, high)| high - low);
+    let reach = settings.low.iter().zip(&settings.high).map(|(low, high)| high - low);
     let reach = reach.fold(0.0, f32::max);
     let lengths: Vec<f32> =
         (1..=POINTS).map(|k| reach * (k as f32 / POINTS as f32).powi(2)).collect();
-    let points: Vec<_> =
-        directions.iter().flat_map(|d| lengths.iter().map(|length| at(d, *length))).collect();
-    let inside = certified(&points)?;
+    let size = settings.state.len();
+    let points = directions.iter().flat_map(|d| lengths.iter().map(|length| at(d, *length)));
+    let inside = certified(StateList::new(size).with(points).view())?;
     // Brackets [near, far] of the first change along each ray; near has the state's side.
     let mut brackets = Vec::new();
     for (ray, inside) in inside.chunks(POINTS).enumerate() {
@@ -203,8 +193,9 @@ fn sweep_rays<const NX: usize>(
     }
     for _ in 0..BISECTIONS {
         let middle =
-            |(ray, near, far): &(usize, f32, f32)| at(&directions[*ray], 0.5 * (near + far));
-        let inside = certified(&brackets.iter().map(middle).collect::<Vec<_>>())?;
+            |(ray, near, far): &(usize, f32, f32)| at(directions.row(*ray), 0.5 * (near + far));
+        let middles = StateList::new(size).with(brackets.iter().map(middle));
+        let inside = certified(middles.view())?;
         for ((_, near, far), inside) in brackets.iter_mut().zip(inside) {
             let middle = 0.5 * (*near + *far);
             *(if inside == start_certified { near } else { far }) = middle;
@@ -213,7 +204,9 @@ fn sweep_rays<const NX: usize>(
     let closest = brackets.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
     Ok(closest.map(|(ray, near, far)| {
         // The certified end of the bracket.
-        let point = at(&directions[ray], if start_certified { near } else { far });
-        (Boundary { point, distance: distance(&point, &settings.state) }, directions[ray])
+        let direction = directions.row(ray).to_vec();
+        let point = at(&direction, if start_certified { near } else { far });
+        let distance = distance(&point, &settings.state);
+        Found { boundary: Boundary { point, distance }, direction }
     }))
 }

@@ -5,20 +5,21 @@ use std::time::Instant;
 
 use super::boundary;
 use super::ledger::{Entry, Ledger, Spend};
+use super::lipschitz::{self, MarginBox};
 use super::record::{
     ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
-    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
+    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing, decimal,
 };
 use super::settings::Settings;
-use super::{Context, Watch, derived, deviation, global, growth, lipschitz};
-use crate::backend::{Backend, physics};
+use super::{Context, Watch, derived, deviation, global, growth};
+use crate::backend::Program;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::policy::Policy;
+use crate::model::{Model, Plant};
+use crate::policy::Mlp;
 use crate::rollout::{
-    GENERATOR, Plant, Purpose, Query, Region, RolloutSpec, Stream, Tightening, measure, trajectory,
+    GENERATOR, Purpose, Query, Region, RolloutSpec, States, Stream, Tightening, replay,
 };
-use crate::system::System;
 
 /// Rollouts drawn in the picture: the state's, and that many starts of the growth.
 const PICTURED: usize = 12;
@@ -28,16 +29,10 @@ const GRADIENT_SAMPLES: u32 = 4096;
 const WIDER: f32 = 10.0;
 
 /// Names and number of the coordinates that vary and of those that are frozen.
-pub(super) fn coordinates<S, const NX: usize, const NU: usize>(
-    system: &S,
-    varies: &[bool],
-) -> (usize, Vec<String>)
-where
-    S: System<NX, NU>,
-{
-    let frozen = system.states().into_iter().zip(varies).filter(|(_, varies)| !**varies);
-    let frozen: Vec<String> = frozen.map(|(axis, _)| axis.name).collect();
-    (NX - frozen.len(), frozen)
+pub(super) fn coordinates(model: &Model, varies: &[bool]) -> (usize, Vec<String>) {
+    let frozen = model.states.iter().zip(varies).filter(|(_, varies)| !**varies);
+    let frozen: Vec<String> = frozen.map(|(axis, _)| axis.name.clone()).collect();
+    (model.states.len() - frozen.len(), frozen)
 }
 
 /// Certifies the plant: every number of the [`Record`] but the threads of its timing.
@@ -47,19 +42,15 @@ where
 /// # Errors
 /// [`Error::TooFewScenarios`] and [`Error::Invalid`] before any work; those of the backend;
 /// [`Error::Interrupted`] if `watch` says so.
-pub fn certify<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    settings: &Settings<NX>,
+pub fn certify(
+    program: &Program<'_>,
+    settings: &Settings,
     config: serde_json::Value,
     watch: &dyn Watch,
-) -> Result<Record>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Record> {
     let begun = Instant::now();
-    let context = Context { backend, plant, watch };
+    let context = Context { program, watch };
+    let (plant, backend) = (program.plant(), program.backend());
     check_settings(settings)?;
     let ledger = ledger(settings)?;
     let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
@@ -70,6 +61,8 @@ where
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, (&growth, global.band))?;
     let picture = picture(plant, settings, &growth);
+    let mut statements = derived::statements(settings, &deviation, &global, &growth);
+    statements.extend(derived::of_samples(plant, settings, &picture));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
@@ -77,11 +70,11 @@ where
         schema: SCHEMA,
         digests: BTreeMap::new(),
         holds: derived::holds(&deviation, &global, &growth),
-        statements: derived::statements(settings, &deviation, &global, &growth),
-        provenance: provenance(backend, plant, settings.seed, config),
-        system: system_record(plant.system, settings),
+        statements,
+        provenance: provenance(program, settings.seed, config),
+        system: system_record(&plant.model, settings),
         horizon: settings.spec.horizon,
-        gamma: f64::from(settings.spec.gamma),
+        gamma: decimal(settings.spec.gamma),
         constants,
         deviation,
         global,
@@ -97,22 +90,16 @@ where
 }
 
 /// Names, boxes and bodies of the system, with the box of starts that `settings` ask for.
-pub(super) fn system_record<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
-) -> SystemRecord
-where
-    S: System<NX, NU>,
-{
-    let mut states = system.states();
-    for (axis, (low, high)) in states.iter_mut().zip(settings.low.into_iter().zip(settings.high)) {
-        (axis.low, axis.high) = (low, high);
+pub(super) fn system_record(model: &Model, settings: &Settings) -> SystemRecord {
+    let mut states = model.states.clone();
+    for (axis, (low, high)) in states.iter_mut().zip(settings.low.iter().zip(&settings.high)) {
+        (axis.low, axis.high) = (*low, *high);
     }
     SystemRecord {
-        name: system.name().to_owned(),
-        states: states.to_vec(),
-        controls: system.controls().to_vec(),
-        bodies: system.bodies(),
+        name: model.name.clone(),
+        states,
+        controls: model.controls.clone(),
+        bodies: model.bodies.clone(),
     }
 }
 
@@ -121,11 +108,11 @@ where
 ///
 /// # Errors
 /// [`Error::TooFewScenarios`] and [`Error::Invalid`].
-pub fn check_settings<const NX: usize>(settings: &Settings<NX>) -> Result<()> {
+pub fn check_settings(settings: &Settings) -> Result<()> {
     growth::check_scenarios(&settings.growth)?;
     deviation::check_scenarios(&settings.deviation, settings.spec.horizon)?;
     ledger(settings)?;
-    Region::new_box(settings.low, settings.high).map(|_| ())
+    Region::new_box(&*settings.low, &*settings.high).map(|_| ())
 }
 
 /// What the margins lose with the constants used.
@@ -141,16 +128,9 @@ pub(super) fn tightening(
 ///
 /// # Errors
 /// [`Error::TooFewScenarios`] and [`Error::Invalid`] before any work; those of the backend.
-pub fn tightened<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-) -> Result<Tightened>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    Region::new_box(settings.low, settings.high)?;
-    let constants = constants(context.plant.system, settings)?;
+pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened> {
+    Region::new_box(&*settings.low, &*settings.high)?;
+    let constants = constants(context.model(), settings)?;
     let deviation = deviation::bound(context, settings)?;
     let losses = tightening(&deviation.bound, &constants, &settings.spec);
     Ok(Tightened { constants, deviation, losses })
@@ -168,25 +148,21 @@ pub struct Tightened {
 }
 
 /// The Lipschitz constants, computed, sampled, and used as `settings` ask.
-pub(super) fn constants<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
-) -> Result<ConstantsRecord>
-where
-    S: System<NX, NU>,
-{
-    let all = [true; NX];
-    let inside = lipschitz::margins(system, settings.low, settings.high, all);
-    let wider = |side: &[f32; NX], sign: f32| -> [f32; NX] {
-        std::array::from_fn(|i| side[i] + sign * WIDER * (settings.high[i] - settings.low[i]))
+pub(super) fn constants(model: &Model, settings: &Settings) -> Result<ConstantsRecord> {
+    let all = vec![true; model.states.len()];
+    let horizon = settings.spec.horizon;
+    let region = MarginBox { low: &settings.low, high: &settings.high, varies: &all, horizon };
+    let inside = lipschitz::margins(model, region);
+    let wider = |side: &[f32], sign: f32| -> Vec<f32> {
+        let widths = settings.low.iter().zip(&settings.high).map(|(low, high)| high - low);
+        side.iter().zip(widths).map(|(side, width)| side + sign * WIDER * width).collect()
     };
     let (low, high) = (wider(&settings.low, -1.0), wider(&settings.high, 1.0));
-    let outside = lipschitz::margins(system, low, high, all);
-    let (samples, seed) = (GRADIENT_SAMPLES, settings.seed);
-    let sampled = lipschitz::sampled(system, settings.low, settings.high, all, samples, seed);
+    let outside = lipschitz::margins(model, MarginBox { low: &low, high: &high, ..region });
+    let sampled = lipschitz::sampled(model, region, GRADIENT_SAMPLES, settings.seed);
     let one = |name: &str, given: Option<f64>, computed: f64, beyond: f64, sampled: f64| {
         let used = given.unwrap_or(computed);
-        if !(used.is_finite() && used > 0.0) {
+        if !(used.is_finite() && used >= 0.0) {
             let problem = format!(
                 "no finite Lipschitz constant of the {name} margin over the box (computed \
                  {computed}); give a smaller box or the constant itself"
@@ -222,7 +198,7 @@ where
 }
 
 /// The ledger of all claims; growth books every round it may take.
-pub(super) fn ledger<const NX: usize>(settings: &Settings<NX>) -> Result<Ledger> {
+pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
     let rounds = f64::from(growth.rounds);
     let global = settings.global.beta;
@@ -260,23 +236,19 @@ pub(super) fn spendings(ledger: &Ledger) -> Vec<Spending> {
 }
 
 /// Who computed what from which input.
-pub(crate) fn provenance<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+pub(crate) fn provenance(
+    program: &Program<'_>,
     seed: u64,
     config: serde_json::Value,
-) -> Provenance
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Provenance {
+    let (plant, backend) = (program.plant(), program.backend());
     let (physics_sha256, policy_sha256) = hashes(plant);
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed,
         generator: GENERATOR.to_owned(),
         config,
-        policy: plant.policy.name(),
+        policy: plant.controller.name.clone(),
         policy_sha256,
         physics_sha256,
         backend: backend.name().to_owned(),
@@ -285,49 +257,32 @@ where
 }
 
 /// SHA-256 of the recorded physics and of the policy.
-pub fn hashes<S, P, const NX: usize, const NU: usize>(plant: Plant<'_, S, P>) -> (String, String)
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let text = physics(plant);
-    let physics = digest::sha256([text.as_bytes()]);
+pub fn hashes(plant: &Plant) -> (String, String) {
+    let physics = digest::sha256([plant.text().as_bytes()]);
     // A formula is part of the recorded text.
-    let policy = plant.policy.network().map_or_else(|| physics.clone(), |mlp| mlp.digest());
+    let policy = plant.controller.network().map_or_else(|| physics.clone(), Mlp::digest);
     (physics, policy)
 }
 
 /// Tier and margins of the state.
-fn state<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+fn state(
+    context: Context<'_>,
+    settings: &Settings,
     tightening: &Tightening,
     (growth, band): (&GrowthRecord, f64),
-) -> Result<StateRecord>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let x = settings.state;
-    let query = Query::Measure;
-    let margins = global::check_margins(context, &settings.spec, tightening, &[x], query, band)?;
-    let check_margin = f64::from(margins[0]);
-    let target_margin = f64::from(context.plant.system.target(x));
-    let tier = super::verify::tier(target_margin, check_margin, growth, &x);
-    let constraint_margin = f64::from(context.plant.system.constraint(x));
+) -> Result<StateRecord> {
+    let (x, query) = (&*settings.state, Query::Measure);
+    let states = States::one(x);
+    let margins = global::check_margins(context, &settings.spec, tightening, states, query, band)?;
+    let check_margin = decimal(margins[0]);
+    let target_margin = decimal(context.model().target_at(x, 0));
+    let tier = super::verify::tier(target_margin, check_margin, growth, x);
+    let constraint_margin = decimal(context.model().constraint_at(x, 0));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }
 
 /// A few rollouts: the state's, then starts of the growth's last round.
-fn picture<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    settings: &Settings<NX>,
-    growth: &GrowthRecord,
-) -> PictureRecord
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn picture(plant: &Plant, settings: &Settings, growth: &GrowthRecord) -> PictureRecord {
     let region = Region::Box { low: settings.low.to_vec(), high: settings.high.to_vec() };
     let stream = Stream::new(settings.seed, Purpose::Picture, 0);
     let sampled = growth.samples.iter().take(PICTURED).map(|sample| sample.x.clone());
@@ -338,13 +293,9 @@ where
         starts.push(region.point(stream, index));
     }
     let none = Tightening::none(&settings.spec);
-    let rollouts = starts.into_iter().map(|start| {
-        let start: [f32; NX] = std::array::from_fn(|i| start[i]);
-        let states = trajectory::<f32, S, P, NX, NU>(plant, start, settings.spec.horizon);
-        RolloutRecord {
-            states: states.into_iter().map(|x| x.to_vec()).collect(),
-            success: measure(plant, start, &settings.spec, &none) > 0.0,
-        }
+    let rollouts = starts.into_iter().map(|start| RolloutRecord {
+        states: replay::states(plant, &start, settings.spec.horizon),
+        success: replay::measure(plant, &start, &settings.spec, &none) > 0.0,
     });
     PictureRecord { rollouts: rollouts.collect() }
 }

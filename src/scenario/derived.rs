@@ -2,14 +2,14 @@
 
 use super::certify::{constants, hashes, ledger, spendings, system_record};
 use super::record::{
-    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, Record, SliceAxisRecord,
+    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record, SliceRecord,
+    decimal,
 };
 use super::settings::Settings;
-use super::{deviation, global, growth, verify};
+use super::{deviation, global, growth, sampling, verify};
 use crate::error::Result;
-use crate::policy::Policy;
-use crate::rollout::{GENERATOR, Plant};
-use crate::system::System;
+use crate::model::{Model, Plant};
+use crate::rollout::{GENERATOR, StateList};
 
 /// `stored` with everything that follows from `settings` and its own counts computed again: claims,
 /// intervals, constants, the ledger, margins of the states, words. What rollouts came to is taken
@@ -17,59 +17,41 @@ use crate::system::System;
 ///
 /// # Errors
 /// Settings whose claims could not be made.
-pub(super) fn derived<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    settings: &Settings<NX>,
-    stored: &Record,
-) -> Result<Record>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let system = plant.system;
+pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Result<Record> {
+    let model = &*plant.model;
     let mut record = stored.clone();
     record.horizon = settings.spec.horizon;
-    record.gamma = f64::from(settings.spec.gamma);
+    record.gamma = decimal(settings.spec.gamma);
     record.provenance.seed = settings.seed;
     record.provenance.generator = GENERATOR.to_owned();
-    record.provenance.policy = plant.policy.name();
+    record.provenance.policy = plant.controller.name.clone();
     (record.provenance.physics_sha256, record.provenance.policy_sha256) = hashes(plant);
-    record.system = system_record(system, settings);
-    record.constants = constants(system, settings)?;
-    record.deviation = deviation::derived(system, settings, &stored.deviation)?;
-    record.global = global::derived(system, settings, &stored.global)?;
-    record.growth = growth::derived(system, settings, &stored.growth)?;
+    record.system = system_record(model, settings);
+    record.constants = constants(model, settings)?;
+    record.deviation = deviation::derived(model, settings, &stored.deviation)?;
+    record.global = global::derived(model, settings, &stored.global)?;
+    record.growth = growth::derived(model, settings, &stored.growth)?;
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
-    margins(&mut record, system, settings);
+    margins(&mut record, model, settings);
     record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    record.statements.extend(of_samples(plant, settings, &record.picture));
     record.holds = holds(&record.deviation, &record.global, &record.growth);
     Ok(record)
 }
 
 /// The states of the record, their margins of target and constraint, and the tier.
-fn margins<S, const NX: usize, const NU: usize>(
-    record: &mut Record,
-    system: &S,
-    settings: &Settings<NX>,
-) where
-    S: System<NX, NU>,
-{
-    let x = settings.state;
+fn margins(record: &mut Record, model: &Model, settings: &Settings) {
+    let x = &*settings.state;
     let state = &mut record.state;
     state.x = x.to_vec();
-    state.target_margin = f64::from(system.target(x));
-    state.constraint_margin = f64::from(system.constraint(x));
-    state.tier = verify::tier(state.target_margin, state.check_margin, &record.growth, &x);
-    let axis = |i: usize| SliceAxisRecord {
-        state: settings.slice[i].state,
-        values: settings.slice[i].values.clone(),
-    };
-    let cells = global::slice_through(settings, &x);
-    let slice = &mut record.slice;
-    (slice.x, slice.y) = (axis(0), axis(1));
-    slice.target_margin = cells.iter().map(|x| system.target(*x)).collect();
-    slice.constraint_margin = cells.iter().map(|x| system.constraint(*x)).collect();
+    state.target_margin = decimal(model.target_at(x, 0));
+    state.constraint_margin = decimal(model.constraint_at(x, 0));
+    state.tier = verify::tier(state.target_margin, state.check_margin, &record.growth, x);
+    let cells = global::slice_through(settings, x);
+    let check_margin = std::mem::take(&mut record.slice.check_margin);
+    record.slice =
+        SliceRecord { check_margin, ..global::slice_record(model, settings, cells.view()) };
 }
 
 /// Whether every claim that is asked for was obtained.
@@ -85,8 +67,8 @@ pub(super) fn holds(
 }
 
 /// The claims in words.
-pub(super) fn statements<const NX: usize>(
-    settings: &Settings<NX>,
+pub(super) fn statements(
+    settings: &Settings,
     deviation: &DeviationRecord,
     global: &GlobalRecord,
     growth: &GrowthRecord,
@@ -99,8 +81,22 @@ pub(super) fn statements<const NX: usize>(
     statements
 }
 
+/// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is
+/// too coarse for them.
+pub(super) fn of_samples(
+    plant: &Plant,
+    settings: &Settings,
+    picture: &PictureRecord,
+) -> Vec<String> {
+    let size = settings.state.len();
+    let first = |x: &&Vec<f32>| x.len() == size;
+    let firsts = picture.rollouts.iter().filter_map(|rollout| rollout.states.first());
+    let starts = StateList::new(size).with(firsts.filter(first));
+    sampling::sampling(plant, starts.view(), settings.spec.horizon)
+}
+
 /// The certified share of the box in words.
-fn share_statement<const NX: usize>(global: &GlobalRecord, settings: &Settings<NX>) -> String {
+fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
     let [low, high] = global.share_interval;
     format!(
         "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \

@@ -3,31 +3,31 @@
 use std::collections::BTreeSet;
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
-use super::record::{Claim, DeviationRecord};
+use super::record::{Claim, DeviationRecord, decimal};
 use super::settings::{DeviationSettings, DeviationSource, Joint, Settings};
 use super::{Context, linear};
 use crate::error::{Error, Result};
-use crate::policy::Policy;
+use crate::model::Model;
 use crate::rollout::{
     DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Region, RolloutSpec,
     Starts, Stream, Tightening,
 };
-use crate::system::System;
 
 /// Risk, beta and decision variables of each scenario program of a joint method.
-pub(super) struct Program {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Program {
     /// Decision variables d.
-    pub(super) decision_vars: u32,
+    pub(crate) decision_vars: u32,
     /// Risk of one program.
-    pub(super) epsilon: f64,
+    pub(crate) epsilon: f64,
     /// Beta of one program.
-    pub(super) beta: f64,
+    pub(crate) beta: f64,
 }
 
 impl Program {
     /// The program that `joint` makes of the deviation bound over `horizon` steps; the bound of
     /// step 0 is the radius itself and costs nothing.
-    pub(super) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
+    pub(crate) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
         let DeviationSettings { epsilon, beta, joint, .. } = *settings;
         let steps = f64::from(horizon);
         match joint {
@@ -49,17 +49,10 @@ struct Sample {
 }
 
 /// Draws the pairs and bounds the deviation; method and numbers as `settings` ask.
-pub fn bound<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-) -> Result<DeviationRecord>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecord> {
     let asked = &settings.deviation;
     let program = check_scenarios(asked, settings.spec.horizon)?;
-    let exact = exact(context.plant.system, settings)?;
+    let exact = exact(context.model(), settings)?;
     let pilot = (asked.joint == Joint::FixedShape).then_some(asked.pilot);
     let shape = match pilot {
         Some(count) => {
@@ -77,7 +70,7 @@ where
         conclude(&sample.farthest, shape.as_deref(), asked.radius);
     let measured =
         Measured { bound: scenario_bound, largest, scale, support, non_finite: sample.non_finite };
-    record(context.plant.system, settings, (&program, exact), measured)
+    record(context.model(), settings, (&program, exact), measured)
 }
 
 /// What only rollouts tell.
@@ -91,15 +84,12 @@ struct Measured {
 }
 
 /// The record, with what follows from the settings.
-fn record<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
+fn record(
+    model: &Model,
+    settings: &Settings,
     (program, exact): (&Program, Option<Vec<f64>>),
     measured: Measured,
-) -> Result<DeviationRecord>
-where
-    S: System<NX, NU>,
-{
+) -> Result<DeviationRecord> {
     let asked = &settings.deviation;
     let Measured { bound, largest, scale, support, non_finite } = measured;
     let bound = match (asked.source, &exact) {
@@ -107,9 +97,9 @@ where
         _ => bound,
     };
     Ok(DeviationRecord {
-        claim: claim(system, settings, program)?,
+        claim: claim(model, settings, program)?,
         // As it was written: 0.1, not 0.10000000149.
-        radius: asked.radius.to_string().parse().unwrap_or(f64::from(asked.radius)),
+        radius: decimal(asked.radius),
         control: asked.control,
         joint: asked.joint,
         source: asked.source,
@@ -125,20 +115,17 @@ where
 }
 
 /// What `stored` says as its own numbers and `settings` give it.
-pub(super) fn derived<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
+pub(super) fn derived(
+    model: &Model,
+    settings: &Settings,
     stored: &DeviationRecord,
-) -> Result<DeviationRecord>
-where
-    S: System<NX, NU>,
-{
+) -> Result<DeviationRecord> {
     let program = check_scenarios(&settings.deviation, settings.spec.horizon)?;
-    let exact = exact(system, settings)?;
+    let exact = exact(model, settings)?;
     let DeviationRecord { scale, support, non_finite, .. } = *stored;
     let (bound, largest) = (stored.bound.clone(), stored.largest.clone());
     let measured = Measured { bound, largest, scale, support, non_finite };
-    record(system, settings, (&program, exact), measured)
+    record(model, settings, (&program, exact), measured)
 }
 
 /// The program of the bound; refuses fewer pairs than it needs.
@@ -158,16 +145,10 @@ pub(super) fn check_scenarios(asked: &DeviationSettings, horizon: u32) -> Result
 }
 
 /// The exact supremum, for a system that is linear in its state under replayed controls.
-fn exact<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
-) -> Result<Option<Vec<f64>>>
-where
-    S: System<NX, NU>,
-{
+fn exact(model: &Model, settings: &Settings) -> Result<Option<Vec<f64>>> {
     let asked = &settings.deviation;
     let matrix = match asked.control {
-        PairControl::Replay => linear::state_matrix(system),
+        PairControl::Replay => linear::state_matrix(model, settings.spec.horizon),
         // Under feedback the policy bends the dynamics: no single matrix.
         PairControl::ClosedLoop => None,
     };
@@ -183,18 +164,14 @@ where
 }
 
 /// Rolls out `count` pairs of the streams `[nominal, perturbation]`.
-fn draw<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+fn draw(
+    context: Context<'_>,
+    settings: &Settings,
     [nominal, perturbation]: [Purpose; 2],
     count: u64,
-) -> Result<Sample>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Sample> {
     let stream = |purpose| Stream::new(settings.seed, purpose, 0);
-    let region = Region::new_box(settings.low, settings.high)?;
+    let region = Region::new_box(&*settings.low, &*settings.high)?;
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Drawn { region, stream: stream(nominal) },
@@ -207,7 +184,7 @@ where
         control: settings.deviation.control,
     };
     let mut non_finite = 0;
-    let farthest = context.backend.deviation(context.plant, &task, &mut |_, pairs| {
+    let farthest = context.program.deviation(&task, &mut |_, pairs| {
         let broken = pairs.iter().filter(|p| p.nominal == NON_FINITE || p.perturbed == NON_FINITE);
         non_finite += broken.count() as u64;
         context.watch.advance(pairs.len() as u64)
@@ -251,14 +228,7 @@ fn conclude(
 }
 
 /// The claim in words and numbers.
-fn claim<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
-    program: &Program,
-) -> Result<Claim>
-where
-    S: System<NX, NU>,
-{
+fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim> {
     let asked = &settings.deviation;
     let horizon = settings.spec.horizon;
     let joint = match asked.joint {
@@ -283,17 +253,18 @@ where
             "The margins are tightened with the exact supremum, which no pair exceeds. {confidence}"
         ),
     };
-    let region = Region::new_box(settings.low, settings.high)?;
-    let (dimension, frozen) = super::certify::coordinates(system, &region.varies());
+    let region = Region::new_box(&*settings.low, &*settings.high)?;
+    let (dimension, frozen) = super::certify::coordinates(model, &region.varies());
     // Risk of one program, times the programs whose risks add up.
     let programs = asked.epsilon / program.epsilon;
     let risk = certified_risk(asked.scenarios, u64::from(program.decision_vars) - 1, program.beta);
+    let states = model.states.len();
     Ok(Claim {
         name: "deviation".to_owned(),
         statement,
         measure: format!(
-            "nominal start uniform in the box, {dimension} of {NX} coordinates varying; perturbed \
-             start uniform in the Euclidean ball of radius {} around it, all {NX} coordinates",
+            "nominal start uniform in the box, {dimension} of {states} coordinates varying; perturbed \
+             start uniform in the Euclidean ball of radius {} around it, all {states} coordinates",
             asked.radius
         ),
         dimension,

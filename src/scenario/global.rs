@@ -1,21 +1,18 @@
 //! The certified set: `V_check` of any states, over a slice, and its conditional failure.
 
-use std::array::from_fn;
-
 use rayon::prelude::*;
 
 use super::Context;
 use super::bound::{certified_risk, interval};
+use super::finding::{Figure, Finding};
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord};
 use super::settings::Settings;
-use super::verify::Finding;
 use crate::error::Result;
-use crate::policy::Policy;
+use crate::model::{Model, Plant};
 use crate::rollout::{
-    DeviationTask, NON_FINITE, PairMeasure, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, Stream, Tightening, measure, pair_measures,
+    DeviationTask, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
+    RolloutSpec, Starts, StateList, States, Stream, Tightening, replay,
 };
-use crate::system::System;
 
 /// Pairs that are run in f32 and f64 to measure the f32 error.
 const ERROR_SAMPLE: u64 = 128;
@@ -25,39 +22,35 @@ const BAND_FACTOR: f64 = 8.0;
 const LEAST_BAND: f64 = 1e-5;
 
 /// `V_check` (or its sign) of each of `states`; a measure within `band` of zero is that of f64.
-pub fn check_margins<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
+pub fn check_margins(
+    context: Context<'_>,
     spec: &RolloutSpec,
     tightening: &Tightening,
-    states: &[[f32; NX]],
+    states: States<'_>,
     query: Query,
     band: f64,
-) -> Result<Vec<f32>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Vec<f32>> {
     let mut margins = Vec::with_capacity(states.len());
     if states.is_empty() {
         return Ok(margins);
     }
     let task = ReachAvoidTask {
-        starts: Starts::listed(states),
+        starts: Starts::Listed(states),
         range: 0..states.len() as u64,
         spec: *spec,
         tightening,
         query,
     };
-    context.backend.reach_avoid(context.plant, &task, &mut |_, values| {
+    context.program.reach_avoid(&task, &mut |_, values| {
         margins.extend_from_slice(values);
         context.watch.advance(values.len() as u64)
     })?;
     if query == Query::Measure {
         let near = |margin: &&mut f32| f64::from(margin.abs()) <= band;
-        let pairs = margins.iter_mut().zip(states);
+        let pairs = margins.iter_mut().zip(states.iter());
         for (margin, start) in pairs.filter(|(margin, _)| near(margin)) {
             // Rounding to f32 keeps the sign.
-            *margin = measure(context.plant, *start, spec, tightening) as f32;
+            *margin = replay::measure(context.plant(), start, spec, tightening) as f32;
         }
     }
     Ok(margins)
@@ -65,68 +58,62 @@ where
 
 /// `V_check`, target and constraint margin over the slice through the state; `band` as in
 /// [`check_margins`].
-pub fn slice<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+pub fn slice(
+    context: Context<'_>,
+    settings: &Settings,
     tightening: &Tightening,
     band: f64,
-) -> Result<SliceRecord>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<SliceRecord> {
     let states = slice_through(settings, &settings.state);
     context.watch.begin("slice", states.len() as u64);
-    let system = context.plant.system;
-    let axis = |i: usize| SliceAxisRecord {
-        state: settings.slice[i].state,
-        values: settings.slice[i].values.clone(),
-    };
-    Ok(SliceRecord {
-        x: axis(0),
-        y: axis(1),
-        check_margin: check_margins(
-            context,
-            &settings.spec,
-            tightening,
-            &states,
-            Query::Measure,
-            band,
-        )?,
-        target_margin: states.iter().map(|x| system.target(*x)).collect(),
-        constraint_margin: states.iter().map(|x| system.constraint(*x)).collect(),
-    })
+    let query = Query::Measure;
+    let mut slice = slice_record(context.model(), settings, states.view());
+    slice.check_margin =
+        check_margins(context, &settings.spec, tightening, states.view(), query, band)?;
+    Ok(slice)
 }
 
-/// The cells of the slice through `state`, row by row.
-pub fn slice_through<const NX: usize>(
-    settings: &Settings<NX>,
-    state: &[f32; NX],
-) -> Vec<[f32; NX]> {
-    let [across, along] = &settings.slice;
+/// The slice through `states` without `V_check`, which only rollouts tell; empty where there is no
+/// slice.
+pub(super) fn slice_record(model: &Model, settings: &Settings, states: States<'_>) -> SliceRecord {
+    let axis = |i: usize| match &settings.slice {
+        Some(axes) => SliceAxisRecord { state: axes[i].state, values: axes[i].values.clone() },
+        None => SliceAxisRecord { state: 0, values: Vec::new() },
+    };
+    SliceRecord {
+        x: axis(0),
+        y: axis(1),
+        check_margin: Vec::new(),
+        target_margin: states.iter().map(|x| model.target_at(x, 0)).collect(),
+        constraint_margin: states.iter().map(|x| model.constraint_at(x, 0)).collect(),
+    }
+}
+
+/// The cells of the slice through `state`, row by row; none where there is no slice.
+pub fn slice_through(settings: &Settings, state: &[f32]) -> StateList {
+    let Some([across, along]) = &settings.slice else {
+        return StateList::new(state.len());
+    };
     let cell = |y: f32, x: f32| {
-        let mut state = *state;
+        let mut state = state.to_vec();
         state[across.state] = x;
         state[along.state] = y;
         state
     };
-    along.values.iter().flat_map(|&y| across.values.iter().map(move |&x| cell(y, x))).collect()
+    let row = |y: f32| across.values.iter().map(move |&x| cell(y, x));
+    StateList::new(state.len()).with(along.values.iter().flat_map(|&y| row(y)))
 }
 
 /// Draws pairs from the box: how much of it is certified, and how often a perturbed rollout
 /// fails whose nominal start is, sections 4 and 8.3.
-pub fn conditional<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+pub fn conditional(
+    context: Context<'_>,
+    settings: &Settings,
     tightening: &Tightening,
     purposes: [Purpose; 2],
-) -> Result<GlobalRecord>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<GlobalRecord> {
     let draws = settings.global.draws;
-    let region = Region::new_box(settings.low, settings.high)?;
+    let region = Region::new_box(&*settings.low, &*settings.high)?;
     let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
@@ -142,44 +129,39 @@ where
     context.watch.begin("certified set", draws);
     let f32_error = f32_error(context, &task)?;
     let mut count = Count { band: band_of(f32_error), ..Count::default() };
-    context.backend.deviation(context.plant, &task, &mut |first, pairs| {
-        count.add(context.plant, &task, first, pairs);
+    context.program.deviation(&task, &mut |first, pairs| {
+        count.add(context.plant(), &task, first, pairs);
         context.watch.advance(pairs.len() as u64)
     })?;
-    conclude(context.plant.system, settings, &count, f32_error)
+    conclude(context.model(), settings, &count, f32_error)
 }
 
 /// What `stored` says as its own counts and `settings` give it.
-pub(super) fn derived<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
+pub(super) fn derived(
+    model: &Model,
+    settings: &Settings,
     stored: &GlobalRecord,
-) -> Result<GlobalRecord>
-where
-    S: System<NX, NU>,
-{
+) -> Result<GlobalRecord> {
     let GlobalRecord { accepted, reached, non_finite, f32_error, f64_reruns, .. } = *stored;
     let (band, failures) = (band_of(f32_error), stored.claim.failures);
     let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
-    conclude(system, settings, &count, f32_error)
+    conclude(model, settings, &count, f32_error)
 }
 
 /// Claim and intervals that the counts support.
-fn conclude<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
+fn conclude(
+    model: &Model,
+    settings: &Settings,
     count: &Count,
     f32_error: f64,
-) -> Result<GlobalRecord>
-where
-    S: System<NX, NU>,
-{
-    let region = Region::new_box(settings.low, settings.high)?;
+) -> Result<GlobalRecord> {
+    let region = Region::new_box(&*settings.low, &*settings.high)?;
     let box_volume = region.volume();
-    let (dimension, frozen) = super::certify::coordinates(system, &region.varies());
+    let (dimension, frozen) = super::certify::coordinates(model, &region.varies());
     let (draws, beta) = (settings.global.draws, settings.global.beta);
     let (low, high) = interval(count.accepted, draws, beta);
     let risk = certified_risk(count.accepted, count.failures, beta);
+    let states = model.states.len();
     let claim = Claim {
         name: "global".to_owned(),
         statement: format!(
@@ -189,9 +171,9 @@ where
             count.failures, count.accepted
         ),
         measure: format!(
-            "nominal start uniform in the certified part of the box, {dimension} of {NX} \
+            "nominal start uniform in the certified part of the box, {dimension} of {states} \
              coordinates varying; perturbed start uniform in the Euclidean ball of radius {} around \
-             it, all {NX} coordinates",
+             it, all {states} coordinates",
             settings.deviation.radius
         ),
         dimension,
@@ -234,16 +216,7 @@ struct Count {
 
 impl Count {
     /// Adds the pairs `first..`; a measure within the band is run again in f64.
-    fn add<S, P, const NX: usize, const NU: usize>(
-        &mut self,
-        plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_>,
-        first: u64,
-        pairs: &[PairMeasure],
-    ) where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+    fn add(&mut self, plant: &Plant, task: &DeviationTask<'_>, first: u64, pairs: &[PairMeasure]) {
         for (index, pair) in (first..).zip(pairs) {
             let (mut nominal, mut perturbed) = (f64::from(pair.nominal), f64::from(pair.perturbed));
             if nominal.abs() <= self.band || perturbed.abs() <= self.band {
@@ -261,17 +234,10 @@ impl Count {
 }
 
 /// The measures of pair `index` in f64.
-fn pair_f64<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_>,
-    index: u64,
-) -> (f64, f64)
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let pair = task.pairs.pair(index).map(|start| from_fn(|i| start[i]));
-    pair_measures(plant, pair, &task.spec, task.tightening, task.control)
+fn pair_f64(plant: &Plant, task: &DeviationTask<'_>, index: u64) -> (f64, f64) {
+    let [nominal, perturbed] = task.pairs.pair(index);
+    let pair = [&*nominal, &*perturbed];
+    replay::pair_measures(plant, pair, &task.spec, task.tightening, task.control)
 }
 
 /// The band around zero that a measured f32 error asks for.
@@ -281,21 +247,13 @@ fn band_of(f32_error: f64) -> f64 {
 
 /// The band around zero within which measures are run again in f64, from the f32 error measured
 /// on pairs drawn from the box.
-pub fn band<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    tightening: &Tightening,
-) -> Result<f64>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+pub fn band(context: Context<'_>, settings: &Settings, tightening: &Tightening) -> Result<f64> {
     let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
     let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Drawn {
-                region: Region::new_box(settings.low, settings.high)?,
+                region: Region::new_box(&*settings.low, &*settings.high)?,
                 stream: nominal,
             },
             radius: settings.deviation.radius,
@@ -310,19 +268,12 @@ where
 }
 
 /// The largest distance of an f32 measure from f64 over the first pairs, those that are finite.
-fn f32_error<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    task: &DeviationTask<'_>,
-) -> Result<f64>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn f32_error(context: Context<'_>, task: &DeviationTask<'_>) -> Result<f64> {
     let sample = DeviationTask { range: 0..ERROR_SAMPLE.min(task.range.end), ..task.clone() };
-    let mut worst = 0.0_f64;
-    context.backend.deviation(context.plant, &sample, &mut |first, pairs| {
+    let (mut worst, plant) = (0.0_f64, context.plant());
+    context.program.deviation(&sample, &mut |first, pairs| {
         let error = |(i, pair): (usize, &PairMeasure)| {
-            let (nominal, perturbed) = pair_f64(context.plant, task, first + i as u64);
+            let (nominal, perturbed) = pair_f64(plant, task, first + i as u64);
             let finite = |a: f64, b: f32| {
                 if b == NON_FINITE || a == f64::from(NON_FINITE) {
                     0.0
@@ -345,8 +296,8 @@ pub(super) fn share_overlaps(stored: &GlobalRecord, fresh: &GlobalRecord) -> Fin
     let [fresh_low, fresh_high] = fresh.share_interval;
     Finding {
         name: "certified share on fresh pairs".to_owned(),
-        stored: format!("{low:.6} to {high:.6}"),
-        found: format!("{fresh_low:.6} to {fresh_high:.6}"),
+        stored: Figure::Interval(stored.share_interval),
+        found: Figure::Interval(fresh.share_interval),
         holds: low <= fresh_high && fresh_low <= high,
     }
 }

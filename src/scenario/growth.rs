@@ -2,15 +2,14 @@
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
 use super::boundary::{self, Boundary};
-use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord};
+use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
 use super::{Context, certify};
 use crate::error::{Error, Result};
-use crate::policy::Policy;
+use crate::model::Model;
 use crate::rollout::{
-    Ball, NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, measure,
+    Ball, NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
 };
-use crate::system::System;
 
 /// Starts of the last round that are kept for the picture.
 const KEPT_SAMPLES: u64 = 400;
@@ -20,7 +19,7 @@ const KEPT_SAMPLES: u64 = 400;
 /// Only a round without failure verifies a ball. The paper's listing would return the radius
 /// after the last round, which nobody has tested.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Growth<const NX: usize> {
+pub enum Growth {
     /// The ball passed clean.
     Verified(Ball),
     /// Every round had failures.
@@ -30,7 +29,7 @@ pub enum Growth<const NX: usize> {
     },
 }
 
-impl<const NX: usize> GrowthSettings<NX> {
+impl GrowthSettings {
     /// Beta of one round: the procedure stops at the first clean round, so all M rounds must hold
     /// at once (section 8.2).
     pub(super) fn round_beta(&self) -> f64 {
@@ -51,21 +50,17 @@ struct Round {
 
 /// Grows a ball around `boundary` for at most M rounds of N fresh starts each. `call` numbers the
 /// calls of a run, so that none reuses another's samples.
-pub fn grow<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    boundary: &Boundary<NX>,
+pub fn grow(
+    context: Context<'_>,
+    settings: &Settings,
+    boundary: &Boundary,
     band: f64,
     call: u32,
-) -> Result<(Growth<NX>, Vec<RoundRecord>, Vec<SampleRecord>)>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<(Growth, Vec<RoundRecord>, Vec<SampleRecord>)> {
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let mut ball = Ball {
-        center: boundary.point.to_vec(),
+        center: boundary.point.clone(),
         radius: asked.radius,
         varies: asked.varies.to_vec(),
     };
@@ -91,18 +86,14 @@ where
 
 /// The radius of the round after `number`, whose nearest failure was that far; none after the
 /// last round, and where nothing is left.
-pub(super) fn next_radius<const NX: usize>(
-    asked: &GrowthSettings<NX>,
-    number: u32,
-    nearest: f64,
-) -> Option<f32> {
+pub(super) fn next_radius(asked: &GrowthSettings, number: u32, nearest: f64) -> Option<f32> {
     // Rounded down: the failure itself stays outside.
     let next = (nearest as f32 > 0.0).then(|| (nearest as f32).next_down());
     next.filter(|_| number + 1 < asked.rounds)
 }
 
 /// Refuses fewer starts than one clean round needs.
-pub(crate) fn check_scenarios<const NX: usize>(asked: &GrowthSettings<NX>) -> Result<()> {
+pub(crate) fn check_scenarios(asked: &GrowthSettings) -> Result<()> {
     let need = required_scenarios(asked.epsilon, asked.round_beta(), 1)?;
     if asked.scenarios >= need {
         return Ok(());
@@ -117,17 +108,13 @@ pub(crate) fn check_scenarios<const NX: usize>(asked: &GrowthSettings<NX>) -> Re
 }
 
 /// One round: N fresh starts in the ball, their outcomes, and the nearest failure.
-fn round<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
+fn round(
+    context: Context<'_>,
+    settings: &Settings,
     ball: &Ball,
     stream: Stream,
     band: f64,
-) -> Result<Round>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Round> {
     let starts = Starts::Drawn { region: Region::Ball(ball.clone()), stream };
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
@@ -138,7 +125,7 @@ where
         query: Query::Measure,
     };
     let mut record = RoundRecord {
-        radius: f64::from(ball.radius),
+        radius: decimal(ball.radius),
         scenarios: settings.growth.scenarios,
         failures: 0,
         nearest_failure: None,
@@ -146,12 +133,12 @@ where
         f64_reruns: 0,
     };
     let mut samples = Vec::new();
-    context.backend.reach_avoid(context.plant, &task, &mut |first, values| {
+    context.program.reach_avoid(&task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let start: [f32; NX] = task.starts.start_array(index);
+            let start = task.starts.start(index);
             let mut value = f64::from(*value);
             if value.abs() <= band {
-                value = measure(context.plant, start, &settings.spec, &tightening);
+                value = replay::measure(context.plant(), &start, &settings.spec, &tightening);
                 record.f64_reruns += 1;
             }
             let success = value > 0.0;
@@ -163,7 +150,7 @@ where
                 record.nearest_failure = Some(nearest);
             }
             if index < KEPT_SAMPLES {
-                samples.push(SampleRecord { x: start.to_vec(), success });
+                samples.push(SampleRecord { x: start, success });
             }
         }
         context.watch.advance(values.len() as u64)
@@ -172,14 +159,11 @@ where
 }
 
 /// What `stored` says as its own failures and `settings` give it.
-pub(super) fn derived<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
+pub(super) fn derived(
+    model: &Model,
+    settings: &Settings,
     stored: &GrowthRecord,
-) -> Result<GrowthRecord>
-where
-    S: System<NX, NU>,
-{
+) -> Result<GrowthRecord> {
     let asked = &settings.growth;
     let mut record = GrowthRecord {
         center: stored.center.clone(),
@@ -187,25 +171,26 @@ where
         samples: stored.samples.clone(),
         ..nothing(asked)
     };
-    let center = stored.center.as_ref().and_then(|x| <[f32; NX]>::try_from(x.as_slice()).ok());
-    let Some(center) = center else { return Ok(record) };
+    let whole = |x: &&Vec<f32>| x.len() == model.states.len();
+    let Some(center) = stored.center.as_ref().filter(whole).cloned() else {
+        return Ok(record);
+    };
     record.distance = Some(boundary::distance(&center, &settings.state));
     record.outcome = GrowthOutcome::Exhausted;
-    let mut ball =
-        Ball { center: center.to_vec(), radius: asked.radius, varies: asked.varies.to_vec() };
+    let mut ball = Ball { center, radius: asked.radius, varies: asked.varies.to_vec() };
     for (number, round) in (0..).zip(&mut record.rounds) {
-        (round.radius, round.scenarios) = (f64::from(ball.radius), asked.scenarios);
+        (round.radius, round.scenarios) = (decimal(ball.radius), asked.scenarios);
         let next = round.nearest_failure.and_then(|far| next_radius(asked, number, far));
         ball.radius = next.unwrap_or(ball.radius);
     }
     if record.rounds.last().is_some_and(|round| round.failures == 0) {
-        verified(&mut record, system, settings, ball)?;
+        verified(&mut record, model, settings, ball)?;
     }
     Ok(record)
 }
 
 /// The record of a growth that had nothing to grow from.
-fn nothing<const NX: usize>(asked: &GrowthSettings<NX>) -> GrowthRecord {
+fn nothing(asked: &GrowthSettings) -> GrowthRecord {
     GrowthRecord {
         outcome: GrowthOutcome::NoBoundary,
         boundary: asked.boundary,
@@ -221,63 +206,49 @@ fn nothing<const NX: usize>(asked: &GrowthSettings<NX>) -> GrowthRecord {
 }
 
 /// Enters a ball that passed clean.
-fn verified<S, const NX: usize, const NU: usize>(
+fn verified(
     record: &mut GrowthRecord,
-    system: &S,
-    settings: &Settings<NX>,
+    model: &Model,
+    settings: &Settings,
     ball: Ball,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-{
+) -> Result<()> {
     record.outcome = GrowthOutcome::Verified;
-    record.radius = f64::from(ball.radius);
-    record.claim = Some(claim(system, settings, &ball)?);
+    record.radius = decimal(ball.radius);
+    record.claim = Some(claim(model, settings, &ball)?);
     record.volume = Region::Ball(ball).volume();
     Ok(())
 }
 
 /// The growth as a record: boundary search, rounds, outcome and claim.
-pub(super) fn record<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    boundary: Option<Boundary<NX>>,
+pub(super) fn record(
+    context: Context<'_>,
+    settings: &Settings,
+    boundary: Option<Boundary>,
     band: f64,
-) -> Result<GrowthRecord>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<GrowthRecord> {
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let mut record = nothing(asked);
     let Some(boundary) = boundary else {
         return Ok(record);
     };
-    record.center = Some(boundary.point.to_vec());
+    record.center = Some(boundary.point.clone());
     record.distance = Some(boundary.distance);
     let (growth, rounds, samples) = grow(context, settings, &boundary, band, 0)?;
     record.rounds = rounds;
     record.samples = samples;
     record.outcome = GrowthOutcome::Exhausted;
     if let Growth::Verified(ball) = growth {
-        verified(&mut record, context.plant.system, settings, ball)?;
+        verified(&mut record, context.model(), settings, ball)?;
     }
     Ok(record)
 }
 
 /// The claim in words and numbers.
-fn claim<S, const NX: usize, const NU: usize>(
-    system: &S,
-    settings: &Settings<NX>,
-    ball: &Ball,
-) -> Result<Claim>
-where
-    S: System<NX, NU>,
-{
+fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
     let asked = &settings.growth;
-    let beta_used = asked.round_beta();
-    let (dimension, frozen) = certify::coordinates(system, &asked.varies);
+    let (beta_used, states) = (asked.round_beta(), model.states.len());
+    let (dimension, frozen) = certify::coordinates(model, &asked.varies);
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(
@@ -297,9 +268,10 @@ where
             "start uniform in the Euclidean ball of radius {:.4} in {}",
             ball.radius,
             match dimension {
-                all if all == NX => format!("all {NX} coordinates"),
-                some =>
-                    format!("{some} of {NX} coordinates, the others frozen at the centre's values"),
+                all if all == states => format!("all {states} coordinates"),
+                some => format!(
+                    "{some} of {states} coordinates, the others frozen at the centre's values"
+                ),
             }
         ),
         dimension,

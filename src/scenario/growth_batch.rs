@@ -8,12 +8,10 @@ use super::Context;
 use super::growth::{Growth, check_scenarios, next_radius};
 use super::settings::Settings;
 use crate::error::Result;
-use crate::policy::Policy;
 use crate::real::Lanes;
 use crate::rollout::{
-    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, measure,
+    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening, replay,
 };
-use crate::system::System;
 
 /// Starts that are drawn side by side.
 const GROUP: usize = 16;
@@ -22,9 +20,9 @@ const LISTED: usize = if cfg!(test) { 100 } else { 1 << 20 };
 
 /// A ball to be grown: where, and with which random numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Request<const NX: usize> {
+pub struct Request {
     /// Centre, and the values of the coordinates that do not vary.
-    pub center: [f32; NX],
+    pub center: Vec<f32>,
     /// Seed of the starts.
     pub seed: u64,
     /// Number of the call under that seed: none reuses another's samples.
@@ -33,9 +31,9 @@ pub struct Request<const NX: usize> {
 
 /// What came of a ball.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Grown<const NX: usize> {
+pub struct Grown {
     /// The outcome.
-    pub outcome: Growth<NX>,
+    pub outcome: Growth,
     /// Rounds taken.
     pub rounds: u32,
     /// Starts that were run again in f64.
@@ -43,7 +41,7 @@ pub struct Grown<const NX: usize> {
 }
 
 /// A ball under way.
-struct Open<const NX: usize> {
+struct Open {
     ball: Ball,
     /// The request that it answers.
     request: usize,
@@ -56,27 +54,23 @@ struct Open<const NX: usize> {
 ///
 /// # Errors
 /// [`crate::Error::TooFewScenarios`], and those of the backend.
-pub fn grow_each<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    requests: &[Request<NX>],
+pub fn grow_each(
+    context: Context<'_>,
+    settings: &Settings,
+    requests: &[Request],
     band: f64,
-) -> Result<Vec<Grown<NX>>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Vec<Grown>> {
     let asked = &settings.growth;
     check_scenarios(asked)?;
-    let open = |(request, center): (usize, [f32; NX])| Open {
-        ball: Ball { center: center.to_vec(), radius: asked.radius, varies: asked.varies.to_vec() },
+    let open = |(request, center): (usize, Vec<f32>)| Open {
+        ball: Ball { center, radius: asked.radius, varies: asked.varies.clone() },
         request,
         rounds: 0,
         f64_reruns: 0,
     };
-    let centers = requests.iter().map(|request| request.center).enumerate();
-    let mut balls: Vec<Open<NX>> = centers.map(open).collect();
-    let mut grown: Vec<Option<Grown<NX>>> = vec![None; requests.len()];
+    let centers = requests.iter().map(|request| request.center.clone()).enumerate();
+    let mut balls: Vec<Open> = centers.map(open).collect();
+    let mut grown: Vec<Option<Grown>> = vec![None; requests.len()];
     for number in 0..asked.rounds {
         round(context, settings, requests, &mut balls, band)?
             .into_iter()
@@ -96,7 +90,7 @@ where
 }
 
 /// The ball as it ended, its nearest failure that far, or nowhere.
-fn finished<const NX: usize>(open: Open<NX>, nearest: Option<f64>) -> Grown<NX> {
+fn finished(open: Open, nearest: Option<f64>) -> Grown {
     let Open { ball, rounds, f64_reruns, .. } = open;
     let outcome = match nearest {
         None => Growth::Verified(ball),
@@ -106,17 +100,13 @@ fn finished<const NX: usize>(open: Open<NX>, nearest: Option<f64>) -> Grown<NX> 
 }
 
 /// One round of all balls: the distance of the nearest failure of each.
-fn round<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    requests: &[Request<NX>],
-    balls: &mut [Open<NX>],
+fn round(
+    context: Context<'_>,
+    settings: &Settings,
+    requests: &[Request],
+    balls: &mut [Open],
     band: f64,
-) -> Result<Vec<Option<f64>>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Vec<Option<f64>>> {
     if balls.is_empty() {
         return Ok(Vec::new());
     }
@@ -132,44 +122,43 @@ where
 }
 
 /// The starts `range` of a round, N for each ball after the other.
-fn piece<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    requests: &[Request<NX>],
-    (balls, range): (&mut [Open<NX>], Range<u64>),
+fn piece(
+    context: Context<'_>,
+    settings: &Settings,
+    requests: &[Request],
+    (balls, range): (&mut [Open], Range<u64>),
     (nearest, band): (&mut [Option<f64>], f64),
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<()> {
     let count = settings.growth.scenarios;
-    let draw = |(place, open): (usize, &Open<NX>)| {
-        let Request { seed, call, .. } = requests[open.request];
+    let draw = |(place, open): (usize, &Open)| {
+        let Request { seed, call, .. } = &requests[open.request];
         let use_number = call * settings.growth.rounds + open.rounds;
-        let stream = Stream::new(seed, Purpose::Growth, use_number);
+        let stream = Stream::new(*seed, Purpose::Growth, use_number);
         let own = |index: u64| index.saturating_sub(place as u64 * count).min(count);
         drawn(&Region::Ball(open.ball.clone()), stream, own(range.start)..own(range.end))
     };
-    let starts: Vec<[f32; NX]> = balls.par_iter().enumerate().flat_map_iter(draw).collect();
+    let drawn: Vec<Vec<f32>> = balls.par_iter().enumerate().map(draw).collect();
+    let (starts, size) = (drawn.concat(), settings.state.len());
+    let starts = States::new(&starts, size);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
-        starts: Starts::listed(&starts),
+        starts: Starts::Listed(starts),
         range: 0..starts.len() as u64,
         spec: settings.spec,
         tightening: &tightening,
         query: Query::Measure,
     };
-    context.backend.reach_avoid(context.plant, &task, &mut |first, values| {
+    context.program.reach_avoid(&task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let (start, place) = (starts[index as usize], ((range.start + index) / count) as usize);
+            let start = starts.row(index as usize);
+            let place = ((range.start + index) / count) as usize;
             let mut value = f64::from(*value);
             if value.abs() <= band {
-                value = measure(context.plant, start, &settings.spec, &tightening);
+                value = replay::measure(context.plant(), start, &settings.spec, &tightening);
                 balls[place].f64_reruns += 1;
             }
             if value.is_nan() || value <= 0.0 {
-                let distance = balls[place].ball.distance(&start);
+                let distance = balls[place].ball.distance(start);
                 nearest[place] = Some(nearest[place].map_or(distance, |near| near.min(distance)));
             }
         }
@@ -178,13 +167,13 @@ where
 }
 
 /// The starts `range` of `stream` in `region`.
-fn drawn<const NX: usize>(region: &Region, stream: Stream, range: Range<u64>) -> Vec<[f32; NX]> {
-    let mut starts = Vec::with_capacity((range.end - range.start) as usize);
-    let mut lanes = [Lanes([0.0; GROUP]); NX];
+fn drawn(region: &Region, stream: Stream, range: Range<u64>) -> Vec<f32> {
+    let mut starts = Vec::with_capacity((range.end - range.start) as usize * region.size());
+    let mut lanes = vec![Lanes([0.0; GROUP]); region.size()];
     for first in range.clone().step_by(GROUP) {
         region.sample(stream, first, &mut lanes);
         let live = GROUP.min((range.end - first) as usize);
-        starts.extend((0..live).map(|i| lanes.each_ref().map(|lane| lane.0[i])));
+        starts.extend((0..live).flat_map(|i| lanes.iter().map(move |lane| lane.0[i])));
     }
     starts
 }
@@ -194,7 +183,8 @@ mod tests {
     use super::*;
     use crate::backend::Backend;
     use crate::backend::cpu::Cpu;
-    use crate::rollout::{Plant, RolloutSpec};
+    use crate::model::{Model, Plant};
+    use crate::rollout::RolloutSpec;
     use crate::scenario::Unwatched;
     use crate::scenario::boundary::Boundary;
     use crate::scenario::growth::grow;
@@ -205,17 +195,17 @@ mod tests {
     const CENTERS: [[f32; 2]; 6] =
         [[0.0, 0.0], [0.85, 0.3], [-0.8, -0.5], [1.15, 0.1], [0.5, -0.9], [0.99, 0.35]];
 
-    fn requests() -> Vec<Request<2>> {
+    fn requests() -> Vec<Request> {
         let request = |(i, center): (usize, [f32; 2])| Request {
-            center,
+            center: center.to_vec(),
             seed: 5 + i as u64 % 2,
             call: [3, 0, 7][i % 3],
         };
         CENTERS.into_iter().enumerate().map(request).collect()
     }
 
-    fn settings(system: &DoubleIntegrator) -> Settings<2> {
-        let mut settings = Settings::new(system, [0.0; 2], RolloutSpec::new(30, 0.95).unwrap());
+    fn settings(model: &Model) -> Settings {
+        let mut settings = Settings::new(model, [0.0; 2], RolloutSpec::new(30, 0.95).unwrap());
         (settings.growth.radius, settings.growth.rounds) = (0.4, 4);
         // No multiple of the starts that are drawn side by side.
         settings.growth.scenarios = 83;
@@ -224,19 +214,18 @@ mod tests {
 
     #[test]
     fn a_batch_grows_what_each_call_grows_alone() {
-        let system = DoubleIntegrator::default();
-        let policy = BangBang { acceleration: 1.0 };
+        let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
         let backend = Backend::Cpu(Cpu::new(Some(2)).unwrap());
-        let plant = Plant { system: &system, policy: &policy };
-        let context = Context { backend: &backend, plant, watch: &Unwatched };
-        let asked = settings(&system);
+        let program = backend.prepare(&plant).unwrap();
+        let context = Context { program: &program, watch: &Unwatched };
+        let asked = settings(&plant.model);
         // A band so wide that some starts are run again.
         let band = 0.02;
         let grown = grow_each(context, &asked, &requests(), band).unwrap();
         assert_eq!(grown.len(), CENTERS.len());
         for (request, grown) in requests().into_iter().zip(&grown) {
             let settings = Settings { seed: request.seed, ..asked.clone() };
-            let boundary = Boundary { point: request.center, distance: 0.0 };
+            let boundary = Boundary { point: request.center.clone(), distance: 0.0 };
             let (outcome, rounds, _) =
                 grow(context, &settings, &boundary, band, request.call).unwrap();
             let reruns = |round: &RoundRecord| round.f64_reruns;
@@ -253,12 +242,11 @@ mod tests {
 
     #[test]
     fn nothing_asked_is_nothing_grown() {
-        let system = DoubleIntegrator::default();
-        let policy = BangBang { acceleration: 1.0 };
+        let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
         let backend = Backend::Cpu(Cpu::new(Some(1)).unwrap());
-        let plant = Plant { system: &system, policy: &policy };
-        let context = Context { backend: &backend, plant, watch: &Unwatched };
-        let mut asked = settings(&system);
+        let program = backend.prepare(&plant).unwrap();
+        let context = Context { program: &program, watch: &Unwatched };
+        let mut asked = settings(&plant.model);
         assert_eq!(grow_each(context, &asked, &[], 0.0).unwrap(), []);
         // 0.1 and 1e-3 over four rounds need 79.
         asked.growth.scenarios = 20;

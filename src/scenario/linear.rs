@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use crate::model::Model;
 use crate::real::bound::{Domain, Enclosure, Interval, enclose};
-use crate::system::System;
+use crate::system::Axis;
 
 /// Width of a derivative, relative to the largest of the matrix, that is taken to be rounding:
 /// 2^-44, five hundred times the spacing of f64, and far below any nonlinearity that matters.
@@ -13,28 +14,22 @@ const ROUNDING: f64 = 1.0 / (1_u64 << 44) as f64;
 const SINGULAR_VALUE: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// The state matrix `A` `[NX, NX]`, if `step` is `A x + b(u)` for every `x` and each `u` in its
-/// bounds.
+/// bounds, at any step up to `horizon`.
 ///
 /// Every derivative by a state, enclosed over the whole state space and all controls, must be one
 /// number up to rounding.
-pub fn state_matrix<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-) -> Option<DMatrix<f64>> {
-    let controls = system.controls();
-    let ends = |state: f64, control: [f32; NU]| -> Vec<f64> {
-        let controls = control.iter().map(|&end| f64::from(end));
-        std::iter::repeat_n(state, NX).chain(controls).collect()
+pub fn state_matrix(model: &Model, horizon: u32) -> Option<DMatrix<f64>> {
+    let states = model.states.len();
+    let ends = |state: f64, side: fn(&Axis) -> f32, step: u32| -> Vec<f64> {
+        let controls: Vec<f64> = model.controls.iter().map(|axis| f64::from(side(axis))).collect();
+        model.arguments(&vec![state; states], &controls, step)
     };
-    let low = ends(f64::NEG_INFINITY, std::array::from_fn(|i| controls[i].low));
-    let high = ends(f64::INFINITY, std::array::from_fn(|i| controls[i].high));
-    let varies: Vec<bool> = (0..NX + NU).map(|i| i < NX).collect();
+    let low = ends(f64::NEG_INFINITY, |axis| axis.low, 0);
+    let high = ends(f64::INFINITY, |axis| axis.high, horizon);
+    let varies: Vec<bool> = (0..low.len()).map(|i| i < states).collect();
     let domain = Domain { low: &low, high: &high, varies: &varies };
-    let outputs = enclose(domain, |inputs| {
-        let x = std::array::from_fn(|i| inputs[i]);
-        let u = std::array::from_fn(|i| inputs[NX + i]);
-        system.step(x, u).to_vec()
-    });
-    constant_derivatives(&outputs, NX)
+    let outputs = enclose(domain, |inputs| model.step.eval(inputs));
+    constant_derivatives(&outputs, states)
 }
 
 /// The matrix of derivatives, if each is one number over all pieces.
@@ -105,6 +100,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::{exact_deviation, state_matrix};
+    use crate::model::Model;
     use crate::real::Real;
     use crate::system::{Axis, DoubleIntegrator, DroneRace, System};
 
@@ -123,7 +119,8 @@ mod tests {
             (25, 0.2851),
             (30, 0.3303),
         ];
-        let matrix = state_matrix(&DroneRace::default()).expect("the race is linear");
+        let matrix =
+            state_matrix(&Model::of(DroneRace::default()), 40).expect("the race is linear");
         let found = exact_deviation(&matrix, 0.1, 30);
         assert_eq!(found.len(), 31);
         for (t, deviation) in expected {
@@ -134,7 +131,8 @@ mod tests {
     /// `A^t = [[1, s], [0, 1]]` has the largest singular value `(s + sqrt(s^2 + 4)) / 2`.
     #[test]
     fn double_integrator_deviation_is_a_tight_supremum() {
-        let matrix = state_matrix(&DoubleIntegrator::default()).expect("it is linear");
+        let matrix =
+            state_matrix(&Model::of(DoubleIntegrator::default()), 40).expect("it is linear");
         let dt = f64::from(0.1_f32);
         assert_eq!(matrix, DMatrix::from_row_slice(2, 2, &[1.0, dt, 0.0, 1.0]));
         for (t, found) in exact_deviation(&matrix, 2.0, 200).into_iter().enumerate() {
@@ -147,7 +145,8 @@ mod tests {
     /// Entries that are off by their rounding still give an upper bound.
     #[test]
     fn the_margin_covers_the_rounding_of_the_entries() {
-        let matrix = state_matrix(&DoubleIntegrator::default()).expect("it is linear");
+        let matrix =
+            state_matrix(&Model::of(DoubleIntegrator::default()), 40).expect("it is linear");
         let rounded = &matrix * (1.0 - 0.5 * super::ROUNDING);
         let s = f64::from(0.1_f32) * 200.0;
         let exact = 0.5 * (s + s.hypot(2.0));
@@ -159,7 +158,7 @@ mod tests {
     #[test]
     fn no_pair_of_race_trajectories_comes_farther_apart() {
         let race = DroneRace::default();
-        let matrix = state_matrix(&race).expect("the race is linear");
+        let matrix = state_matrix(&Model::of(race), 40).expect("the race is linear");
         let bound = exact_deviation(&matrix, 1.0, 40);
         let mut power = DMatrix::identity(12, 12);
         for (t, bound) in bound.into_iter().enumerate() {
@@ -232,10 +231,13 @@ mod tests {
     fn nonlinear_systems_have_no_matrix() {
         use Planar::{Bilinear, Clipped, Dubins, Pendulum, Relay, Switched};
         for system in [Pendulum, Dubins, Clipped, Bilinear, Relay] {
-            assert_eq!(state_matrix(&system), None);
+            assert_eq!(state_matrix(&Model::of(system), 40), None);
         }
         let dt = f64::from(0.1_f32);
         let expected = [1.0, 1.0, 0.0, 0.0, dt, 0.0, 0.0, 0.0, 1.0];
-        assert_eq!(state_matrix(&Switched), Some(DMatrix::from_row_slice(3, 3, &expected)));
+        assert_eq!(
+            state_matrix(&Model::of(Switched), 40),
+            Some(DMatrix::from_row_slice(3, 3, &expected))
+        );
     }
 }

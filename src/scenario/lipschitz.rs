@@ -1,8 +1,11 @@
 //! Lipschitz constants of a system's margins, from its own functions (`docs/method.md`, section 8).
 
+use rayon::prelude::*;
+
+use crate::formula::Graph;
+use crate::model::Model;
 use crate::real::bound::{Domain, Lipschitz, lipschitz};
 use crate::rollout::philox;
-use crate::system::System;
 
 /// Lipschitz constants of both margins over one box, in the Euclidean norm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,23 +25,38 @@ pub struct SampledSlopes {
     pub constraint: f64,
 }
 
+/// Where the margins are looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct MarginBox<'a> {
+    /// Lower end of each state.
+    pub low: &'a [f32],
+    /// Upper end.
+    pub high: &'a [f32],
+    /// Whether each state varies.
+    pub varies: &'a [bool],
+    /// Last step: time and step of the margins run from 0 to there.
+    pub horizon: u32,
+}
+
 /// Constants of the margins that hold for any two states of the box which differ only in
-/// coordinates that `varies` marks.
+/// coordinates that `varies` marks, at any one step up to the horizon.
 ///
 /// States outside the box are not covered: widen it by the deviation that it is used with.
 ///
 /// # Panics
 /// If a lower end is above its upper end.
-pub fn margins<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-    low: [f32; NX],
-    high: [f32; NX],
-    varies: [bool; NX],
-) -> MarginConstants {
-    let domain = Domain { low: &low.map(f64::from), high: &high.map(f64::from), varies: &varies };
+pub fn margins(model: &Model, region: MarginBox<'_>) -> MarginConstants {
+    let ends = |side: &[f32], step: u32| -> Vec<f64> {
+        model.at_state(&side.iter().copied().map(f64::from).collect::<Vec<_>>(), step)
+    };
+    // No margin reads a control: it is held at 0, and nothing but states varies.
+    let (low, high) = (ends(region.low, 0), ends(region.high, region.horizon));
+    let mut varies = region.varies.to_vec();
+    varies.resize(low.len(), false);
+    let domain = Domain { low: &low, high: &high, varies: &varies };
     MarginConstants {
-        target: lipschitz(domain, |x| system.target(std::array::from_fn(|i| x[i]))),
-        constraint: lipschitz(domain, |x| system.constraint(std::array::from_fn(|i| x[i]))),
+        target: lipschitz(domain, |inputs| model.target.eval(inputs)[0]),
+        constraint: lipschitz(domain, |inputs| model.constraint.eval(inputs)[0]),
     }
 }
 
@@ -46,91 +64,91 @@ pub fn margins<S: System<NX, NU>, const NX: usize, const NU: usize>(
 ///
 /// Half of the coordinates are drawn at the ends of the box, where slopes are often largest. Each
 /// figure is a slope between two states of the box, so up to rounding no constant is below it.
-pub fn sampled<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-    low: [f32; NX],
-    high: [f32; NX],
-    varies: [bool; NX],
-    count: u32,
-    seed: u64,
-) -> SampledSlopes {
-    let (low, high) = (low.map(f64::from), high.map(f64::from));
-    let mut largest = SampledSlopes { target: 0.0, constraint: 0.0 };
-    for index in 0..count {
-        let start = state(low, high, index, seed);
-        let climb = |margin: &dyn Fn([f64; NX]) -> f64| slope(margin, start, low, high, varies);
-        largest.target = largest.target.max(climb(&|x| system.target(x)));
-        largest.constraint = largest.constraint.max(climb(&|x| system.constraint(x)));
-    }
-    largest
-}
-
-/// A random state, each coordinate within its side or at one of the two ends.
-fn state<const NX: usize>(low: [f64; NX], high: [f64; NX], index: u32, seed: u64) -> [f64; NX] {
-    let key = [seed as u32, (seed >> 32) as u32];
-    std::array::from_fn(|i| {
-        let [[place], [end], ..] = philox([[index], [i as u32], [0], [0]], key);
-        let share = f64::from(place) / f64::from(u32::MAX);
-        let share = if end.is_multiple_of(2) { share } else { share.round() };
-        low[i] + share * (high[i] - low[i])
+pub fn sampled(model: &Model, region: MarginBox<'_>, count: u32, seed: u64) -> SampledSlopes {
+    let slopes = |index: u32| {
+        let (start, step) = (state(region, index, seed), index % (region.horizon + 1));
+        let mut values = Vec::new();
+        let mut climb = |margin: &Graph| {
+            let states = start.len();
+            let mut inputs = model.at_state(&start, step);
+            slope(region, &start, &mut |x| {
+                inputs[..states].copy_from_slice(x);
+                margin.eval_first(&inputs, &mut values)
+            })
+        };
+        SampledSlopes { target: climb(&model.target), constraint: climb(&model.constraint) }
+    };
+    let none = || SampledSlopes { target: 0.0, constraint: 0.0 };
+    (0..count).into_par_iter().map(slopes).reduce(none, |a, b| SampledSlopes {
+        target: a.target.max(b.target),
+        constraint: a.constraint.max(b.constraint),
     })
 }
 
+/// A random state, each coordinate within its side or at one of the two ends.
+fn state(MarginBox { low, high, .. }: MarginBox<'_>, index: u32, seed: u64) -> Vec<f64> {
+    let key = [seed as u32, (seed >> 32) as u32];
+    let coordinate = |i: usize| {
+        let [[place], [end], ..] = philox([[index], [i as u32], [0], [0]], key);
+        let share = f64::from(place) / f64::from(u32::MAX);
+        let share = if end.is_multiple_of(2) { share } else { share.round() };
+        let (low, high) = (f64::from(low[i]), f64::from(high[i]));
+        low + share * (high - low)
+    };
+    (0..low.len()).map(coordinate).collect()
+}
+
 /// The slope from `start` along the numerical gradient of `margin`, staying in the box.
-fn slope<const NX: usize>(
-    margin: &dyn Fn([f64; NX]) -> f64,
-    start: [f64; NX],
-    low: [f64; NX],
-    high: [f64; NX],
-    varies: [bool; NX],
-) -> f64 {
+fn slope(region: MarginBox<'_>, start: &[f64], margin: &mut dyn FnMut(&[f64]) -> f64) -> f64 {
     // Large against the rounding of the margins (1e-16 of their size), small against the box.
     const STEP: f64 = 1e-5;
-    let moved = |direction: [f64; NX], length: f64| -> [f64; NX] {
-        std::array::from_fn(|i| (start[i] + length * direction[i]).clamp(low[i], high[i]))
-    };
-    let mut gradient = [0.0; NX];
-    for i in (0..NX).filter(|&i| varies[i]) {
-        let axis = std::array::from_fn(|j| f64::from(u8::from(i == j)));
-        let (back, ahead) = (moved(axis, -STEP), moved(axis, STEP));
-        if ahead[i] > back[i] {
-            gradient[i] = (margin(ahead) - margin(back)) / (ahead[i] - back[i]);
+    let within = |i: usize, x: f64| x.clamp(f64::from(region.low[i]), f64::from(region.high[i]));
+    let mut x = start.to_vec();
+    let mut gradient = vec![0.0; start.len()];
+    for i in (0..start.len()).filter(|&i| region.varies[i]) {
+        let (back, ahead) = (within(i, start[i] - STEP), within(i, start[i] + STEP));
+        if ahead > back {
+            x[i] = ahead;
+            let above = margin(&x);
+            x[i] = back;
+            gradient[i] = (above - margin(&x)) / (ahead - back);
+            x[i] = start[i];
         }
     }
-    let norm = length(gradient);
+    let norm = length(gradient.iter().copied());
     if norm == 0.0 {
         return 0.0;
     }
-    let direction = gradient.map(|side| side / norm);
-    let (back, ahead) = (moved(direction, -STEP), moved(direction, STEP));
-    let apart = length::<NX>(std::array::from_fn(|i| ahead[i] - back[i]));
+    let moved = |length: f64| -> Vec<f64> {
+        let place = |i: usize| within(i, start[i] + length * (gradient[i] / norm));
+        (0..start.len()).map(place).collect()
+    };
+    let (back, ahead) = (moved(-STEP), moved(STEP));
+    let apart = length(ahead.iter().zip(&back).map(|(ahead, back)| ahead - back));
     // A start in a corner may have nowhere to go.
     if apart < STEP {
         return 0.0;
     }
-    (margin(ahead) - margin(back)).abs() / apart
+    (margin(&ahead) - margin(&back)).abs() / apart
 }
 
-fn length<const N: usize>(vector: [f64; N]) -> f64 {
-    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
+fn length(vector: impl Iterator<Item = f64>) -> f64 {
+    vector.map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{MarginConstants, margins, sampled};
-    use crate::system::{Cone, DoubleIntegrator, DroneRace, System};
+    use super::{MarginBox, MarginConstants, margins, sampled};
+    use crate::model::Model;
+    use crate::system::{Cone, DoubleIntegrator, DroneRace};
 
     /// Constants over the default box; sampled slopes must come to `share` of them, and no farther.
-    fn over_default_box<S: System<NX, NU>, const NX: usize, const NU: usize>(
-        system: &S,
-        varies: [bool; NX],
-        share: f64,
-    ) -> MarginConstants {
-        let states = system.states();
-        let low = std::array::from_fn(|i| states[i].low);
-        let high = std::array::from_fn(|i| states[i].high);
-        let found = margins(system, low, high, varies);
-        let slopes = sampled(system, low, high, varies, 2000, 1);
+    fn over_default_box(model: &Model, varies: &[bool], share: f64) -> MarginConstants {
+        let low: Vec<f32> = model.states.iter().map(|axis| axis.low).collect();
+        let high: Vec<f32> = model.states.iter().map(|axis| axis.high).collect();
+        let region = MarginBox { low: &low, high: &high, varies, horizon: 30 };
+        let found = margins(model, region);
+        let slopes = sampled(model, region, 2000, 1);
         // A slope over 2e-5 between margins below 1e3 is rounded at 1e-13 / 2e-5.
         let rounding = 1e-8;
         assert!(slopes.target <= found.target.constant + rounding, "{slopes:?}");
@@ -162,12 +180,12 @@ mod tests {
         ];
         for (cone, square, share) in truths {
             let race = DroneRace { cone, ..DroneRace::default() };
-            let found = over_default_box(&race, [true; 12], share);
+            let found = over_default_box(&Model::of(race), &[true; 12], share);
             assert_bounds(found.target.constant, 10.0 * 2.0_f64.sqrt());
             assert_bounds(found.constraint.constant, 10.0 * square.sqrt());
             assert_eq!(found.target.pieces, 6);
             let limited = DroneRace { speed_limit: true, ..race };
-            let limited = over_default_box(&limited, [true; 12], share);
+            let limited = over_default_box(&Model::of(limited), &[true; 12], share);
             assert_eq!(limited.constraint.constant, found.constraint.constant);
             assert_eq!(limited.constraint.pieces, found.constraint.pieces + 1);
         }
@@ -176,20 +194,20 @@ mod tests {
     /// With the opponent frozen: one end of each difference, but the corner of two fences.
     #[test]
     fn frozen_coordinates_do_not_count() {
-        let varies = std::array::from_fn(|i| i < 6);
-        let found = over_default_box(&DroneRace::default(), varies, 0.99);
+        let varies: [bool; 12] = std::array::from_fn(|i| i < 6);
+        let found = over_default_box(&Model::of(DroneRace::default()), &varies, 0.99);
         let q = f64::from(0.2_f32);
         assert_bounds(found.target.constant, 10.0);
         // The fences have slope 10 sqrt(2), the cone only 10 sqrt(1 + q^2).
         assert_bounds(found.constraint.constant, 10.0 * 2.0_f64.sqrt().max((1.0 + q * q).sqrt()));
-        let opponent = std::array::from_fn(|i| i >= 6);
-        let found = over_default_box(&DroneRace::default(), opponent, 0.99);
+        let opponent: [bool; 12] = std::array::from_fn(|i| i >= 6);
+        let found = over_default_box(&Model::of(DroneRace::default()), &opponent, 0.99);
         assert_bounds(found.constraint.constant, 10.0 * (1.0 + q * q).sqrt());
     }
 
     #[test]
     fn double_integrator_has_unit_slopes() {
-        let found = over_default_box(&DoubleIntegrator::default(), [true; 2], 0.99);
+        let found = over_default_box(&Model::of(DoubleIntegrator::default()), &[true; 2], 0.99);
         assert_bounds(found.target.constant, 1.0);
         assert_bounds(found.constraint.constant, 1.0);
     }

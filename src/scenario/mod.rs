@@ -6,6 +6,7 @@ mod certify;
 mod compare;
 mod derived;
 pub mod deviation;
+mod finding;
 pub mod global;
 pub mod growth;
 pub mod growth_batch;
@@ -13,6 +14,7 @@ pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
 pub mod record;
+pub mod sampling;
 pub mod settings;
 mod stored;
 pub(crate) mod tail;
@@ -20,11 +22,12 @@ mod verify;
 
 pub(crate) use certify::provenance;
 pub use certify::{Tightened, certify, check_settings, hashes, tightened};
-pub use verify::{CheckReport, Finding, QueryRow, check, query};
+pub use finding::{CheckReport, Figure, Finding};
+pub use verify::{QueryRow, check, query};
 
-use crate::backend::Backend;
+use crate::backend::Program;
 use crate::error::Result;
-use crate::rollout::Plant;
+use crate::model::{Model, Plant};
 
 /// Follows the work: shows progress, and stops it.
 pub trait Watch {
@@ -48,20 +51,23 @@ impl Watch for Unwatched {
     }
 }
 
-/// What every stage works with: who runs, what is run, and who watches.
-pub struct Context<'a, S, P> {
-    /// Who runs.
-    pub backend: &'a Backend,
-    /// What is run.
-    pub plant: Plant<'a, S, P>,
+/// What every stage works with: what runs, and who watches.
+#[derive(Clone, Copy)]
+pub struct Context<'a> {
+    /// What runs.
+    pub program: &'a Program<'a>,
     /// Who watches.
     pub watch: &'a dyn Watch,
 }
 
-impl<S, P> Clone for Context<'_, S, P> {
-    fn clone(&self) -> Self {
-        *self
+impl<'a> Context<'a> {
+    /// What is rolled out.
+    pub fn plant(&self) -> &'a Plant {
+        self.program.plant()
+    }
+
+    /// Its model.
+    pub fn model(&self) -> &'a Model {
+        &self.program.plant().model
     }
 }
-
-impl<S, P> Copy for Context<'_, S, P> {}

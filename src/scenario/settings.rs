@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::bound::CountRule;
 use super::deviation::Program;
 use crate::error::Result;
+use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
-use crate::system::System;
 
 /// Cells of a default slice along each axis.
 const SLICE_CELLS: u16 = 21;
@@ -96,7 +96,7 @@ pub enum BoundarySearch {
 
 /// Local growth, section 5 and Algorithm 1.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GrowthSettings<const NX: usize> {
+pub struct GrowthSettings {
     /// First radius, `r_max`.
     pub radius: f32,
     /// Rounds M.
@@ -110,7 +110,7 @@ pub struct GrowthSettings<const NX: usize> {
     /// Whether beta is divided by the rounds, as soundness asks (section 8.2).
     pub split_beta: bool,
     /// The coordinates that vary; the others keep the values of the state.
-    pub varies: [bool; NX],
+    pub varies: Vec<bool>,
     /// Where the centre is looked for.
     pub boundary: BoundarySearch,
     /// The two coordinates whose velocity says what is ahead, and their velocities: the slice
@@ -120,30 +120,31 @@ pub struct GrowthSettings<const NX: usize> {
 
 /// Everything that `certify` needs to know beside the plant and the backend.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings<const NX: usize> {
+pub struct Settings {
     /// Seed of every stream.
     pub seed: u64,
     /// Horizon and discount.
     pub spec: RolloutSpec,
     /// Lower corner of the box of nominal starts.
-    pub low: [f32; NX],
+    pub low: Vec<f32>,
     /// Upper corner.
-    pub high: [f32; NX],
+    pub high: Vec<f32>,
     /// Lipschitz constants.
     pub constants: ConstantSettings,
     /// Deviation bound.
     pub deviation: DeviationSettings,
     /// Certified set.
     pub global: GlobalSettings,
-    /// The slice: the axis across the columns, then the axis along the rows.
-    pub slice: [SliceAxis; 2],
+    /// The slice: the axis across the columns, then the axis along the rows; none where there is but
+    /// one state.
+    pub slice: Option<[SliceAxis; 2]>,
     /// The state that the slice, the boundary search and the growth start from.
-    pub state: [f32; NX],
+    pub state: Vec<f32>,
     /// Local growth.
-    pub growth: GrowthSettings<NX>,
+    pub growth: GrowthSettings,
 }
 
-impl<const NX: usize> Settings<NX> {
+impl Settings {
     /// The scenarios that `rule` asks for: pairs of the deviation bound, starts of a round of growth.
     ///
     /// # Errors
@@ -158,30 +159,34 @@ impl<const NX: usize> Settings<NX> {
         ])
     }
 
-    /// Sound settings for `system` around `state`, to be adjusted field by field: risk 0.1 and
+    /// Columns and rows of the slice; none of both where there is no slice.
+    pub(crate) fn slice_size(&self) -> [usize; 2] {
+        self.slice.as_ref().map_or([0, 0], |axes| axes.each_ref().map(|axis| axis.values.len()))
+    }
+
+    /// Sound settings for `model` around `state`, to be adjusted field by field: risk 0.1 and
     /// beta 1e-3 throughout, computed constants, a joint deviation bound of radius 0.05 by fixed
     /// shape under replayed controls, 20,000 draws, a slice of 21 by 21 cells over the first two
     /// states, growth in all coordinates from radius 0.5 in at most 10 rounds with beta split.
     ///
     /// # Panics
-    /// If the system has a single state: there is no slice.
-    pub fn new<S, const NU: usize>(system: &S, state: [f32; NX], spec: RolloutSpec) -> Self
-    where
-        S: System<NX, NU>,
-    {
-        assert!(NX > 1, "a slice needs two states");
-        let axes = system.states();
+    /// If `state` has not the states of the model.
+    pub fn new(model: &Model, state: impl Into<Vec<f32>>, spec: RolloutSpec) -> Self {
+        let (axes, state) = (&model.states, state.into());
+        assert_eq!(state.len(), axes.len(), "numbers of the state");
         let (epsilon, beta, scenarios) = (0.1, 1e-3, 159);
-        let slice = [0, 1].map(|state| {
-            let step = (axes[state].high - axes[state].low) / f32::from(SLICE_CELLS - 1);
-            let value = |i| axes[state].low + f32::from(i) * step;
-            SliceAxis { state, values: (0..SLICE_CELLS).map(value).collect() }
+        let slice = (axes.len() > 1).then(|| [0, 1]).map(|both| {
+            both.map(|state| {
+                let step = (axes[state].high - axes[state].low) / f32::from(SLICE_CELLS - 1);
+                let value = |i| axes[state].low + f32::from(i) * step;
+                SliceAxis { state, values: (0..SLICE_CELLS).map(value).collect() }
+            })
         });
         Self {
             seed: 1,
             spec,
-            low: std::array::from_fn(|i| axes[i].low),
-            high: std::array::from_fn(|i| axes[i].high),
+            low: axes.iter().map(|axis| axis.low).collect(),
+            high: axes.iter().map(|axis| axis.high).collect(),
             constants: ConstantSettings::default(),
             deviation: DeviationSettings {
                 radius: 0.05,
@@ -203,7 +208,7 @@ impl<const NX: usize> Settings<NX> {
                 epsilon,
                 beta,
                 split_beta: true,
-                varies: [true; NX],
+                varies: vec![true; axes.len()],
                 boundary: BoundarySearch::Rays,
                 heading: None,
             },

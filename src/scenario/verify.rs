@@ -5,16 +5,16 @@ use serde::Serialize;
 use super::bound::lower_bound;
 use super::certify::{certify, hashes, provenance, tightening};
 use super::derived::derived;
+use super::finding::{CheckReport, Figure, Finding};
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
 use super::settings::Settings;
 use super::{Context, Unwatched, Watch, compare, global};
-use crate::backend::Backend;
+use crate::backend::Program;
 use crate::error::{Error, Result};
-use crate::policy::Policy;
+use crate::model::Plant;
 use crate::rollout::{
-    Ball, Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening,
+    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
 };
-use crate::system::System;
 
 /// Fresh starts that a verified ball is tried with.
 const FRESH_STARTS: u64 = 20_000;
@@ -36,48 +36,8 @@ pub struct QueryRow {
     pub target_margin: f32,
 }
 
-/// One thing that was checked.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// What.
-    pub name: String,
-    /// As stored.
-    pub stored: String,
-    /// As found now.
-    pub found: String,
-    /// Whether the stored claim stands.
-    pub holds: bool,
-}
-
-/// What a check found.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct CheckReport {
-    /// Whether every finding holds.
-    pub holds: bool,
-    /// One by one.
-    pub findings: Vec<Finding>,
-}
-
-impl CheckReport {
-    /// The report of these findings.
-    fn new(findings: Vec<Finding>) -> Self {
-        Self { holds: findings.iter().all(|finding| finding.holds), findings }
-    }
-
-    /// Adds what was found beside.
-    pub fn add(&mut self, findings: Vec<Finding>) {
-        self.holds &= findings.iter().all(|finding| finding.holds);
-        self.findings.extend(findings);
-    }
-}
-
 /// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-pub(super) fn tier<const NX: usize>(
-    target_margin: f64,
-    check_margin: f64,
-    growth: &GrowthRecord,
-    x: &[f32; NX],
-) -> u8 {
+pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord, x: &[f32]) -> u8 {
     let local = || verified_ball(growth).is_some_and(|ball| ball.contains(x));
     match () {
         () if target_margin > 0.0 => 0,
@@ -98,14 +58,7 @@ fn verified_ball(growth: &GrowthRecord) -> Option<Ball> {
 }
 
 /// Refuses a record that is not of this plant.
-fn check_identity<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    record: &Record,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
     let refuse = |field: &str, stored: &str, found: &str| {
         Err(Error::Refused(format!(
             "{field} is {stored} in the record, {found} here; certify again"
@@ -116,12 +69,12 @@ where
     if record.schema != SCHEMA {
         return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());
     }
-    if record.system.name != plant.system.name() {
-        return refuse("system.name", &record.system.name, plant.system.name());
+    if record.system.name != plant.model.name {
+        return refuse("system.name", &record.system.name, &plant.model.name);
     }
-    if record.system.states.len() != NX {
+    if record.system.states.len() != plant.model.states.len() {
         let found = record.system.states.len().to_string();
-        return refuse("system.states length", &found, &NX.to_string());
+        return refuse("system.states length", &found, &plant.model.states.len().to_string());
     }
     if stored.physics_sha256 != physics {
         return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
@@ -138,18 +91,9 @@ where
 }
 
 /// Refuses a record of which some field does not follow from its settings and its own counts.
-fn check_derived<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    record: &Record,
-    settings: &Settings<NX>,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let mut again = derived(plant, settings, record)?;
-    let here = provenance(backend, plant, settings.seed, record.provenance.config.clone());
+fn check_derived(program: &Program<'_>, record: &Record, settings: &Settings) -> Result<()> {
+    let mut again = derived(program.plant(), settings, record)?;
+    let here = provenance(program, settings.seed, record.provenance.config.clone());
     again.provenance = here;
     let finding = compare::fields(record, &again);
     if finding.holds {
@@ -163,22 +107,18 @@ where
 /// # Errors
 /// [`Error::Refused`] if the record is of another plant, or if a field does not follow from its
 /// settings and its own counts; those of the backend.
-pub fn query<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+pub fn query(
+    program: &Program<'_>,
     record: &Record,
-    settings: &Settings<NX>,
-    states: &[[f32; NX]],
-) -> Result<Vec<QueryRow>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+    settings: &Settings,
+    states: States<'_>,
+) -> Result<Vec<QueryRow>> {
+    let plant = program.plant();
     check_identity(plant, record)?;
-    check_derived(backend, plant, record, settings)?;
+    check_derived(program, record, settings)?;
     let spec = settings.spec;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
-    let context = Context { backend, plant, watch: &Unwatched };
+    let context = Context { program, watch: &Unwatched };
     let margins = global::check_margins(
         context,
         &spec,
@@ -187,8 +127,8 @@ where
         Query::Measure,
         record.global.band,
     )?;
-    let row = |(x, check_margin): (&[f32; NX], f32)| {
-        let target_margin: f32 = plant.system.target(*x);
+    let row = |(x, check_margin): (&[f32], f32)| {
+        let target_margin: f32 = plant.model.target_at(x, 0);
         let check = f64::from(check_margin);
         let tier = tier(f64::from(target_margin), check, &record.growth, x);
         QueryRow { tier, check_margin, target_margin }
@@ -203,20 +143,15 @@ where
 ///
 /// # Errors
 /// [`Error::Refused`] if the record is of another plant; those of the backend.
-pub fn check<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+pub fn check(
+    program: &Program<'_>,
     record: &Record,
-    settings: &Settings<NX>,
+    settings: &Settings,
     watch: &dyn Watch,
-) -> Result<CheckReport>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    check_identity(plant, record)?;
-    let again = certify(backend, plant, settings, record.provenance.config.clone(), watch)?;
-    let context = Context { backend, plant, watch };
+) -> Result<CheckReport> {
+    check_identity(program.plant(), record)?;
+    let again = certify(program, settings, record.provenance.config.clone(), watch)?;
+    let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
     findings.push(compare::fields(record, &again));
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
@@ -242,14 +177,14 @@ where
 fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
     let number = |name: &str, stored: f64, found: f64| Finding {
         name: name.to_owned(),
-        stored: format!("{stored:.6}"),
-        found: format!("{found:.6}"),
+        stored: Figure::Number(stored),
+        found: Figure::Number(found),
         holds: (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
     };
     let count = |name: &str, stored: u64, found: u64, of: u64| Finding {
         name: name.to_owned(),
-        stored: stored.to_string(),
-        found: found.to_string(),
+        stored: Figure::Count(stored),
+        found: Figure::Count(found),
         holds: stored.abs_diff(found) as f64 <= MOVED * of as f64,
     };
     let worst = stored.deviation.bound.iter().zip(&again.deviation.bound);
@@ -257,11 +192,11 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         let farther = (was - is).abs() > (worst.0 - worst.1).abs();
         if farther || worst.0 == 0.0 { (*was, *is) } else { worst }
     });
-    let text = |name: &str, stored: String, found: String| {
+    let text = |name: &str, stored: Figure, found: Figure| {
         let holds = stored == found;
         Finding { name: name.to_owned(), stored, found, holds }
     };
-    let outcome = |record: &Record| format!("{:?}", record.growth.outcome).to_lowercase();
+    let outcome = |record: &Record| Figure::Words(record.growth.outcome.name().to_owned());
     vec![
         number(
             "constant of the target margin",
@@ -293,7 +228,7 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         ),
         text("outcome of local growth", outcome(stored), outcome(again)),
         number("radius of the verified ball", stored.growth.radius, again.growth.radius),
-        text("all claims obtained", stored.holds.to_string(), again.holds.to_string()),
+        text("all claims obtained", Figure::Flag(stored.holds), Figure::Flag(again.holds)),
     ]
 }
 
@@ -302,22 +237,14 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
     let least = lower_bound(failures, trials, FALSE_ALARM);
     Finding {
         name: name.to_owned(),
-        stored: format!("at most {risk:.6}"),
-        found: format!("{failures} of {trials}: at least {least:.6}"),
+        stored: Figure::AtMost { at_most: risk },
+        found: Figure::Trials { failures, trials, at_least: least },
         holds: least <= risk,
     }
 }
 
 /// Failures among fresh starts in the verified ball.
-fn fresh_failures<S, P, const NX: usize, const NU: usize>(
-    context: Context<'_, S, P>,
-    settings: &Settings<NX>,
-    ball: Ball,
-) -> Result<u64>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
     context.watch.begin("fresh starts in the ball", FRESH_STARTS);
     let stream = Stream::new(settings.seed, Purpose::Check, 1);
     let tightening = Tightening::none(&settings.spec);
@@ -329,7 +256,7 @@ where
         query: Query::Sign,
     };
     let mut failures = 0;
-    context.backend.reach_avoid(context.plant, &task, &mut |_, values| {
+    context.program.reach_avoid(&task, &mut |_, values| {
         failures += values.iter().filter(|value| **value <= 0.0).count() as u64;
         context.watch.advance(values.len() as u64)
     })?;

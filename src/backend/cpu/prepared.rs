@@ -1,15 +1,19 @@
-//! A plant as the CPU runs it: compiled formulas, its network packed.
+//! A plant as the CPU runs it: formulas compiled or as tapes, its network packed.
 
 use std::sync::Arc;
 
 use super::Cpu;
 use super::mlp::Packed;
-use super::tile::{Drive, Driven};
+use super::tile::{Around, Drive, Driven};
 use crate::backend::{MeasureSink, PairSink};
-use crate::error::{Error, Result};
-use crate::model::{Law, Plant};
+use crate::error::Result;
+use crate::formula::Graph;
+use crate::model::{Law, Model, Plant};
+use crate::policy::Mlp;
 use crate::rollout::{DeviationTask, Farthest, ReachAvoidTask};
-use crate::tile::{Clock, Layout, NativeFormula, NativeSystem};
+use crate::tile::{
+    Clock, Held, Inputs, InterpretedFormula, InterpretedSystem, Layout, NativeFormula, NativeSystem,
+};
 
 /// A plant prepared for tiles.
 #[derive(Debug)]
@@ -24,29 +28,114 @@ pub(in crate::backend) struct Prepared {
 #[derive(Debug)]
 enum PreparedLaw {
     Formula(Arc<dyn NativeFormula>),
-    Network(Arc<Packed>),
+    Network { network: Arc<Packed>, observe: Option<Beside>, act: Option<Beside> },
+}
+
+/// A formula before or behind a network, and the rows between the two.
+#[derive(Debug)]
+struct Beside {
+    formula: InterpretedFormula,
+    rows: [usize; 2],
+}
+
+/// What the formulas of a plant need of a frame, as they are prepared one by one.
+struct Needs<'a> {
+    model: &'a Model,
+    values: Vec<f32>,
+    layout: Layout,
+    clock: Clock,
 }
 
 impl Cpu {
     /// See [`crate::backend::Backend::prepare`].
     pub(in crate::backend) fn prepare(&self, plant: &Plant) -> Result<Prepared> {
         let Plant { model, controller } = plant;
-        let missing = || Error::invalid("model", "no compiled form");
-        let law = match &controller.law {
-            Law::Formula(_) => {
-                PreparedLaw::Formula(controller.native().cloned().ok_or_else(missing)?)
+        let layout = Layout { states: model.states.len(), controls: model.controls.len(), own: 0 };
+        let values = model.values();
+        let mut needs = Needs { model, values, layout, clock: Clock::Ignored };
+        let law = match (&controller.law, controller.native()) {
+            (Law::Formula(_), Some(compiled)) => PreparedLaw::Formula(Arc::clone(compiled)),
+            (Law::Formula(graph), None) => {
+                let inputs = needs.inputs();
+                let formula = needs.formula(graph, &inputs, layout.states, layout.first_own());
+                PreparedLaw::Formula(Arc::new(formula))
             }
-            Law::Network { network, .. } => {
-                Packed::check(network, model.states.len(), model.controls.len())?;
-                PreparedLaw::Network(self.packed(network))
+            (Law::Network { observe, network, act }, _) => {
+                let (observe, act) = needs.around(network, [observe.as_ref(), act.as_ref()])?;
+                PreparedLaw::Network { network: self.packed(network), observe, act }
             }
         };
-        Ok(Prepared {
-            system: model.native.clone().ok_or_else(missing)?,
-            law,
-            layout: Layout { states: model.states.len(), controls: model.controls.len(), own: 0 },
-            clock: Clock::Ignored,
-        })
+        let system = needs.system();
+        Ok(Prepared { system, law, layout: needs.layout, clock: needs.clock })
+    }
+}
+
+impl Needs<'_> {
+    /// Dynamics and margins: as compiled where they are, else as tapes.
+    fn system(&mut self) -> Arc<dyn NativeSystem> {
+        if let Some(compiled) = &self.model.native {
+            return Arc::clone(compiled);
+        }
+        let system = InterpretedSystem::new(self.model, &self.values);
+        self.room(system.own_rows(), system.clock());
+        Arc::new(system)
+    }
+
+    /// What stands around `network`: a formula before it and one behind it.
+    ///
+    /// The rows between are the first that formulas have to themselves. Those of the system may be the
+    /// same: a decision is over before a step begins.
+    fn around(
+        &mut self,
+        network: &Mlp,
+        [observe, act]: [Option<&Graph>; 2],
+    ) -> Result<(Option<Beside>, Option<Beside>)> {
+        let Layout { states, controls, .. } = self.layout;
+        let widths = network.widths();
+        let outputs = widths[widths.len() - 1];
+        let seen = observe.map_or(states, |observe| observe.outputs.len());
+        Packed::check(network, seen, if act.is_some() { outputs } else { controls })?;
+        let first = self.layout.first_own();
+        let (said, own) = (first + seen, first + seen + outputs);
+        let inputs = self.inputs();
+        let observe = observe.map(|graph| Beside {
+            formula: self.formula(graph, &inputs, first, own),
+            rows: [first, said],
+        });
+        let after = inputs.followed_by(said..own);
+        let act = act.map(|graph| Beside {
+            formula: self.formula(graph, &after, states, own),
+            rows: [said, own],
+        });
+        self.room(own - first, Clock::Ignored);
+        Ok((observe, act))
+    }
+
+    /// The inputs of a formula that makes controls.
+    fn inputs(&self) -> Inputs {
+        Inputs::new(self.model, &self.values, Held::Zeros)
+    }
+
+    /// The tape of `graph`, its outputs in the rows from `to` on, its own from `first_own` on.
+    fn formula(
+        &mut self,
+        graph: &Graph,
+        inputs: &Inputs,
+        to: usize,
+        first_own: usize,
+    ) -> InterpretedFormula {
+        let formula = InterpretedFormula::new(graph, inputs, to, first_own);
+        let before = first_own - self.layout.first_own();
+        self.room(before + formula.own_rows(), formula.clock());
+        formula
+    }
+
+    /// Makes room for `own` rows of formulas' own.
+    fn room(&mut self, own: usize, clock: Clock) {
+        self.layout.own = self.layout.own.max(own);
+        if clock == Clock::Read {
+            self.clock = clock;
+        }
     }
 }
 
@@ -75,7 +164,10 @@ impl Prepared {
     fn driven(&self, cpu: &Cpu) -> Driven<'_> {
         let drive = match &self.law {
             PreparedLaw::Formula(formula) => Drive::Formula(&**formula),
-            PreparedLaw::Network(network) => Drive::Network { network, observe: None, act: None },
+            PreparedLaw::Network { network, observe, act } => {
+                let [observe, act] = [observe, act].map(|beside| beside.as_ref().map(around));
+                Drive::Network { network, observe, act }
+            }
         };
         Driven {
             system: &*self.system,
@@ -85,4 +177,9 @@ impl Prepared {
             with: cpu.instructions,
         }
     }
+}
+
+/// A formula beside a network as a tile asks for it.
+fn around(beside: &Beside) -> Around<'_> {
+    Around { formula: &beside.formula, rows: beside.rows }
 }

@@ -5,19 +5,19 @@ use std::path::Path;
 use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::Backend;
-use crate::cli::args::Global;
 use crate::cli::folder_of;
+use crate::cli::inputs::inputs;
+use crate::cli::options::Global;
 use crate::cli::progress::Progress;
-use crate::config::{Config, Job, Overrides, PolicySource};
+use crate::config::{Config, Overrides, PolicySource};
 use crate::error::{Error, Result};
-use crate::experiment::sweep::record::{AxisRecord, PointResult, SweepRecord};
+use crate::experiment::sweep::record::PointResult;
 use crate::experiment::sweep::{Store, certificate_point, certificate_sha256, certificate_sweep};
-use crate::policy::Policy;
-use crate::rollout::Plant;
+use crate::files::Existing;
+use crate::model::Plant;
 use crate::scenario::bound::CountRule;
 use crate::scenario::check_settings;
 use crate::scenario::settings::Settings;
-use crate::system::System;
 
 /// Keys that `--count` sets.
 const COUNTS: [&str; 2] = ["deviation.scenarios", "growth.scenarios"];
@@ -42,13 +42,19 @@ pub(super) fn run(
     let axes = (grid.records(), points.len() as u64);
     let base = Config::load(&asked.config, &sweep.base)?;
     let policy = base.policy_source(folder_of(&asked.config))?;
-    let record = base.with_plant(&policy, Begin { config: &base, backend, axes })?;
+    inputs(&asked.config, &policy, []).spare_folder(out)?;
+    let plant = base.plant(&policy)?;
+    let program = backend.prepare(&plant)?;
+    let record = certificate_sweep(&program, base.seed, base.to_json()?, axes);
     let hashes = points.iter().map(|values| sweep.checked(values)).collect::<Result<Vec<_>>>()?;
     let identity = serde_json::json!({
         "sweep_of": "certificates",
         "schema": record.schema,
         "provenance": record.provenance,
     });
+    if global.existing == Existing::Replaced {
+        Store::make_way(out, &identity, &record)?;
+    }
     let mut store = Store::open(out, &identity, record)?;
     for (values, sha256) in points.into_iter().zip(hashes) {
         store.point(sha256, values.clone(), || {
@@ -66,7 +72,7 @@ impl Sweep<'_> {
             Some("exact") => Some(CountRule::Exact),
             _ => Some(CountRule::Simple),
         };
-        let overrides = self.grid.overrides(&self.base, values, None)?;
+        let mut overrides = self.grid.overrides(&self.base, values, None)?;
         let sets = |assignment: &&String| {
             COUNTS.contains(&assignment.split('=').next().unwrap_or_default().trim())
         };
@@ -75,109 +81,60 @@ impl Sweep<'_> {
                            to set them";
             return Err(Error::invalid(set.as_str(), problem));
         }
+        if rule.is_none() {
+            self.keep_counts(&mut overrides)?;
+        }
         let config = Config::load(self.config, &overrides);
         let config = config.map_err(|error| self.grid.blamed(error, values))?;
         let policy = config.policy_source(folder_of(self.config))?;
         Ok((config, policy, rule))
     }
 
+    /// Sets the counts of the configuration, which would follow from what the axes ask for, unless
+    /// `overrides` set them.
+    fn keep_counts(&self, overrides: &mut Overrides) -> Result<()> {
+        let base = Config::load(self.config, &self.base)?;
+        let counts = [base.deviation.scenarios, base.growth.scenarios];
+        for (key, count) in COUNTS.iter().zip(counts) {
+            if !overrides.set.iter().any(|set| set.trim_start().starts_with(key)) {
+                overrides.set.push(format!("{key}={count}"));
+            }
+        }
+        Ok(())
+    }
+
     /// SHA-256 of a point that can be certified.
     fn checked(&self, values: &Values) -> Result<String> {
         let (config, policy, rule) = self.point(values)?;
-        config.with_plant(&policy, Check { config: &config, rule, backend: self.backend })
+        let plant = config.plant(&policy)?;
+        let (settings, stored) = counted(&config, &plant, rule)?;
+        check_settings(&settings)?;
+        let program = self.backend.prepare(&plant)?;
+        Ok(certificate_sha256(&program, settings.seed, stored))
     }
 
     /// Certifies a point.
     fn certify(&self, values: &Values, progress: &Progress) -> Result<PointResult> {
         let (config, policy, rule) = self.point(values)?;
-        let job = Certify { config: &config, rule, backend: self.backend, progress };
-        config.with_plant(&policy, job)
+        let plant = config.plant(&policy)?;
+        let (settings, stored) = counted(&config, &plant, rule)?;
+        let program = self.backend.prepare(&plant)?;
+        let point = certificate_point(&program, &settings, stored, progress)?;
+        Ok(PointResult::Certificate(point))
     }
 }
 
 /// The settings of a point and the configuration that has their counts.
-fn counted<S, const NX: usize, const NU: usize>(
+fn counted(
     config: &Config,
-    system: &S,
+    plant: &Plant,
     rule: Option<CountRule>,
-) -> Result<(Settings<NX>, serde_json::Value)>
-where
-    S: System<NX, NU>,
-{
-    let axes = system.states();
+) -> Result<(Settings, serde_json::Value)> {
+    let axes = &plant.model.states;
     let mut config = config.clone();
     if let Some(rule) = rule {
-        let counts = config.settings(&axes)?.scenario_counts(rule)?;
+        let counts = config.settings(axes)?.scenario_counts(rule)?;
         [config.deviation.scenarios, config.growth.scenarios] = counts;
     }
-    Ok((config.settings(&axes)?, config.to_json()?))
-}
-
-/// The sweep before its first point.
-struct Begin<'a> {
-    config: &'a Config,
-    backend: &'a Backend,
-    axes: (Vec<AxisRecord>, u64),
-}
-
-impl Job for Begin<'_> {
-    type Output = SweepRecord;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<SweepRecord>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let Self { config, backend, axes } = self;
-        Ok(certificate_sweep(backend, plant, config.seed, config.to_json()?, axes))
-    }
-}
-
-/// The hash of a point, once its settings are checked.
-struct Check<'a> {
-    config: &'a Config,
-    rule: Option<CountRule>,
-    backend: &'a Backend,
-}
-
-impl Job for Check<'_> {
-    type Output = String;
-
-    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<String>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let (settings, config) = counted(self.config, plant.system, self.rule)?;
-        check_settings(&settings)?;
-        Ok(certificate_sha256(self.backend, plant, settings.seed, config))
-    }
-}
-
-/// The certificate of a point.
-struct Certify<'a> {
-    config: &'a Config,
-    rule: Option<CountRule>,
-    backend: &'a Backend,
-    progress: &'a Progress,
-}
-
-impl Job for Certify<'_> {
-    type Output = PointResult;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<PointResult>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let (settings, config) = counted(self.config, plant.system, self.rule)?;
-        let point = certificate_point(self.backend, plant, &settings, config, self.progress)?;
-        Ok(PointResult::Certificate(point))
-    }
+    Ok((config.settings(axes)?, config.to_json()?))
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
-use crate::backend::Backend;
-use crate::cli::args::Global;
+use crate::backend::{Backend, Program};
+use crate::cli::options::Global;
 use crate::cli::progress::Progress;
 use crate::cli::race_input::{RaceInput, name, noise_seeds};
 use crate::config::Overrides;
@@ -14,6 +14,7 @@ use crate::experiment::controller::Name;
 use crate::experiment::run::Experiment;
 use crate::experiment::sweep::Store;
 use crate::experiment::sweep::record::PointResult;
+use crate::files::Existing;
 use crate::scenario::Watch;
 
 /// What every point has.
@@ -38,6 +39,7 @@ pub(super) fn run(
     let base = global.overrides();
     let input = RaceInput::load(&asked.config, &base)?;
     let (starts, source) = input.starts(asked.race.starts.as_deref())?;
+    input.inputs(&asked.config, asked.race.starts.as_deref()).spare_folder(out)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.race.noise_seeds.unwrap_or(1))?;
     let config = asked.config.as_path();
     let sweep = Sweep { config, base, grid, backend, out, starts, source, noise_seeds };
@@ -45,9 +47,15 @@ pub(super) fn run(
     // All of them before the first race: a grid does not end half-way at a value out of range.
     let hashes =
         points.iter().map(|values| sweep.checked(values)).collect::<Result<Vec<String>>>()?;
-    let shared = sweep.experiment(&input)?;
+    let plant = input.plant()?;
+    let program = backend.prepare(&plant)?;
+    let shared = sweep.experiment(&input, &program)?;
     let record = shared.sweep(grid.records(), points.len() as u64);
-    let mut store = Store::open(out, &shared.sweep_identity(), record)?;
+    let identity = shared.sweep_identity();
+    if global.existing == Existing::Replaced {
+        Store::make_way(out, &identity, &record)?;
+    }
+    let mut store = Store::open(out, &identity, record)?;
     let total = points.len();
     for (i, (values, sha256)) in points.into_iter().zip(hashes).enumerate() {
         let label = grid.label(i, total, &values);
@@ -73,9 +81,13 @@ impl Sweep<'_> {
     }
 
     /// The races of a point.
-    fn experiment<'a>(&'a self, input: &'a RaceInput) -> Result<Experiment<'a>> {
+    fn experiment<'a>(
+        &'a self,
+        input: &'a RaceInput,
+        program: &'a Program<'a>,
+    ) -> Result<Experiment<'a>> {
         Ok(Experiment {
-            world: input.world(self.backend)?,
+            world: input.world(self.backend, program)?,
             names: Vec::new(),
             starts: self.starts.clone(),
             source: self.source.clone(),
@@ -89,7 +101,9 @@ impl Sweep<'_> {
     fn checked(&self, values: &Values) -> Result<String> {
         let name = self.controller(values)?;
         let input = self.input(values)?;
-        let experiment = self.experiment(&input)?;
+        let plant = input.plant()?;
+        let program = self.backend.prepare(&plant)?;
+        let experiment = self.experiment(&input, &program)?;
         experiment.check_point(name)?;
         Ok(experiment.point_sha256(name))
     }
@@ -98,7 +112,9 @@ impl Sweep<'_> {
     fn race(&self, values: &Values, label: &str, progress: &Progress) -> Result<PointResult> {
         let name = self.controller(values)?;
         let input = self.input(values)?;
-        let experiment = self.experiment(&input)?;
+        let plant = input.plant()?;
+        let program = self.backend.prepare(&plant)?;
+        let experiment = self.experiment(&input, &program)?;
         let races = self.starts.len() * self.noise_seeds.len();
         progress.begin(label, races as u64 * u64::from(experiment.world.race.steps));
         experiment.point(name, progress).map(PointResult::Race)

@@ -1,55 +1,39 @@
 //! A point of a sweep as a certificate.
 
 use super::record::{AxisRecord, CertificatePoint, SWEEP_SCHEMA, SweepRecord};
-use crate::backend::Backend;
+use crate::backend::Program;
 use crate::digest;
 use crate::error::Result;
 use crate::experiment::run::program_sha256;
-use crate::policy::Policy;
-use crate::rollout::Plant;
 use crate::scenario::settings::Settings;
 use crate::scenario::{self, Watch, provenance};
-use crate::system::System;
 
 /// A sweep of certificates over `axes` with `total` points, none of which is done; `config` is what
 /// every point starts from.
-pub fn certificate_sweep<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+pub fn certificate_sweep(
+    program: &Program<'_>,
     seed: u64,
     config: serde_json::Value,
     (axes, total): (Vec<AxisRecord>, u64),
-) -> SweepRecord
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> SweepRecord {
     SweepRecord {
         schema: SWEEP_SCHEMA,
-        provenance: provenance(backend, plant, seed, config),
+        provenance: provenance(program, seed, config),
         starts: None,
         noise_seeds: Vec::new(),
         judge: None,
         axes,
         total,
         points: Vec::new(),
+        notes: Vec::new(),
     }
 }
 
 /// SHA-256 over everything that a certificate depends on.
-pub fn certificate_sha256<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    seed: u64,
-    config: serde_json::Value,
-) -> String
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+pub fn certificate_sha256(program: &Program<'_>, seed: u64, config: serde_json::Value) -> String {
     let point = serde_json::json!({
         "program_sha256": program_sha256(),
-        "provenance": provenance(backend, plant, seed, config),
+        "provenance": provenance(program, seed, config),
     });
     digest::sha256([point.to_string().as_bytes()])
 }
@@ -58,18 +42,13 @@ where
 ///
 /// # Errors
 /// Those of [`scenario::certify`].
-pub fn certificate_point<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    settings: &Settings<NX>,
+pub fn certificate_point(
+    program: &Program<'_>,
+    settings: &Settings,
     config: serde_json::Value,
     watch: &dyn Watch,
-) -> Result<CertificatePoint>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let record = scenario::certify(backend, plant, settings, config, watch)?;
+) -> Result<CertificatePoint> {
+    let record = scenario::certify(program, settings, config, watch)?;
     let (deviation, global, growth) = (&record.deviation, &record.global, &record.growth);
     Ok(CertificatePoint {
         deviation_scenarios: deviation.claim.scenarios,

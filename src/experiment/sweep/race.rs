@@ -9,7 +9,6 @@ use crate::experiment::race::{fly, race_seed};
 use crate::experiment::roster::{absent, controller, settings};
 use crate::experiment::run::{BATCH, Experiment, flown, mean_seconds, quantile};
 use crate::experiment::summary::Summary;
-use crate::rollout::Plant;
 use crate::scenario::{Unwatched, Watch, provenance};
 
 /// Control steps that are timed, if they fit into [`LATENCY_BUDGET`].
@@ -21,17 +20,17 @@ impl Experiment<'_> {
     /// The sweep over `axes` with `total` points, none of which is done; this experiment is what
     /// every point starts from.
     pub fn sweep(&self, axes: Vec<AxisRecord>, total: u64) -> SweepRecord {
-        let World { backend, system, policy, race, certificates, .. } = self.world;
-        let plant = Plant { system, policy };
+        let World { program, race, certificates, .. } = self.world;
         SweepRecord {
             schema: SWEEP_SCHEMA,
-            provenance: provenance(backend, plant, certificates.seed, self.config.clone()),
+            provenance: provenance(program, certificates.seed, self.config.clone()),
             starts: Some(self.starts_record()),
             noise_seeds: self.noise_seeds.clone(),
             judge: Some(race.judge),
             axes,
             total,
             points: Vec::new(),
+            notes: Vec::new(),
         }
     }
 

@@ -82,8 +82,6 @@ impl Tape {
         Self { steps: placed.steps, own: placed.own }
     }
 
-    pub(crate) fn len(&self) -> usize { self.steps.len() }
-
     /// How many rows of its own it needs.
     pub(crate) fn own_rows(&self) -> usize {
         self.own

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::super::Cpu;
-use super::super::dispatch::Instructions;
 use crate::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use crate::real::Real;
+use crate::real::simd::Instructions;
 use crate::rollout::{
     DeviationTask, Farthest, PairMeasure, Plant, Query, ReachAvoidTask, Region, RolloutSpec,
     Starts, Stream, Tightening,

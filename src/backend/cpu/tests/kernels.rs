@@ -1,7 +1,8 @@
 //! The dense-layer kernels against a scalar loop, to the bit.
 
-use super::super::dispatch::{Instructions, Unit};
+use super::super::dispatch::{Unit, run};
 use super::super::kernel::{GRANULE, Kernel, Panel};
+use crate::real::simd::Instructions;
 
 /// Compares every shape of panel with a scalar loop.
 struct EveryShape {
@@ -59,6 +60,6 @@ fn every_kernel_is_the_scalar_loop() {
     for instructions in Instructions::detect() {
         let baseline = matches!(instructions, Instructions::Baseline);
         let fused = !baseline || cfg!(target_arch = "aarch64");
-        instructions.run(EveryShape { fused });
+        run(instructions, EveryShape { fused });
     }
 }

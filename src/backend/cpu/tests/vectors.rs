@@ -2,8 +2,9 @@
 
 use std::marker::PhantomData;
 
-use crate::backend::cpu::dispatch::{Body, Instructions, Unit};
+use crate::backend::cpu::dispatch::{Unit, run};
 use crate::backend::cpu::kernel::Kernel;
+use crate::real::simd::{Body, Instructions};
 use crate::real::{Real, Vector};
 
 /// Numbers that the operations treat differently, and one that they do not.
@@ -97,7 +98,7 @@ impl Unit for Operations {
 #[test]
 fn every_operation_has_the_bits_of_f32() {
     for instructions in Instructions::detect() {
-        instructions.run(Operations);
+        run(instructions, Operations);
     }
 }
 
@@ -144,6 +145,6 @@ impl Unit for Magnitudes {
 #[test]
 fn the_logarithm_of_every_uniform_number_has_the_bits_of_f32() {
     for instructions in Instructions::detect() {
-        instructions.run(Magnitudes);
+        run(instructions, Magnitudes);
     }
 }

@@ -1,0 +1,90 @@
+//! Configurations of a plant that is given as text: defaults that follow from its states, the plant
+//! with its policy.
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use super::plant::PolicySource;
+use super::profile;
+use super::section::{Config, PolicySection, Profile};
+use crate::error::{Error, Result};
+use crate::model::Plant;
+use crate::model::text::{Origin, read_table};
+
+/// The sections that describe a plant.
+const SECTIONS: [&str; 2] = ["model", "policy"];
+
+/// Whether `given` describes its plant itself.
+pub(super) fn is_described(given: &Table) -> bool {
+    given.contains_key("model")
+}
+
+/// The defaults of `profile` for the plant that `given` describes, with the description itself.
+///
+/// # Errors
+/// [`Error::Invalid`] naming what is wrong with the description, by the file `origin` with its text.
+pub(super) fn defaults(profile: Profile, given: &Table, origin: Origin) -> Result<Table> {
+    if given.contains_key("system") {
+        let problem = "both `model` and `system` are given; keep one of them";
+        return Err(Error::invalid(origin.name, problem));
+    }
+    let description = read_table(&sections(given), &origin)?;
+    let axes: Vec<_> = description.states.iter().map(|state| state.axis.clone()).collect();
+    let config = profile::described(profile, &axes);
+    let refused =
+        |e: toml::ser::Error| Error::invalid(format!("{}: defaults", origin.name), e.to_string());
+    let mut table = Table::try_from(config).map_err(refused)?;
+    // Their keys are those of the description, which knows which of them are right.
+    table.extend(sections(given));
+    Ok(table)
+}
+
+/// The keys that a setting may have below `model`: those of the file, and those of its time.
+pub(super) fn settable(file: &Table) -> Table {
+    let mut valid = sections(file);
+    if let Some(Value::Table(model)) = valid.get_mut("model") {
+        let time = model.entry("time").or_insert_with(|| Value::Table(Table::new()));
+        if let Value::Table(time) = time {
+            for key in ["period", "integrator", "substeps"] {
+                time.entry(key).or_insert(Value::Integer(0));
+            }
+        }
+    }
+    valid
+}
+
+/// The sections of `given` that describe a plant.
+fn sections(given: &Table) -> Table {
+    let of = |key: &str| Some((key.to_owned(), given.get(key)?.clone()));
+    SECTIONS.into_iter().filter_map(of).collect()
+}
+
+impl Config {
+    /// The plant that the section `model` describes, with the policy.
+    ///
+    /// # Errors
+    /// Those of the description, and [`Error::File`] for a network of the wrong shape.
+    pub(super) fn described_plant(&self, model: &Table, policy: &PolicySource) -> Result<Plant> {
+        let (section, folder, network) = match policy {
+            PolicySource::Network { path, network, .. } => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let section = PolicySection { file: Some(name), ..self.policy.clone() };
+                (section, path.parent().unwrap_or(Path::new("")), Some(network.clone()))
+            }
+            PolicySource::Formula(_) => (self.policy.clone(), Path::new(""), None),
+        };
+        let refused = |e: toml::ser::Error| Error::invalid("policy", e.to_string());
+        let section = Table::try_from(section).map_err(refused)?;
+        let table = Table::from_iter([
+            ("model".to_owned(), Value::Table(model.clone())),
+            ("policy".to_owned(), Value::Table(section)),
+        ]);
+        let described = read_table(&table, &Origin::new("configuration", folder))?;
+        let controller = match network {
+            Some(network) => described.controller_of(network)?,
+            None => described.controller()?,
+        };
+        Ok(Plant::new(described.model()?, controller))
+    }
+}

@@ -1,0 +1,63 @@
+//! The text of a plant: what its certificates hash.
+
+use std::fmt::Write;
+
+use super::{Law, Model, Plant};
+use crate::formula::Graph;
+use crate::formula::wgsl::function;
+
+impl Plant {
+    /// Every formula of the plant as a function, then the values of the parameters: equal texts are
+    /// equal plants, whoever wrote them. A network has no text: its digest is
+    /// [`crate::policy::Mlp::digest`].
+    ///
+    /// ```
+    /// use reachcast::model::Plant;
+    /// use reachcast::system::{BangBang, DoubleIntegrator};
+    /// let text = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 }).text();
+    /// assert!(text.contains("fn plant_step(") && text.contains("fn plant_control("));
+    /// ```
+    pub fn text(&self) -> String {
+        let Self { model, controller } = self;
+        let mut text = [
+            model.function("plant_step", &model.step, 0),
+            model.function("plant_target", &model.target, 0),
+            model.function("plant_constraint", &model.constraint, 0),
+        ]
+        .join("\n");
+        let laws = match &controller.law {
+            Law::Formula(graph) => vec![("plant_control", graph, 0)],
+            Law::Network { observe, act, network } => {
+                let outputs = network.widths().last().copied().unwrap_or(0);
+                let observe = observe.iter().map(|graph| ("plant_observe", graph, 0));
+                observe.chain(act.iter().map(|graph| ("plant_act", graph, outputs))).collect()
+            }
+        };
+        for (name, graph, more) in laws {
+            text.push('\n');
+            text += &model.function(name, graph, more);
+        }
+        for parameter in &model.parameters {
+            // The bits, so that no decimal hides a difference.
+            let (name, value) = (&parameter.name, parameter.value);
+            writeln!(text, "// {name} = {value:?} ({:08x})", value.to_bits())
+                .expect("a String grows");
+        }
+        if let Some(period) = model.period {
+            writeln!(text, "// period = {period:?} s").expect("a String grows");
+        }
+        text
+    }
+}
+
+impl Model {
+    /// A formula of the model as a function `name`, with `more` inputs behind the model's.
+    fn function(&self, name: &str, graph: &Graph, more: usize) -> String {
+        let (x, u) = (self.states.len(), self.controls.len());
+        let sizes =
+            [("x", x), ("u", u), ("p", self.parameters.len()), ("t", 1), ("k", 1), ("out", more)];
+        let arguments: Vec<(&str, usize)> =
+            sizes.into_iter().filter(|(_, length)| *length > 0).collect();
+        function(name, &arguments, graph)
+    }
+}
