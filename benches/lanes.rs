@@ -6,6 +6,7 @@
 //! loop across states as well, so the ratios are not the number of lanes.
 
 mod scalar;
+mod text;
 
 use std::hint::black_box;
 use std::process::ExitCode;
@@ -75,6 +76,7 @@ fn main() -> ExitCode {
             );
         }
     }
+    sound &= text::hold();
     if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
@@ -119,7 +121,10 @@ fn plans(backend: &Backend) -> f64 {
 }
 
 /// The shortest call of `plain` over that of `lanes`, which take turns.
-fn ratio(mut plain: impl FnMut() -> Result<()>, mut lanes: impl FnMut() -> Result<()>) -> f64 {
+pub(crate) fn ratio(
+    mut plain: impl FnMut() -> Result<()>,
+    mut lanes: impl FnMut() -> Result<()>,
+) -> f64 {
     let mut best = [f64::INFINITY; 2];
     for _ in 0..TURNS {
         best[0] = best[0].min(shortest(&mut plain));

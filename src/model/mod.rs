@@ -52,6 +52,13 @@ impl Model {
         self.states.len() + self.controls.len() + self.parameters.len() + 2
     }
 
+    /// The same without its compiled form, as if it were given as text: for benches of the two.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn as_text(self) -> Self {
+        Self { native: None, ..self }
+    }
+
     /// The values of the parameters.
     pub fn values(&self) -> Vec<f32> {
         self.parameters.iter().map(|parameter| parameter.value).collect()

@@ -75,11 +75,6 @@ impl InterpretedSystem {
         }
     }
 
-    #[cfg(test)]
-    pub(crate) fn sizes(&self) -> [usize; 2] {
-        [self.step.len(), self.margins.len()]
-    }
-
     /// How many rows of their own the formulas need, from the first one on.
     pub(crate) fn own_rows(&self) -> usize {
         self.step.own_rows().max(self.margins.own_rows())

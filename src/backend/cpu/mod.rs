@@ -63,6 +63,17 @@ impl Cpu {
         Self::with_instructions(threads, Instructions::detect()[0])
     }
 
+    /// One with each instruction set that the processor has, the fastest first: for benches that hold
+    /// each to its floor.
+    ///
+    /// # Errors
+    /// Those of [`Cpu::new`].
+    #[doc(hidden)]
+    pub fn each(threads: Option<usize>) -> Result<Vec<Self>> {
+        let sets = Instructions::detect().into_iter();
+        sets.map(|set| Self::with_instructions(threads, set)).collect()
+    }
+
     /// The same with an instruction set of choice.
     fn with_instructions(threads: Option<usize>, instructions: Instructions) -> Result<Self> {
         if threads == Some(0) {

@@ -74,14 +74,12 @@ impl Tape {
     ) -> Self {
         let mut values = Values::new(graphs, sources);
         assert_eq!(outputs.len(), values.outputs.len(), "outputs of a tape");
+        for (i, row) in outputs.iter().enumerate() {
+            assert!(!outputs[..i].contains(row), "two outputs of a tape to row {row}");
+        }
         pairs::pair_up(&mut values);
         let placed = rows::placed(&schedule::scheduled(values, outputs), first_own);
         Self { steps: placed.steps, own: placed.own }
-    }
-
-    #[cfg(test)]
-    pub(crate) fn len(&self) -> usize {
-        self.steps.len()
     }
 
     /// How many rows of its own it needs.

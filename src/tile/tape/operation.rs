@@ -50,7 +50,7 @@ impl<R: Real> Operation<R> {
             Kind::Copy => a,
             Kind::Unary(f) => f.of(a),
             Kind::Binary(f) => f.of(a, b),
-            Kind::Pair(first, then) => then.of(first.of(a, b), c),
+            Kind::Pair(f) => f.of(a, b, c),
             Kind::Select => a.if_lt(b, c, d),
         }
     }
@@ -65,8 +65,8 @@ pub(super) enum Kind {
     Unary(Unary),
     /// A function of two.
     Binary(Binary),
-    /// A function of the first two, then one of that and the third, each rounded.
-    Pair(Binary, Then),
+    /// Two functions, one after the other, of three.
+    Pair(Pair),
     /// `if a < b { yes } else { no }`, in this order.
     Select,
 }
@@ -77,7 +77,7 @@ impl Kind {
         match self {
             Self::Copy | Self::Unary(_) => 1,
             Self::Binary(_) => 2,
-            Self::Pair(..) => 3,
+            Self::Pair(_) => 3,
             Self::Select => 4,
         }
     }
@@ -113,34 +113,30 @@ pub(super) enum Binary {
     Max,
 }
 
-/// Which of two numbers an operation takes first.
+/// Functions of the first two of three numbers, then of that and the third, each rounded: pairs that
+/// formulas are full of, with a loop of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Side {
-    /// The one just computed.
-    Left,
-    /// The other one.
-    Right,
-}
-
-/// The second function of a pair, and on which side of it the first one's value stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Then {
-    /// Sum.
-    Add,
-    /// Value less third operand.
-    Sub,
-    /// Third operand less value.
-    From,
-    /// Product.
-    Mul,
-    /// The smaller of value and third operand.
-    Min,
-    /// The smaller of third operand and value.
-    MinOf,
-    /// The larger of value and third operand.
-    Max,
-    /// The larger of third operand and value.
-    MaxOf,
+pub(super) enum Pair {
+    /// `a * b + c`.
+    MulAdd,
+    /// `a * b - c`.
+    MulSub,
+    /// `c - a * b`.
+    MulFrom,
+    /// `a * b * c`.
+    MulMul,
+    /// `(a + b) * c`.
+    AddMul,
+    /// The smaller of `a + b` and `c`.
+    AddMin,
+    /// `(a - b) * c`.
+    SubMul,
+    /// The smaller of `a - b` and `c`.
+    SubMin,
+    /// The smallest of three.
+    MinMin,
+    /// The smaller of `c` and the larger of `a` and `b`: what clips.
+    Clip,
 }
 
 impl Binary {
@@ -148,21 +144,49 @@ impl Binary {
     pub(super) fn commutes(self) -> bool {
         matches!(self, Self::Add | Self::Mul)
     }
+}
 
-    /// The function as the second of a pair, if pairs are made of it: a quotient takes longer
-    /// than the loads that a pair saves.
-    pub(super) fn then(self, side: Side) -> Option<Then> {
-        Some(match (self, side) {
-            (Self::Add, _) => Then::Add,
-            (Self::Mul, _) => Then::Mul,
-            (Self::Sub, Side::Left) => Then::Sub,
-            (Self::Sub, Side::Right) => Then::From,
-            (Self::Min, Side::Left) => Then::Min,
-            (Self::Min, Side::Right) => Then::MinOf,
-            (Self::Max, Side::Left) => Then::Max,
-            (Self::Max, Side::Right) => Then::MaxOf,
-            (Self::Div, _) => return None,
-        })
+impl Pair {
+    /// The pair of `first`, whose value is on the left of `second`, if it has a loop.
+    pub(super) fn with_left(first: Binary, second: Binary) -> Option<Self> {
+        match (first, second) {
+            (Binary::Mul, Binary::Add) => Some(Self::MulAdd),
+            (Binary::Mul, Binary::Sub) => Some(Self::MulSub),
+            (Binary::Mul, Binary::Mul) => Some(Self::MulMul),
+            (Binary::Add, Binary::Mul) => Some(Self::AddMul),
+            (Binary::Add, Binary::Min) => Some(Self::AddMin),
+            (Binary::Sub, Binary::Mul) => Some(Self::SubMul),
+            (Binary::Sub, Binary::Min) => Some(Self::SubMin),
+            (Binary::Min, Binary::Min) => Some(Self::MinMin),
+            _ => None,
+        }
+    }
+
+    /// The pair of `first`, whose value is on the right of `second`, if it has a loop.
+    pub(super) fn with_right(first: Binary, second: Binary) -> Option<Self> {
+        match (first, second) {
+            (Binary::Mul, Binary::Sub) => Some(Self::MulFrom),
+            (Binary::Max, Binary::Min) => Some(Self::Clip),
+            (_, second) if second.commutes() => Self::with_left(first, second),
+            _ => None,
+        }
+    }
+
+    /// Its value.
+    #[inline(always)]
+    pub(super) fn of<R: Real>(self, a: R, b: R, c: R) -> R {
+        match self {
+            Self::MulAdd => a * b + c,
+            Self::MulSub => a * b - c,
+            Self::MulFrom => c - a * b,
+            Self::MulMul => a * b * c,
+            Self::AddMul => (a + b) * c,
+            Self::AddMin => (a + b).min(c),
+            Self::SubMul => (a - b) * c,
+            Self::SubMin => (a - b).min(c),
+            Self::MinMin => a.min(b).min(c),
+            Self::Clip => c.min(a.max(b)),
+        }
     }
 }
 
@@ -190,23 +214,6 @@ impl Binary {
             Self::Div => a / b,
             Self::Min => a.min(b),
             Self::Max => a.max(b),
-        }
-    }
-}
-
-impl Then {
-    /// Its value, of what the first function gave and the third operand.
-    #[inline(always)]
-    pub(super) fn of<R: Real>(self, value: R, c: R) -> R {
-        match self {
-            Self::Add => value + c,
-            Self::Sub => value - c,
-            Self::From => c - value,
-            Self::Mul => value * c,
-            Self::Min => value.min(c),
-            Self::MinOf => c.min(value),
-            Self::Max => value.max(c),
-            Self::MaxOf => c.max(value),
         }
     }
 }

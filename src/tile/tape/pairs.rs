@@ -1,6 +1,6 @@
 //! Pairs: a result that a single operation needs is computed in the loop of that operation.
 
-use super::operation::{Binary, Kind, Operation, Side};
+use super::operation::{Binary, Kind, Operation, Pair};
 use super::values::{Value, Values};
 
 /// Makes pairs of `values`; what went into one is needed by nothing.
@@ -17,26 +17,24 @@ pub(super) fn pair_up(values: &mut Values) {
 
 /// The operation `i` as a pair, if it can be one.
 fn pair(operations: &[Operation<Value>], uses: &[usize], i: usize) -> Option<Operation<Value>> {
-    let Kind::Binary(f) = operations[i].kind else { return None };
+    let Kind::Binary(second) = operations[i].kind else { return None };
     let &[left, right] = operations[i].operands() else { return None };
     let single = |value| match value {
-        Value::Result(j) if uses[j] == 1 => first(&operations[j]),
+        Value::Result(j) if uses[j] == 1 => Some(&operations[j]),
         _ => None,
     };
-    // The later of two: less lies between it and its use.
-    let (side, other, (first, [a, b])) = match (single(right), single(left)) {
-        (Some(first), _) => (Side::Right, left, first),
-        (None, Some(first)) => (Side::Left, right, first),
-        (None, None) => return None,
-    };
-    Some(Operation::new(Kind::Pair(first, f.then(side)?), &[a, b, other]))
+    // The one on the right first: it is the later one, and less lies between it and its use.
+    let of_right = single(right).and_then(|first| joined(first, left, second, Pair::with_right));
+    of_right.or_else(|| joined(single(left)?, right, second, Pair::with_left))
 }
 
-/// Function and operands of an operation that can be the first of a pair.
-fn first(operation: &Operation<Value>) -> Option<(Binary, [Value; 2])> {
-    match (operation.kind, operation.operands()) {
-        (Kind::Binary(Binary::Div), _) => None,
-        (Kind::Binary(f), &[a, b]) => Some((f, [a, b])),
-        _ => None,
-    }
+/// The pair of the function `first` and of `second`, which has another operand, if `join` has one.
+fn joined(
+    first: &Operation<Value>,
+    other: Value,
+    second: Binary,
+    join: fn(Binary, Binary) -> Option<Pair>,
+) -> Option<Operation<Value>> {
+    let (Kind::Binary(f), &[a, b]) = (first.kind, first.operands()) else { return None };
+    Some(Operation::new(Kind::Pair(join(f, second)?), &[a, b, other]))
 }

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::operation::{Binary, Kind, Then, Unary};
+use super::operation::{Binary, Kind, Pair, Unary};
 use super::{Place, Step};
 use crate::real::Vector;
 use crate::real::simd::Formulas;
@@ -30,13 +30,12 @@ impl Formulas for Run<'_> {
         // Cells: an operation may write the row that it reads.
         let rows = Rows { blocks: Cell::from_mut(blocks).as_slice_of_cells(), stride, length };
         for step in self.steps {
-            let [a, b, c, d] = step.operation.places();
-            let to = rows.row(step.to);
+            let (to, [a, b, c, d]) = (rows.row(step.to), step.operation.places());
             match step.operation.kind {
                 Kind::Copy => copy::<V>(rows, to, a),
                 Kind::Unary(f) => unary::<V>(rows, to, f, a),
                 Kind::Binary(f) => binary::<V>(rows, to, f, [a, b]),
-                Kind::Pair(first, then) => pair::<V>(rows, to, first, then, [a, b, c]),
+                Kind::Pair(f) => pair::<V>(rows, to, f, [a, b, c]),
                 Kind::Select => select::<V>(rows, to, [a, b, c, d]),
             }
         }
@@ -61,42 +60,30 @@ impl<'a> Rows<'a> {
 }
 
 /// An operand inside a loop.
-trait Operand<V>: Copy {
+trait Operand: Copy {
     /// Its vector at number `at` of a block.
-    fn vector(self, block: usize, at: usize) -> V;
+    fn vector<V: Vector>(self, block: usize, at: usize) -> V;
 }
 
 /// The blocks of a row.
 #[derive(Clone, Copy)]
 struct Row<'a>(&'a [Cell<Block>]);
 
-impl<V: Vector> Operand<V> for Row<'_> {
+impl Operand for Row<'_> {
     #[inline(always)]
-    fn vector(self, block: usize, at: usize) -> V {
+    fn vector<V: Vector>(self, block: usize, at: usize) -> V {
         V::load(&self.0[block].get()[at..])
     }
 }
 
 /// The same number everywhere.
 #[derive(Clone, Copy)]
-struct Splat<V>(V);
+struct Splat(f32);
 
-impl<V: Vector> Operand<V> for Splat<V> {
+impl Operand for Splat {
     #[inline(always)]
-    fn vector(self, _block: usize, _at: usize) -> V {
-        self.0
-    }
-}
-
-/// Writes `f` of each place to a row.
-#[inline(always)]
-fn each<V: Vector>(Row(to): Row<'_>, f: impl Fn(usize, usize) -> V) {
-    for (block, to) in to.iter().enumerate() {
-        let mut numbers = [0.0; GRANULE];
-        for at in (0..GRANULE).step_by(V::WIDTH) {
-            f(block, at).store(&mut numbers[at..]);
-        }
-        to.set(numbers);
+    fn vector<V: Vector>(self, _block: usize, _at: usize) -> V {
+        V::lit(self.0)
     }
 }
 
@@ -109,27 +96,23 @@ macro_rules! operand {
                 $body
             }
             Place::Number(number) => {
-                let $name = Splat(V::lit(number));
+                let $name = Splat(number);
                 $body
             }
         }
     };
 }
 
-/// `$body` with the two operands at `$places`, at least one of which is a row.
+/// `$body` with the two operands at `$places`.
 macro_rules! operands {
     ($rows:ident, $places:expr, [$a:ident, $b:ident] => $body:expr) => {
         match $places {
-            [Place::Row(a), Place::Row(b)] => {
-                let ($a, $b) = ($rows.row(a), $rows.row(b));
-                $body
-            }
-            [Place::Row(a), Place::Number(b)] => {
-                let ($a, $b) = ($rows.row(a), Splat(V::lit(b)));
-                $body
+            [Place::Row(a), b] => {
+                let $a = $rows.row(a);
+                operand!($rows, b, $b => $body)
             }
             [Place::Number(a), Place::Row(b)] => {
-                let ($a, $b) = (Splat(V::lit(a)), $rows.row(b));
+                let ($a, $b) = (Splat(a), $rows.row(b));
                 $body
             }
             [Place::Number(_), Place::Number(_)] => unreachable!("numbers are folded"),
@@ -137,15 +120,15 @@ macro_rules! operands {
     };
 }
 
-/// A loop for each of the functions listed: which one it is, is asked outside of it.
+/// `$body` with `$known` as the constant that `$f` is: which of those listed, is asked outside of
+/// the loop that is in it.
 macro_rules! one_of {
-    ($f:expr, $kind:ident: $($name:ident)*, $known:ident => $body:expr $(, $other:ident)?) => {
+    ($f:expr, $kind:ident: $($name:ident)*, $known:ident => $body:expr) => {
         match $f {
             $($kind::$name => {
                 let $known = $kind::$name;
                 $body
             })*
-            $($kind::$other => unreachable!("no loops of its own"),)?
         }
     };
 }
@@ -172,40 +155,35 @@ fn binary<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Binary, places: [Place; 2])
 }
 
 #[inline(always)]
-fn pair<V: Vector>(rows: Rows<'_>, to: Row<'_>, first: Binary, then: Then, [a, b, c]: [Place; 3]) {
+fn pair<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Pair, [a, b, c]: [Place; 3]) {
     operands!(rows, [a, b], [a, b] => operand!(rows, c, c => {
-        thens::<V, _, _, _>(to, first, then, a, b, c);
-    }));
-}
-
-/// The loops of pairs of operands of given kinds.
-#[inline(always)]
-fn thens<V: Vector, A: Operand<V>, B: Operand<V>, C: Operand<V>>(
-    to: Row<'_>,
-    first: Binary,
-    then: Then,
-    a: A,
-    b: B,
-    c: C,
-) {
-    one_of!(first, Binary: Add Sub Mul Min Max, first => {
-        one_of!(then, Then: Add Sub From Mul Min MinOf Max MaxOf, then => {
+        one_of!(f, Pair:
+            MulAdd MulSub MulFrom MulMul AddMul AddMin SubMul SubMin MinMin Clip, f => {
             each(to, |block, at| -> V {
-                let value = first.of(a.vector(block, at), b.vector(block, at));
-                then.of(value, c.vector(block, at))
+                f.of(a.vector(block, at), b.vector(block, at), c.vector(block, at))
             });
         });
-    }, Div);
+    }));
 }
 
 #[inline(always)]
 fn select<V: Vector>(rows: Rows<'_>, to: Row<'_>, [a, b, yes, no]: [Place; 4]) {
-    operands!(rows, [a, b], [a, b] => {
-        operand!(rows, yes, yes => operand!(rows, no, no => {
-            each(to, |block, at| -> V {
-                let (yes, no) = (yes.vector(block, at), no.vector(block, at));
-                V::if_lt(a.vector(block, at), b.vector(block, at), yes, no)
-            });
-        }));
-    });
+    operands!(rows, [a, b], [a, b] => operand!(rows, yes, yes => operand!(rows, no, no => {
+        each(to, |block, at| -> V {
+            let (yes, no) = (yes.vector(block, at), no.vector(block, at));
+            V::if_lt(a.vector(block, at), b.vector(block, at), yes, no)
+        });
+    })));
+}
+
+/// Writes `f` of the number of each block and of the place in it to a row.
+#[inline(always)]
+fn each<V: Vector>(Row(to): Row<'_>, f: impl Fn(usize, usize) -> V) {
+    for (block, to) in to.iter().enumerate() {
+        let mut numbers = [0.0; GRANULE];
+        for at in (0..GRANULE).step_by(V::WIDTH) {
+            f(block, at).store(&mut numbers[at..]);
+        }
+        to.set(numbers);
+    }
 }

@@ -67,12 +67,10 @@ impl Values {
         }
     }
 
-    /// The value of `operation`: a number where all operands are, else a result.
+    /// The value of `operation`: a number or an operand where that is known, else a result.
     fn value(&mut self, operation: &Operation<Value>) -> Value {
-        let numbers = operation.map(number);
-        if numbers.operands().iter().all(Option::is_some) {
-            let known = numbers.map(Option::unwrap_or_default);
-            return Value::Number(known.value().to_bits());
+        if let Some(known) = known(operation) {
+            return known;
         }
         let (operation, next) = (cheaper(operation), self.operations.len());
         let index = *self.known.entry(operation.clone()).or_insert(next);
@@ -108,6 +106,22 @@ fn number(value: Value) -> Option<f32> {
     match value {
         Value::Number(bits) => Some(f32::from_bits(bits)),
         Value::Row(_) | Value::Result(_) => None,
+    }
+}
+
+/// What an operation of numbers gives, or a choice between numbers.
+fn known(operation: &Operation<Value>) -> Option<Value> {
+    let numbers = operation.map(number);
+    let known = |operands: &[Option<f32>]| operands.iter().all(Option::is_some);
+    if known(numbers.operands()) {
+        let numbers = numbers.map(Option::unwrap_or_default);
+        return Some(Value::Number(numbers.value().to_bits()));
+    }
+    match (operation.kind, numbers.operands(), operation.operands()) {
+        (Kind::Select, [Some(a), Some(b), ..], &[_, _, yes, no]) => {
+            Some(if a < b { yes } else { no })
+        }
+        _ => None,
     }
 }
 
