@@ -10,6 +10,7 @@ use common::{backends, settings};
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::backend::{Backend, gpu::Choice};
 use reachcast::cost::Cost;
+use reachcast::model;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::report::html;
@@ -249,12 +250,12 @@ fn subnormal_numbers_are_zero_at_worst() {
         }
         println!("{}: {flushed} of {} subnormal measures are 0", backend.device(), found.len());
         // A certificate decides them in f64.
-        let system = Line(Motion::Shrinking);
-        let plant = Plant { system: &system, policy: &Idle };
-        let context = Context { backend: &backend, plant, watch: &Unwatched };
+        let plant = model::Plant::of(Line(Motion::Shrinking), Idle);
+        let program = backend.prepare(&plant).expect("a program");
+        let context = Context { program: &program, watch: &Unwatched };
         let spec = spec(&tightening);
         let (starts, query) = (starts(), Query::Measure);
-        let margins = check_margins(context, &spec, &tightening, &starts, query, 1e-5);
+        let margins = check_margins(context, &spec, &tightening, (&starts).into(), query, 1e-5);
         for ([start], margin) in starts.iter().zip(margins.expect("margins")) {
             assert_eq!(*start > 0.0, margin > 0.0, "{start} on {}", backend.device());
         }
@@ -304,12 +305,13 @@ impl Policy<2, 1> for Still {
 fn certificates(edge: f32) -> Vec<Record> {
     let system = Plane { edge };
     let mut settings = settings(&system, 2);
-    settings.state = [0.45, 0.0];
+    settings.state = vec![0.45, 0.0];
     settings.deviation.radius = 0.02;
     settings.growth.radius = 0.9;
-    let plant = Plant { system: &system, policy: &Still };
+    let plant = model::Plant::of(system, Still);
     let certify = |backend: &Backend| {
-        certify(backend, plant, &settings, serde_json::json!({}), &Unwatched).expect("a record")
+        let program = backend.prepare(&plant).expect("a program");
+        certify(&program, &settings, serde_json::json!({}), &Unwatched).expect("a record")
     };
     backends().iter().map(certify).collect()
 }

@@ -55,7 +55,7 @@ pub(crate) fn race_policy() -> Mlp {
 pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
     system: &S,
     horizon: u32,
-) -> Settings<NX> {
+) -> Settings {
     let axes = system.states();
     let values = |axis: usize| {
         let (low, high) = (axes[axis].low, axes[axis].high);
@@ -64,8 +64,8 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
     Settings {
         seed: 1,
         spec: RolloutSpec::new(horizon, 0.95).expect("spec"),
-        low: axes.each_ref().map(|axis| axis.low),
-        high: axes.each_ref().map(|axis| axis.high),
+        low: axes.iter().map(|axis| axis.low).collect(),
+        high: axes.iter().map(|axis| axis.high).collect(),
         constants: ConstantSettings { target: Some(1.0), constraint: Some(1.0) },
         deviation: DeviationSettings {
             radius: 0.1,
@@ -78,8 +78,8 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             source: DeviationSource::Scenario,
         },
         global: GlobalSettings { draws: 600, beta: 1e-3 },
-        slice: [0, 1].map(|state| SliceAxis { state, values: values(state) }),
-        state: axes.each_ref().map(|axis| 0.5 * (axis.low + axis.high)),
+        slice: Some([0, 1].map(|state| SliceAxis { state, values: values(state) })),
+        state: axes.iter().map(|axis| 0.5 * (axis.low + axis.high)).collect(),
         growth: GrowthSettings {
             radius: 0.1,
             rounds: 5,
@@ -87,7 +87,7 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             epsilon: 0.1,
             beta: 1e-3,
             split_beta: true,
-            varies: [true; NX],
+            varies: vec![true; NX],
             boundary: BoundarySearch::Slice,
             heading: None,
         },
@@ -96,16 +96,17 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
 
 /// A small certificate of the race: constants of the published study's order, a picture of the
 /// x-y plane, growth in the ego's x and y.
-pub(crate) fn race_settings(system: &DroneRace) -> Settings<12> {
+pub(crate) fn race_settings(system: &DroneRace) -> Settings {
     let mut settings = settings(system, 30);
     settings.constants = ConstantSettings { target: Some(14.15), constraint: Some(14.43) };
     settings.deviation.radius = 0.02;
-    for (axis, state, low, step, count) in [(0, 0, -0.9, 0.1, 18_u16), (1, 2, -2.6, 0.2, 13)] {
-        settings.slice[axis] =
-            SliceAxis { state, values: (0..count).map(|i| low + step * f32::from(i)).collect() };
-    }
-    settings.state = [0.4, 0.0, -2.2, 0.7, 0.0, 0.0, 0.4, 0.0, -2.2, 0.3, 0.0, 0.0];
-    settings.growth.varies = std::array::from_fn(|i| i == 0 || i == 2);
+    let axes = [(0, -0.9, 0.1, 18_u16), (2, -2.6, 0.2, 13)];
+    settings.slice = Some(axes.map(|(state, low, step, count)| SliceAxis {
+        state,
+        values: (0..count).map(|i| low + step * f32::from(i)).collect(),
+    }));
+    settings.state = vec![0.4, 0.0, -2.2, 0.7, 0.0, 0.0, 0.4, 0.0, -2.2, 0.3, 0.0, 0.0];
+    settings.growth.varies = (0..12).map(|i| i == 0 || i == 2).collect();
     settings
 }
 
