@@ -47,9 +47,9 @@ fn parity(gpu: Gpu) -> bool {
     let policy = race_policy();
     let plant = Plant { system: &race, policy: &policy };
     let ball = Region::Ball(Ball {
-        center: [0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.4, 0.0, -2.0, 0.3, 0.0, 0.0],
+        center: vec![0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.4, 0.0, -2.0, 0.3, 0.0, 0.0],
         radius: 0.4,
-        varies: [true; 12],
+        varies: vec![true; 12],
     });
     let integrator = DoubleIntegrator::default();
     let bang = BangBang { acceleration: 1.0 };
@@ -96,7 +96,7 @@ where
         let mut agree = true;
         let ran = backend.reach_avoid(plant, &task, &mut |first, values| {
             for (index, value) in (first..).zip(values) {
-                let truth = measure(plant, starts.start(index), &spec, &tightening);
+                let truth = measure(plant, starts.start_array(index), &spec, &tightening);
                 agree &= match query {
                     Query::Measure => (f64::from(*value) - truth).abs() <= BAND,
                     Query::Sign => truth.abs() <= BAND || (*value > 0.0) == (truth > 0.0),
@@ -135,7 +135,7 @@ where
     let mut agree = true;
     let ran = backend.deviation(plant, &task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let pair = pairs.load::<1>(index).map(|start| start.map(|lane| lane.0[0]));
+            let pair = pairs.pair(index).map(|start| std::array::from_fn(|i| start[i]));
             let (nominal, perturbed) = pair_measures(plant, pair, &spec, &tightening, control);
             agree &= (f64::from(value.nominal) - nominal).abs() <= BAND
                 && (f64::from(value.perturbed) - perturbed).abs() <= BAND;

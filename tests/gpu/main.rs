@@ -114,7 +114,7 @@ fn whole_box<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) ->
     Region::new_box(low, high).expect("the box of a system")
 }
 
-fn drawn<const NX: usize>(region: Region, seed: u64) -> Starts<'static> {
+fn drawn(region: Region, seed: u64) -> Starts<'static> {
     Starts::Drawn { region, stream: Stream::new(seed, Purpose::User, 3) }
 }
 

@@ -44,7 +44,7 @@ pub(crate) fn assert_close_to_f64<
     task: &ReachAvoidTask<'_>,
     gpu: &[f32],
 ) {
-    let starts = task.range.clone().map(|index| task.starts.start(index));
+    let starts = task.range.clone().map(|index| task.starts.start_array(index));
     let both: Vec<(f64, f32)> = starts
         .map(|start| {
             let oracle = measure(plant, start, &task.spec, task.tightening);
@@ -76,7 +76,7 @@ fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
         query: Query::Measure,
     };
     let (_, found) = measures(gpu, plant, &task);
-    let host = |i| measure_f32(plant, task.starts.start(i), &spec, &tightening);
+    let host = |i| measure_f32(plant, task.starts.start_array(i), &spec, &tightening);
     let equal = (0..1000).filter(|&i| found[i as usize] == host(i)).count();
     // A contracted product can flip the bang-bang control, but only next to the switch.
     let least = if exact { 1000 } else { 900 };

@@ -73,7 +73,7 @@ fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
     P: Policy<NX, NU>,
 {
     let pairs = task.range.clone().map(|pair| {
-        let starts = task.pairs.load::<1>(pair).map(|x| x.map(|x| x.0[0]));
+        let starts = task.pairs.pair(pair).map(|x| std::array::from_fn(|i| x[i]));
         let (nominal, perturbed) =
             pair_measures(plant, starts, &task.spec, task.tightening, task.control);
         (pair_f32(plant, task, starts), [nominal, perturbed])
@@ -94,7 +94,8 @@ fn distances<R: Real, S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, con
     task: &DeviationTask<'_>,
     pair: u64,
 ) -> Vec<R> {
-    let [mut a, mut b] = task.pairs.load::<1>(pair).map(|x| x.map(|x| R::lit(x.0[0])));
+    let [mut a, mut b] =
+        task.pairs.pair(pair).map(|x| -> [R; NX] { std::array::from_fn(|i| R::lit(x[i])) });
     let mut all = Vec::new();
     for _ in 0..=task.spec.horizon {
         let gaps = a.iter().zip(&b).map(|(&a, &b)| b - a);

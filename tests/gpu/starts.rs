@@ -42,15 +42,16 @@ fn starts_have_the_host_bits() {
     let low = [-1.5, 0.25, -7.0, 0.1, 2.0];
     let high = [1.5, 0.75, 9.0, 0.1, 2.5];
     let region = Region::new_box(low, high).expect("a box");
-    gpu = revealed_starts(gpu, &drawn(region, 0x1234_5678_9abc_def0), first);
+    gpu = revealed_starts::<5>(gpu, &drawn(region, 0x1234_5678_9abc_def0), first);
     let list: Vec<[f32; 5]> = (0..700).map(|i| [0.1 * i as f32, 1.0, -2.0, 3.0, 0.7]).collect();
-    gpu = revealed_starts(gpu, &Starts::listed(&list), 123);
+    gpu = revealed_starts::<5>(gpu, &Starts::listed(&list), 123);
     for varies in [[true; 6], [true, false, true, true, false, true]] {
-        let ball = Ball { center: [0.3, -0.2, 1.0, 0.0, 5.0, -0.7], radius: 0.55, varies };
-        gpu = revealed_starts(gpu, &drawn(Region::Ball(ball), 7), first);
+        let center = vec![0.3, -0.2, 1.0, 0.0, 5.0, -0.7];
+        let ball = Ball { center, radius: 0.55, varies: varies.to_vec() };
+        gpu = revealed_starts::<6>(gpu, &drawn(Region::Ball(ball), 7), first);
     }
     let interval = Region::new_box([-1.0], [2.0]).expect("an interval");
-    revealed_starts(gpu, &drawn(interval, 7), 0);
+    revealed_starts::<1>(gpu, &drawn(interval, 7), 0);
 }
 
 #[test]
@@ -75,7 +76,7 @@ fn pairs_have_the_host_bits() {
         let plant = Plant { system: &system, policy: &Idle };
         let (back, _, found) = deviation::<_, _, 3, 1>(gpu, plant, &task);
         gpu = back;
-        let expected = (5..305).map(|i| pairs.load::<1>(i).map(|x| x[coordinate].0[0]));
+        let expected = (5..305).map(|i| pairs.pair(i).map(|x| x[coordinate]));
         let (nominal, perturbed): (Vec<f32>, Vec<f32>) =
             expected.map(|[nominal, perturbed]| (nominal, perturbed)).unzip();
         assert_eq!(bits(found.iter().map(|m| m.nominal)), bits(nominal));
