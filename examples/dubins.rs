@@ -1,5 +1,5 @@
 //! A system of one's own, from its definition to a certificate: a Dubins car, a round obstacle,
-//! a hand-written policy. `cargo run --release --example dubins [cpu|gpu]`
+//! a hand-written policy. `cargo run --release --example dubins`
 
 use reachcast::Result;
 use reachcast::backend::{Backend, cpu::Cpu};
@@ -11,7 +11,7 @@ use reachcast::scenario::{Unwatched, certify, record::Record, settings::Settings
 use reachcast::system::{Axis, Body, System};
 
 /// A car of unit speed that steers with up to 1 rad/s; the state is (x, y, heading).
-struct Dubins;
+pub(crate) struct Dubins;
 
 impl System<3, 1> for Dubins {
     fn name(&self) -> &str {
@@ -26,8 +26,8 @@ impl System<3, 1> for Dubins {
     }
     #[inline(always)]
     fn step<R: Real>(&self, [x, y, heading]: [R; 3], [turn]: [R; 1]) -> [R; 3] {
-        let dt = R::lit(0.1);
         let turn = turn.clamp(R::lit(-1.0), R::lit(1.0));
+        let dt = R::lit(0.1);
         [x + dt * heading.cos(), y + dt * heading.sin(), heading + dt * turn]
     }
     #[inline(always)]
@@ -44,7 +44,7 @@ impl System<3, 1> for Dubins {
 }
 
 /// Steers toward the target, pushed away from the obstacle where it is near.
-struct Steer;
+pub(crate) struct Steer;
 
 impl Policy<3, 1> for Steer {
     fn name(&self) -> String {

@@ -1,6 +1,6 @@
 // One thread rolls one pair side by side over the states t = step .. step + steps - 1. The
 // nominal trajectory stands in column i, the perturbed one in column stride + i; threads from
-// WORKGROUP on only help to drive. Reads the schedule and, for a network, its controls (steps = 1
+// WORKGROUP on only help to drive. Reads the schedule and, for a network, its outputs (steps = 1
 // then) or its parameters; writes both states and folds, the pair's measures and its distance at
 // each of these steps. Twin: backend/cpu/deviation.rs.
 
@@ -36,16 +36,16 @@ fn deviation(
             let place = (t - params.segment_start) * params.stride + column;
             distances[place] = gap(nominal, perturbed);
         }
-        nominal_fold = judge(nominal_fold, nominal, row);
-        perturbed_fold = judge(perturbed_fold, perturbed, vec3<f32>(row.x, 0.0, 0.0));
+        nominal_fold = judge(nominal_fold, nominal, t, row);
+        perturbed_fold = judge(perturbed_fold, perturbed, t, vec3<f32>(row.x, 0.0, 0.0));
         if t < params.horizon {
-            let replayed = drive(lane, column, nominal);
+            let replayed = drive(lane, column, nominal, t);
             if params.closed_loop != 0u {
-                perturbed = advance(perturbed, drive(lane, second, perturbed));
+                perturbed = advance(perturbed, drive(lane, second, perturbed, t), t);
             } else {
-                perturbed = advance(perturbed, replayed);
+                perturbed = advance(perturbed, replayed, t);
             }
-            nominal = advance(nominal, replayed);
+            nominal = advance(nominal, replayed, t);
         }
     }
     if !writes {

@@ -1,8 +1,20 @@
-// Adds the margins at `x` to a fold. `row` of the schedule: discount, then what the target margin
-// and the constraint margin lose. Twin: `fold` in rollout/reference.rs.
-fn judge(fold: Fold, x: State, row: vec3<f32>) -> Fold {
-    let target_margin = target_at(x) - row.y;
-    let constraint_margin = constraint_at(x) - row.z;
+// Judges the states of a rollout by their margins. Twin: `fold` in rollout/replay.rs.
+
+// Bits of a number without its sign.
+const MAGNITUDE: u32 = 0x7fffffffu;
+
+// An infinite margin is satisfied or violated for good: as the largest number of its sign, whose bits
+// are one below, the measure stays finite. A NaN stays one.
+fn bounded(margin: f32) -> f32 {
+    let bits = bitcast<u32>(margin);
+    return select(margin, bitcast<f32>(bits - 1u), (bits & MAGNITUDE) == EXPONENT);
+}
+
+// Adds the margins at `x`, the state at step `t`, to a fold. `row` of the schedule: discount, then
+// what the target margin and the constraint margin lose.
+fn judge(fold: Fold, x: State, t: u32, row: vec3<f32>) -> Fold {
+    let target_margin = bounded(target_at(x, t) - row.y);
+    let constraint_margin = bounded(constraint_at(x, t) - row.z);
     if !(state_finite(x) && finite(target_margin) && finite(constraint_margin)) {
         return fold_fail(fold);
     }

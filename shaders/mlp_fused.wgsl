@@ -28,16 +28,17 @@ fn dense(layer: Layer, lane: u32) {
     workgroupBarrier();
 }
 
-// Controls at `x`, the state of trajectory `lane` of the workgroup; further threads only help.
-fn drive(lane: u32, column: u32, x: State) -> Control {
-    // The controls of the step before are read before they are replaced.
+// Controls at `x`, the state of trajectory `lane` of the workgroup at step `t`; further threads only
+// help.
+fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {
+    // The outputs of the step before are read before they are replaced.
     workgroupBarrier();
     if lane < WORKGROUP {
-        put_state(lane, x);
+        put_inputs(lane, observed(x, t));
     }
     workgroupBarrier();
     for (var i = 0u; i < LAYER_COUNT; i += 1u) {
         dense(layer_at(i), lane);
     }
-    return control_at(lane % WORKGROUP);
+    return acted(x, outputs_at(lane % WORKGROUP), t);
 }

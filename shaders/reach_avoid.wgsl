@@ -1,6 +1,6 @@
 // One thread rolls one trajectory over the states t = step .. step + steps - 1, the margins of
 // each folded; threads from WORKGROUP on only help to drive. Reads the schedule and, for a network,
-// its controls (steps = 1 then) or its parameters; writes the state, the fold and the measure or
+// its outputs (steps = 1 then) or its parameters; writes the state, the fold and the measure or
 // its sign at the trajectory's place in the batch. Twin: backend/cpu/reach_avoid.rs.
 
 @group(0) @binding(2) var<storage, read> schedule: array<vec4<f32>>;
@@ -24,10 +24,10 @@ fn reach_avoid(
             break;
         }
         if !settled {
-            fold = judge(fold, x, schedule[t].xyz);
+            fold = judge(fold, x, t, schedule[t].xyz);
         }
         if t < params.horizon {
-            x = advance(x, drive(lane, column, x));
+            x = advance(x, drive(lane, column, x, t), t);
         }
     }
     if lane >= WORKGROUP || column >= params.columns {

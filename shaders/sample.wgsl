@@ -1,12 +1,13 @@
-// One thread draws one start, or one pair of starts, and empties its fold. Reads the region (a
-// listed start is in `state` already); writes states, folds and origins. Twin: rollout/sample.rs.
+// One thread draws one start, or one pair of starts, and empties its fold. Reads the region, or
+// the starts that the host lists; writes states, folds and origins. Twin: rollout/sample.rs.
 
 const REGION_BOX: u32 = 0u;
 const REGION_BALL: u32 = 1u;
 const NORMAL_PAIRS: u32 = (NX + 1u) / 2u;
 const BLOCK_WORDS: u32 = 4u;
 
-// One per coordinate: (low, high - low, -) of a box, (centre, radius, varies) of a ball.
+// One per coordinate: (low, high - low, -) of a box, (centre, radius, varies) of a ball. Else the
+// listed starts of the columns, see `listed_start`.
 @group(0) @binding(1) var<storage, read> region: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> folds: array<Fold>;
@@ -96,7 +97,7 @@ fn sample(@builtin(global_invocation_id) id: vec3<u32>) {
     } else if params.region_kind == REGION_BALL {
         start = ball_start(index);
     } else {
-        start = load_state(column);
+        start = listed_start(column);
     }
     store_state(column, start);
     folds[column] = empty_fold();

@@ -158,6 +158,10 @@ fn remedy(source: &std::io::Error) -> &'static str {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "; make room there, or write to another folder, and run the command again"
         }
+        ErrorKind::FileTooLarge => {
+            "; a limit on the size of files is in the way (`ulimit -f`): raise it, and run the command \
+             again"
+        }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
             "; make it writable, or write to another folder"
         }

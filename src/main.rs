@@ -4,8 +4,22 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     quiet_mesa();
+    heed_file_limits();
     ExitCode::from(reachcast::cli::run(std::env::args_os()))
 }
+
+/// A write beyond the limit on the size of files (`ulimit -f`) fails with a message, where its signal
+/// would end the program without one.
+#[cfg(unix)]
+fn heed_file_limits() {
+    use nix::sys::signal::{SigSet, Signal};
+    // Threads that start later inherit the mask. Where it cannot be set, all is as without it.
+    _ = SigSet::from_iter([Signal::SIGXFSZ]).thread_block();
+}
+
+/// Only Unix has such limits.
+#[cfg(not(unix))]
+fn heed_file_limits() {}
 
 /// Without a display, Mesa's device selection layer complains on stderr at every start and goes on
 /// without a choice to make; it is left out then.

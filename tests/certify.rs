@@ -71,8 +71,14 @@ fn a_certificate_is_written_queried_and_checked() {
     let out = folder.path().join("race");
     let record = certify("configs/smoke.toml", &out, &[]);
     assert_eq!(record, stored(&out));
-    let files =
-        ["certificate.json", "deviation.csv", "policy.safetensors", "report.html", "slice.npy"];
+    let files = [
+        "certificate.json",
+        "deviation.csv",
+        "experiment.json",
+        "policy.safetensors",
+        "report.html",
+        "slice.npy",
+    ];
     assert_eq!(names(&out), files);
     let config = &record["provenance"]["config"];
     // Defaults are filled in.
@@ -111,7 +117,7 @@ fn a_certificate_is_written_queried_and_checked() {
     let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(rows[0]["tier"], record["state"]["tier"]);
     let plain = text(&reachcast(&["query", dir, "--states", states]).stdout);
-    assert!(plain.starts_with("tier,check_margin,target_margin\n"), "{plain}");
+    assert!(plain.starts_with("index,tier,check_margin,target_margin\n0,"), "{plain}");
     let answers = folder.path().join("answers");
     let output = reachcast(&["query", dir, "--states", states, "--out", answers.to_str().unwrap()]);
     assert!(text(&output.stdout).contains("tier 0 (in the target)"));
@@ -147,6 +153,20 @@ fn a_formula_needs_no_policy_file() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["holds"], true);
+    // Numbers are numbers, on both sides.
+    let finding = |name: &str| -> [Value; 2] {
+        let all = found["findings"].as_array().unwrap().iter();
+        let one = all.clone().find(|finding| finding["name"].as_str().unwrap().contains(name));
+        ["stored", "found"].map(|side| one.unwrap()[side].clone())
+    };
+    assert!(finding("certified starts").iter().all(Value::is_u64));
+    for name in ["constant of the target", "deviation bound", "radius of the verified ball"] {
+        assert!(finding(name).iter().all(Value::is_f64), "{name}: {:?}", finding(name));
+    }
+    assert!(finding("conditional failure on fresh")[0]["at_most"].is_f64());
+    assert!(finding("conditional failure on fresh")[1]["failures"].is_u64());
+    assert!(finding("certified share on fresh")[1][0].is_f64());
+    assert_eq!(finding("all claims obtained"), [true, true].map(Value::from));
 }
 
 #[test]
@@ -215,7 +235,7 @@ fn an_interrupted_run_leaves_the_old_result() {
         .collect();
     // Hours of work.
     let draws = ["certify", "configs/smoke.toml", "--set", "global.draws=100000000000", "--out"];
-    let run = command(&[&draws[..], &[out.to_str().unwrap()]].concat())
+    let run = command(&[&draws[..], &[out.to_str().unwrap(), "--overwrite"]].concat())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();

@@ -9,6 +9,8 @@ mod drive;
 #[path = "oracle/mppi.rs"]
 mod oracle;
 
+use std::array::from_fn;
+
 use common::{adapter, race_policy};
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
@@ -135,7 +137,7 @@ where
     let mut agree = true;
     let ran = backend.deviation(plant, &task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let pair = pairs.pair(index).map(|start| std::array::from_fn(|i| start[i]));
+            let pair = pairs.pair(index).map(|start| from_fn(|i| start[i]));
             let (nominal, perturbed) = pair_measures(plant, pair, &spec, &tightening, control);
             agree &= (f64::from(value.nominal) - nominal).abs() <= BAND
                 && (f64::from(value.perturbed) - perturbed).abs() <= BAND;

@@ -51,14 +51,17 @@ fn words_say_what_the_file_does_not() {
     let out = folder.path("critic.safetensors");
     let words = done(&["policy", "import", TIANSHOU, "--network", "critic", "--out", &out]);
     for word in ["18-8-8-8-8-1", "relu (the default", "--activation does", "identity", "not named"]
+        .into_iter()
+        // What stands beside it in the file is told.
+        .chain(["left out    ", "actor1_old", "no part of the policy"])
     {
         assert!(words.contains(word), "no `{word}` in: {words}");
     }
-    let words = done(&["policy", "import", GRAPH, "--out", &out]);
+    let words = done(&["policy", "import", GRAPH, "--out", &out, "--overwrite"]);
     assert!(words.contains("silu (as the graph has it)"), "{words}");
     assert_eq!(done(&["policy", "import", GRAPH, "--out", &out, "-q"]), "");
     let names = "a,b,c,d,e,f,g,h,i,j,k,l";
-    done(&["policy", "import", GRAPH, "--out", &out, "--state-order", names]);
+    done(&["policy", "import", GRAPH, "--out", &out, "--state-order", names, "--overwrite"]);
     let order = document(&["policy", "inspect", &out])["state_order"].clone();
     assert_eq!(order.as_array().unwrap().len(), 12);
     assert_eq!(folder.entries(), ["critic.safetensors"]);

@@ -19,7 +19,7 @@ use cpu::Cpu;
 use gpu::Gpu;
 
 pub use event::{Action, Event, add_events};
-pub use physics::physics;
+pub use physics::{model_physics, physics};
 pub use program::Program;
 
 /// The native CPU, or a GPU through wgpu.

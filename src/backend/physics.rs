@@ -1,18 +1,19 @@
 //! The physics of a plant as WGSL text: what shaders are built from and certificates hash.
 
-use std::array::from_fn;
-
-use crate::formula::record;
 use crate::formula::wgsl::function;
+use crate::formula::{Graph, Node};
+use crate::model::{Controller, Law, Model};
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::system::System;
 
-/// The recorded step, target margin, constraint margin and, where the policy is a formula, its
-/// control, as WGSL functions `plant_step`, `plant_target`, `plant_constraint`, `plant_control`.
+/// The recorded step, target margin, constraint margin and what there is of control, observation
+/// and action, as WGSL functions `plant_step`, `plant_target`, `plant_constraint`,
+/// `plant_control`, `plant_observe`, `plant_act`.
 ///
-/// Arrays of states and controls are `array<f32, N>`, a single one is an `f32`. A network has no
-/// text: its digest is [`crate::policy::Mlp::digest`].
+/// Arrays of states and controls are `array<f32, N>`, a single one is an `f32`. Parameters are
+/// arguments: their values are no part of the text. A network has no text: its digest is
+/// [`crate::policy::Mlp::digest`].
 ///
 /// ```
 /// use reachcast::backend::physics;
@@ -21,8 +22,8 @@ use crate::system::System;
 /// let system = DoubleIntegrator::default();
 /// let policy = BangBang { acceleration: 1.0 };
 /// let text = physics(Plant { system: &system, policy: &policy });
-/// assert!(text.starts_with("fn plant_step(x: array<f32, 2>, u: f32) -> array<f32, 2> {"));
-/// assert!(text.contains("fn plant_control(x: array<f32, 2>) -> f32 {"));
+/// assert!(text.starts_with("fn plant_step(x: array<f32, 2>, u: f32"));
+/// assert!(text.contains("fn plant_control(x: array<f32, 2>"));
 /// ```
 pub fn physics<S, P, const NX: usize, const NU: usize>(plant: Plant<'_, S, P>) -> String
 where
@@ -30,24 +31,186 @@ where
     P: Policy<NX, NU>,
 {
     let Plant { system, policy } = plant;
-    let state = [("x", NX)];
-    let step = record(NX + NU, |inputs| {
-        let x = from_fn(|i| inputs[i]);
-        let u = from_fn(|i| inputs[NX + i]);
-        system.step(x, u).to_vec()
-    });
-    let target = record(NX, |x| vec![system.target::<_>(from_fn(|i| x[i]))]);
-    let constraint = record(NX, |x| vec![system.constraint::<_>(from_fn(|i| x[i]))]);
-    let mut text = [
-        function("plant_step", &[("x", NX), ("u", NU)], &step),
-        function("plant_target", &state, &target),
-        function("plant_constraint", &state, &constraint),
-    ]
-    .join("\n");
-    if policy.network().is_none() {
-        let control = record(NX, |x| policy.control::<_>(from_fn(|i| x[i])).to_vec());
-        text.push('\n');
-        text.push_str(&function("plant_control", &state, &control));
+    Physics::new(&Model::recorded(system), &Controller::recorded(system, policy)).text()
+}
+
+/// The same for a model and who drives it.
+pub fn model_physics(model: &Model, controller: &Controller) -> String {
+    Physics::new(model, controller).text()
+}
+
+/// Which function of the physics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// The next state.
+    Step,
+    /// The target margin.
+    Target,
+    /// The constraint margin.
+    Constraint,
+    /// The controls of a formula.
+    Control,
+    /// What a network sees.
+    Observe,
+    /// The controls from what a network says.
+    Act,
+}
+
+impl Role {
+    /// Name of the WGSL function.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Step => "plant_step",
+            Self::Target => "plant_target",
+            Self::Constraint => "plant_constraint",
+            Self::Control => "plant_control",
+            Self::Observe => "plant_observe",
+            Self::Act => "plant_act",
+        }
     }
-    text
+
+    /// What it takes even where it does not read it.
+    fn always(self, part: Part) -> bool {
+        match part {
+            Part::State => true,
+            Part::Control => self == Self::Step,
+            Part::Said => self == Self::Act,
+            Part::Parameters | Part::Seconds | Part::Step => false,
+        }
+    }
+}
+
+/// A part of the inputs of a model's formulas, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// The states.
+    State,
+    /// The controls.
+    Control,
+    /// The parameters.
+    Parameters,
+    /// The time, s.
+    Seconds,
+    /// The number of the step.
+    Step,
+    /// What the network says.
+    Said,
+}
+
+impl Part {
+    const ALL: [Self; 6] =
+        [Self::State, Self::Control, Self::Parameters, Self::Seconds, Self::Step, Self::Said];
+
+    /// Name of the argument.
+    fn name(self) -> &'static str {
+        match self {
+            Self::State => "x",
+            Self::Control => "u",
+            Self::Parameters => "p",
+            Self::Seconds => "seconds",
+            Self::Step => "number",
+            Self::Said => "said",
+        }
+    }
+}
+
+/// A function of the physics.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Function {
+    pub(crate) role: Role,
+    /// Its WGSL text.
+    pub(crate) text: String,
+    /// What it takes, in this order.
+    pub(crate) takes: Vec<Part>,
+    /// Numbers that it gives.
+    pub(crate) outputs: usize,
+}
+
+impl Function {
+    /// Prints `graph`, whose inputs are `lengths` of each part: what it does not read is no
+    /// argument, so that nobody pays for it.
+    fn new(role: Role, graph: &Graph, lengths: [usize; 6]) -> Self {
+        let mut read = vec![false; graph.inputs];
+        for node in &graph.nodes {
+            if let Node::Input(input) = node {
+                read[*input as usize] = true;
+            }
+        }
+        let (mut at, mut place) = (0, vec![0; graph.inputs]);
+        let (mut takes, mut arguments, mut taken) = (Vec::new(), Vec::new(), 0);
+        for (part, length) in Part::ALL.into_iter().zip(lengths) {
+            let inputs = at..(at + length).min(graph.inputs);
+            at += length;
+            let wanted = role.always(part) || read[inputs.clone()].contains(&true);
+            if inputs.is_empty() || !wanted {
+                continue;
+            }
+            takes.push(part);
+            arguments.push((part.name(), length));
+            inputs.clone().zip(taken..).for_each(|(input, to)| place[input] = to);
+            taken += length as u32;
+        }
+        let moved = moved(graph, &place, taken);
+        let text = function(role.name(), &arguments, &moved);
+        Self { role, text, takes, outputs: graph.outputs.len() }
+    }
+
+    /// Whether it takes `part`.
+    pub(crate) fn reads(&self, part: Part) -> bool {
+        self.takes.contains(&part)
+    }
+}
+
+/// `graph` with its inputs at other places, `count` in all.
+fn moved(graph: &Graph, place: &[u32], count: u32) -> Graph {
+    let node = |node: &Node| match node {
+        Node::Input(input) => Node::Input(place[*input as usize]),
+        other => other.clone(),
+    };
+    Graph {
+        inputs: count as usize,
+        nodes: graph.nodes.iter().map(node).collect(),
+        outputs: graph.outputs.clone(),
+    }
+}
+
+/// The functions of a plant.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Physics {
+    pub(crate) functions: Vec<Function>,
+}
+
+impl Physics {
+    /// Prints the formulas of `model` and `controller`.
+    pub(crate) fn new(model: &Model, controller: &Controller) -> Self {
+        let mut graphs = vec![
+            (Role::Step, &model.step),
+            (Role::Target, &model.target),
+            (Role::Constraint, &model.constraint),
+        ];
+        let mut said = 0;
+        match &controller.law {
+            Law::Formula(graph) => graphs.push((Role::Control, graph)),
+            Law::Network { observe, network, act } => {
+                said = network.widths().last().copied().unwrap_or(0);
+                graphs.extend(observe.iter().map(|graph| (Role::Observe, graph)));
+                graphs.extend(act.iter().map(|graph| (Role::Act, graph)));
+            }
+        }
+        let (states, controls) = (model.states.len(), model.controls.len());
+        let lengths = [states, controls, model.parameters.len(), 1, 1, said];
+        let print = |(role, graph): (Role, &Graph)| Function::new(role, graph, lengths);
+        Self { functions: graphs.into_iter().map(print).collect() }
+    }
+
+    /// All functions, one after the other.
+    pub(crate) fn text(&self) -> String {
+        let texts: Vec<&str> = self.functions.iter().map(|one| one.text.as_str()).collect();
+        texts.join("\n")
+    }
+
+    /// The function of `role`, if there is one.
+    pub(crate) fn function(&self, role: Role) -> Option<&Function> {
+        self.functions.iter().find(|function| function.role == role)
+    }
 }

@@ -129,7 +129,7 @@ pub fn study_starts() -> Result<Vec<[f32; 12]>> {
         let cells: Option<Vec<f32>> = line.split(',').map(|cell| cell.parse().ok()).collect();
         cells.and_then(|cells| cells.try_into().ok())
     };
-    let lines = STUDY.lines().filter(|line| !line.starts_with('#'));
+    let lines = STUDY.lines().skip(1);
     let starts: Option<Vec<_>> = lines.map(row).collect();
     starts.ok_or_else(|| Error::invalid("the starts of the study", "a row has not 12 numbers"))
 }

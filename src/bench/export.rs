@@ -8,7 +8,7 @@ use super::data::{self, Data};
 use crate::backend::Backend;
 use crate::cost::RaceCost;
 use crate::error::Result;
-use crate::files::{Staged, check_room, json, npy_bytes};
+use crate::files::{Existing, Staged, check_room, json, npy_bytes};
 use crate::policy::Mlp;
 use crate::rollout::{CostQuery, MppiTask, Plant, Query, ReachAvoidTask, Starts, Tightening};
 use crate::system::DroneRace;
@@ -57,7 +57,12 @@ struct MppiNumbers {
 ///
 /// # Errors
 /// Those of the backend, [`crate::Error::Write`] and [`crate::Error::NoRoom`].
-pub fn export(backend: &Backend, seed: u64, folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn export(
+    backend: &Backend,
+    seed: u64,
+    folder: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>> {
     let mut staged = Staged::new(folder)?;
     check_room(folder, EXPORT_BYTES)?;
     let data = Data::new(seed)?;
@@ -75,7 +80,7 @@ pub fn export(backend: &Backend, seed: u64, folder: &Path) -> Result<Vec<PathBuf
     let names = networks.iter().map(|(name, _)| (*name).to_owned()).collect();
     let settings = json("settings.json", &settings(seed, names))?;
     staged.add("settings.json", settings.as_bytes())?;
-    staged.publish()
+    staged.publish_sparing(existing)
 }
 
 fn settings(seed: u64, networks: Vec<String>) -> Settings {

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
+use super::options::{Changes, Common, Keys, Replace};
 use super::sweep::SweepArguments;
-use crate::config::{Overrides, Profile};
 use crate::policy::{Activation, OutputActivation};
 use crate::train::settings::Method;
 
@@ -13,8 +13,8 @@ use crate::train::settings::Method;
 #[derive(Debug, Parser)]
 #[command(name = "reachcast", version, max_term_width = 100, after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    #[command(flatten)]
-    pub(super) global: Global,
+    #[command(flatten, next_help_heading = "Options of every command")]
+    pub(super) common: Common,
     #[command(subcommand)]
     pub(super) command: Command,
 }
@@ -40,62 +40,6 @@ Exit codes:
   2  wrong usage, configuration or input
   3  ran, but the claim asked for was not obtained";
 
-/// Most threads: beyond what any processor runs at once they only cost.
-const MOST_THREADS: i64 = 1024;
-
-/// Options of every command.
-#[derive(Args, Debug)]
-pub(super) struct Global {
-    /// Who runs the rollouts; `auto` takes a hardware GPU if there is one, else the CPU
-    #[arg(long, global = true, value_enum, default_value_t = BackendName::Auto)]
-    pub(super) backend: BackendName,
-    /// The GPU adapter whose name contains this, as `devices` lists them
-    #[arg(long, global = true, value_name = "NAME")]
-    pub(super) device: Option<String>,
-    /// Go on on the CPU where no adapter opens, or where it fails for good; it is reported
-    #[arg(long, global = true)]
-    pub(super) fallback: bool,
-    /// Threads of the CPU backend [default: as many as the processor runs at once]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
-    pub(super) threads: Option<u16>,
-    /// Seed of every random stream, instead of the configuration's
-    #[arg(long, global = true, value_name = "N")]
-    pub(super) seed: Option<u64>,
-    /// Profile whose defaults count, instead of the configuration's
-    #[arg(long, global = true, value_enum)]
-    pub(super) profile: Option<Profile>,
-    /// Override a key of the configuration, for instance rollout.horizon=40; repeatable
-    #[arg(long, global = true, value_name = "SECTION.KEY=VALUE")]
-    pub(super) set: Vec<String>,
-    /// Folder for the results [default of certify: reachcast-out]; the file, for policy import
-    #[arg(long, global = true, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
-    /// Print one JSON document on standard output and nothing else
-    #[arg(long, global = true)]
-    pub(super) json: bool,
-    /// Print errors only
-    #[arg(short, long, global = true)]
-    pub(super) quiet: bool,
-}
-
-impl Global {
-    /// What lies over a configuration file.
-    pub(super) fn overrides(&self) -> Overrides {
-        Overrides { profile: self.profile, seed: self.seed, set: self.set.clone() }
-    }
-}
-
-/// The values of `--backend`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum BackendName {
-    /// A hardware GPU if there is one, else the CPU; never a software adapter
-    Auto,
-    /// The native CPU backend
-    Cpu,
-    /// A GPU, or a software adapter where there is none
-    Gpu,
-}
-
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
@@ -111,6 +55,13 @@ Examples:
     Certify {
         /// Configuration (TOML)
         config: PathBuf,
+        /// Folder of the results [default: reachcast-out]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        replace: Replace,
+        #[command(flatten, next_help_heading = "Configuration")]
+        changes: Changes,
     },
     /// Compute the reach-avoid measure of each start
     #[command(after_help = "\
@@ -128,6 +79,10 @@ Example:
         /// Where the measures go: .npy (f32, [N]) or .csv
         #[arg(long, value_name = "FILE")]
         measures: PathBuf,
+        #[command(flatten)]
+        replace: Replace,
+        #[command(flatten, next_help_heading = "Configuration")]
+        keys: Keys,
     },
     /// Tell the tier and the tightened measure V_check of states against a stored certificate
     #[command(after_help = "\
@@ -143,6 +98,11 @@ Example:
         /// States: .npy (f32 or f64, [N, states]) or .csv
         #[arg(long, value_name = "FILE")]
         states: PathBuf,
+        /// Folder for query.csv, instead of a line per state on standard output
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        replace: Replace,
     },
     /// Verify a stored certificate again, and try its claims on fresh scenarios
     ///
@@ -216,6 +176,13 @@ Examples:
         /// What is trained, and how, instead of the configuration's
         #[arg(long, value_enum)]
         method: Option<Method>,
+        /// Folder of the results [default: reachcast-train]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        replace: Replace,
+        #[command(flatten, next_help_heading = "Configuration")]
+        changes: Changes,
     },
     /// Import a policy from PyTorch or ONNX, or tell what is in a policy file
     #[command(subcommand)]
@@ -243,6 +210,37 @@ Examples:
     Devices,
 }
 
+impl Command {
+    /// What lies over the configuration, where the results go and whether they may replace others;
+    /// nothing where the command has no such option.
+    pub(super) fn options(&self) -> (Changes, Option<&PathBuf>, Replace) {
+        let no_seed = |keys: &Keys| Changes { seed: None, keys: keys.clone() };
+        match self {
+            Self::Certify { changes, out, replace, .. }
+            | Self::Train { changes, out, replace, .. } => {
+                (changes.clone(), out.as_ref(), *replace)
+            }
+            Self::Rollout { keys, replace, .. } => (no_seed(keys), None, *replace),
+            Self::Query { out, replace, .. } => (Changes::default(), out.as_ref(), *replace),
+            Self::Race(asked) => (asked.changes.clone(), asked.out.as_ref(), asked.replace),
+            Self::Sweep(asked) => (asked.changes.clone(), asked.out.as_ref(), asked.replace),
+            Self::Policy(PolicyCommand::Import(asked)) => {
+                (no_seed(&asked.keys), asked.out.as_ref(), asked.replace)
+            }
+            Self::Policy(PolicyCommand::Inspect { changes, .. }) => {
+                (changes.clone(), None, Replace::default())
+            }
+            Self::Bench(asked) => {
+                let changes = Changes { seed: asked.seed, ..Changes::default() };
+                (changes, asked.out.as_ref(), asked.replace)
+            }
+            Self::Check { .. } | Self::Scenarios(_) | Self::Devices => {
+                (Changes::default(), None, Replace::default())
+            }
+        }
+    }
+}
+
 /// What `race` is asked for.
 #[derive(Args, Clone, Debug)]
 pub(super) struct RaceArguments {
@@ -257,6 +255,13 @@ pub(super) struct RaceArguments {
     /// Runs of each controller, with the noise seeds SEED, SEED + 1, ...
     #[arg(long, value_name = "M", default_value_t = 1)]
     pub(super) noise_seeds: u64,
+    /// Folder of the results [default: reachcast-race]
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) replace: Replace,
+    #[command(flatten, next_help_heading = "Configuration")]
+    pub(super) changes: Changes,
 }
 
 /// What `bench` is asked for.
@@ -271,6 +276,14 @@ pub(super) struct BenchArguments {
     /// Measure nothing; write what the workloads run on, and what they must come to, to this folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["quick", "workload"])]
     pub(super) export: Option<PathBuf>,
+    /// Folder for the record, bench.json, as well
+    #[arg(long, value_name = "DIR", conflicts_with = "export")]
+    pub(super) out: Option<PathBuf>,
+    /// Seed of every random stream [default: 1]
+    #[arg(long, value_name = "N")]
+    pub(super) seed: Option<u64>,
+    #[command(flatten)]
+    pub(super) replace: Replace,
 }
 
 /// What is done with a policy file.
@@ -309,6 +322,8 @@ Example:
         /// Configuration (TOML) with the names of the states and their box
         #[arg(long, value_name = "CONFIG")]
         config: Option<PathBuf>,
+        #[command(flatten, next_help_heading = "Configuration")]
+        changes: Changes,
     },
 }
 
@@ -335,6 +350,13 @@ pub(super) struct ImportArguments {
     /// Convert weights in float64, float16 or bfloat16 to float32 instead of refusing them
     #[arg(long)]
     pub(super) cast: bool,
+    /// The policy file to write, OUT.safetensors
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) replace: Replace,
+    #[command(flatten, next_help_heading = "Configuration")]
+    pub(super) keys: Keys,
 }
 
 /// The claim that `scenarios` is asked about.

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::args::{BenchArguments, Global};
+use super::args::BenchArguments;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::bench::export::export;
@@ -13,22 +14,25 @@ use crate::bench::measure::Timing;
 use crate::bench::record::{BenchRecord, KernelRecord, ScalingRecord, WorkloadRecord};
 use crate::bench::run::{self as benchmark, Asked};
 use crate::error::Result;
-use crate::files::{Staged, check_room, json};
+use crate::files::{Staged, check_room, json, spare_existing};
 
 /// Room for the record, bytes.
 const RECORD_BYTES: u64 = 1 << 20;
+/// Name of the record.
+const RECORD: &str = "bench.json";
 /// Seed unless `--seed` says otherwise.
 const SEED: u64 = 1;
 
 /// Measures, or exports what is measured.
 pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
-    let seed = global.seed.unwrap_or(SEED);
+    let seed = global.changes.seed.unwrap_or(SEED);
     if let Some(folder) = &asked.export {
         return write_out(global, seed, folder);
     }
-    let threads = global.threads.map(usize::from);
+    let threads = global.common.threads.map(usize::from);
     let asked = Asked { quick: asked.quick, filter: asked.workload.clone(), seed, threads };
     let progress = Progress::new(global);
+    global.out.as_ref().map_or(Ok(()), |out| spare_existing(&out.join(RECORD), global.existing))?;
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     global.out.as_deref().map_or(Ok(()), |out| check_room(out, RECORD_BYTES))?;
@@ -37,7 +41,7 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     progress.finish();
     backends.iter().for_each(|backend| devices::note_events(global, backend));
     if let Some(mut staged) = staged {
-        staged.add("bench.json", json("bench.json", &record)?.as_bytes())?;
+        staged.add(RECORD, json(RECORD, &record)?.as_bytes())?;
         staged.publish()?;
     }
     report(global, &record, || text(&record))?;
@@ -53,7 +57,7 @@ struct Exported {
 
 /// Writes what the workloads run on.
 fn write_out(global: &Global, seed: u64, folder: &Path) -> Result<Outcome> {
-    let files = export(&devices::open(global)?, seed, folder)?;
+    let files = export(&devices::open(global)?, seed, folder, global.existing)?;
     let files = files.iter().map(|file| file.display().to_string()).collect();
     let exported = Exported { seed, files };
     report(global, &exported, || exported.files.iter().map(|file| format!("{file}\n")).collect())?;

@@ -1,16 +1,18 @@
 //! The command `certify`: a certificate, its tables and its report in one folder.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::args::Global;
+use super::inputs::inputs;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
 use crate::config::{Config, PolicySource};
 use crate::error::Result;
-use crate::files::{Staged, check_room, json, npy_bytes};
+use crate::files::{Existing, MANIFEST, Staged, check_room, is_free, json, make_way, npy_bytes};
 use crate::model::Plant;
 use crate::scenario;
+use crate::scenario::check_settings;
 use crate::scenario::record::{DeviationRecord, Record};
 use crate::scenario::settings::Settings;
 
@@ -27,34 +29,62 @@ pub(super) const POLICY: &str = "policy.safetensors";
 pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let config = Config::load(path, &global.overrides())?;
     let policy = config.policy_source(folder_of(path))?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
-    let (record, mut staged) = certify(global, &config, &config.plant(&policy)?, &out)?;
+    let out = global.folder(DEFAULT_OUT);
+    inputs(path, &policy, []).spare_folder(&out)?;
+    let manifest = manifest(&config, &policy)?;
+    let work = Certify { global, config: &config, out: &out, manifest: &manifest };
+    let (record, mut staged) = work.run(&config.plant(&policy)?)?;
+    staged.add(MANIFEST, manifest.as_bytes())?;
     stage(&mut staged, &record, &policy)?;
+    // Again: the work may have taken hours.
+    match global.existing {
+        Existing::Kept => is_free(&out, &manifest).map(drop)?,
+        Existing::Replaced => make_way(&out, &manifest)?,
+    }
     let files = staged.publish()?;
     report(global, &record, || summary::text(&record, &files))?;
     Ok(if record.holds { Outcome::Done } else { Outcome::NotObtained })
 }
 
-/// The certificate, and the folder that its files are staged for.
-fn certify(
-    global: &Global,
-    config: &Config,
-    plant: &Plant,
-    out: &Path,
-) -> Result<(Record, Staged)> {
-    let settings = config.settings(&plant.model.states)?;
-    let stored = config.to_json()?;
-    let backend = devices::open(global)?;
-    let progress = Progress::new(global);
-    // Before the work: a folder that cannot be written to would waste it.
-    let staged = Staged::new(out)?;
-    check_room(out, estimate(&settings))?;
-    let program = backend.prepare(plant)?;
-    let mut record = scenario::certify(&program, &settings, stored, &progress)?;
-    record.timing.threads = devices::threads(global);
-    devices::note_events(global, &backend);
-    progress.check()?;
-    Ok((record.sealed()?, staged))
+/// What the folder of a certificate says that it holds: the same for a run that repeats it.
+fn manifest(config: &Config, policy: &PolicySource) -> Result<String> {
+    let digest = match policy {
+        PolicySource::Network { network, .. } => Some(network.digest()),
+        PolicySource::Formula(_) => None,
+    };
+    let work = serde_json::json!({ "config": config.to_json()?, "policy_sha256": digest });
+    json(MANIFEST, &serde_json::json!({ "certificate": work }))
+}
+
+/// The command for a plant.
+struct Certify<'a> {
+    global: &'a Global,
+    config: &'a Config,
+    out: &'a Path,
+    manifest: &'a str,
+}
+
+impl Certify<'_> {
+    /// The certificate, and the folder that its files are staged for.
+    fn run(self, plant: &Plant) -> Result<(Record, Staged)> {
+        let settings = self.config.settings(&plant.model.states)?;
+        check_settings(&settings)?;
+        let stored = self.config.to_json()?;
+        if self.global.existing == Existing::Kept {
+            is_free(self.out, self.manifest)?;
+        }
+        let backend = devices::open(self.global)?;
+        let progress = Progress::new(self.global);
+        // Before the work: a folder that cannot be written to would waste it.
+        let staged = Staged::new(self.out)?;
+        check_room(self.out, estimate(&settings))?;
+        let program = backend.prepare(plant)?;
+        let mut record = scenario::certify(&program, &settings, stored, &progress)?;
+        record.timing.threads = devices::threads(self.global);
+        devices::note_events(self.global, &backend);
+        progress.check()?;
+        Ok((record.sealed()?, staged))
+    }
 }
 
 /// About what the files of the folder take, bytes: a number takes some 20 characters in a text.

@@ -4,7 +4,8 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::args::{BackendName, Global};
+use super::options::{BackendName, Global};
+use super::remembered::hardware;
 use super::{Outcome, report};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -19,9 +20,9 @@ use crate::error::{Error, Result};
 pub(super) fn open(global: &Global) -> Result<Backend> {
     let Some(choice) = choice(global)? else { return cpu(global).map(Backend::Cpu) };
     match Gpu::open(&choice) {
-        Ok(gpu) if global.fallback => Ok(Backend::Gpu(gpu.with_fallback(cpu(global)?))),
+        Ok(gpu) if global.common.fallback => Ok(Backend::Gpu(gpu.with_fallback(cpu(global)?))),
         Ok(gpu) => Ok(Backend::Gpu(gpu)),
-        Err(Error::Device(problem)) if global.fallback => {
+        Err(Error::Device(problem)) if global.common.fallback => {
             Ok(Backend::Cpu(cpu(global)?.in_place_of_adapter(problem)))
         }
         Err(error) => Err(error),
@@ -30,23 +31,25 @@ pub(super) fn open(global: &Global) -> Result<Backend> {
 
 /// The adapter that the flags ask for; `None` for the CPU.
 fn choice(global: &Global) -> Result<Option<Choice>> {
-    if let Some(name) = &global.device {
-        if global.backend == BackendName::Cpu {
+    if let Some(name) = &global.common.device {
+        if global.common.backend == BackendName::Cpu {
             let problem = "names a GPU adapter; leave it out, or leave out --backend cpu";
             return Err(Error::invalid(format!("--device {name}"), problem));
         }
         return Ok(Some(Choice::Named(name.clone())));
     }
-    Ok(match global.backend {
+    Ok(match global.common.backend {
         BackendName::Gpu => Some(Choice::Any),
-        BackendName::Auto if adapters().iter().any(is_hardware) => Some(Choice::Hardware),
+        BackendName::Auto if hardware(|| adapters().iter().any(is_hardware)) => {
+            Some(Choice::Hardware)
+        }
         BackendName::Auto | BackendName::Cpu => None,
     })
 }
 
 /// Says on standard error what failed on the adapter and was worked around.
 pub(super) fn note_events(global: &Global, backend: &Backend) {
-    if global.quiet {
+    if global.common.quiet {
         return;
     }
     for event in backend.events() {
@@ -61,7 +64,7 @@ pub(super) fn note_events(global: &Global, backend: &Backend) {
 /// # Errors
 /// [`Error::Device`] if there is none of that name or kind.
 pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
-    if global.backend != BackendName::Auto || global.device.is_some() {
+    if global.common.backend != BackendName::Auto || global.common.device.is_some() {
         return Ok(vec![open(global)?]);
     }
     let mut all = vec![cpu(global).map(Backend::Cpu)?];
@@ -73,13 +76,13 @@ pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
 
 /// The CPU with the threads asked for.
 pub(super) fn cpu(global: &Global) -> Result<Cpu> {
-    Cpu::new(global.threads.map(usize::from))
+    Cpu::new(global.common.threads.map(usize::from))
 }
 
 /// Threads that run the rollouts of `backend`, or that feed it.
 pub(super) fn threads(global: &Global) -> usize {
     let available = || std::thread::available_parallelism().map_or(1, usize::from);
-    global.threads.map_or_else(available, usize::from)
+    global.common.threads.map_or_else(available, usize::from)
 }
 
 /// Whether `adapter` is a GPU and not a program.

@@ -4,10 +4,13 @@ mod args;
 mod bench;
 mod certify;
 mod devices;
+mod inputs;
+mod options;
 mod policy;
 mod progress;
 mod race;
 mod race_input;
+mod remembered;
 mod rollout;
 mod scenarios;
 mod stored;
@@ -24,7 +27,8 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::files::json;
-use args::{Arguments, Command, Global, PolicyCommand};
+use args::{Arguments, Command, PolicyCommand};
+use options::Global;
 
 /// What a command that ran to its end came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,19 +63,19 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 
 /// Runs the command.
 fn dispatch(arguments: &Arguments) -> Result<Outcome> {
-    let global = &arguments.global;
+    let global = &arguments.global();
     match &arguments.command {
-        Command::Certify { config } => certify::run(global, config),
-        Command::Rollout { config, starts, measures } => {
+        Command::Certify { config, .. } => certify::run(global, config),
+        Command::Rollout { config, starts, measures, .. } => {
             rollout::run(global, config, starts, measures)
         }
-        Command::Query { folder, states } => stored::query(global, folder, states),
+        Command::Query { folder, states, .. } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
         Command::Race(asked) => race::run(global, asked),
         Command::Sweep(asked) => sweep::run(global, asked),
-        Command::Train { config, method } => train::run(global, config, *method),
+        Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
-        Command::Policy(PolicyCommand::Inspect { file, config }) => {
+        Command::Policy(PolicyCommand::Inspect { file, config, .. }) => {
             policy::inspect(global, file, config.as_deref())
         }
         Command::Scenarios(asked) => scenarios::run(global, *asked),
@@ -82,7 +86,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
 
 /// Prints `value` as JSON with `--json`, nothing with `-q`, else `text`.
 fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
-    let text = match (global.json, global.quiet) {
+    let text = match (global.common.json, global.common.quiet) {
         (true, _) => json("--json", value)?,
         (false, true) => return Ok(()),
         (false, false) => plain(&text()),

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::args::{Global, ImportArguments};
+use super::args::ImportArguments;
+use super::options::{Global, Keys};
 use super::{Outcome, folder_of, report};
 use crate::config::{Config, Job, PolicySource};
 use crate::error::{Error, Result};
-use crate::files::Staged;
+use crate::files::{Inputs, Staged};
 use crate::policy::import::{self, Cast, Origin, Request};
 use crate::policy::inspect::{Inspection, output_intervals, output_ranges};
 use crate::policy::{Mlp, Policy};
@@ -18,6 +19,8 @@ use crate::system::System;
 
 /// Ending of policy files.
 const ENDING: &str = "safetensors";
+/// Tensors that a line lists.
+const LISTED: usize = 8;
 /// Random states that the range of actions is seen over.
 const SAMPLES: u64 = 16_384;
 /// States that are evaluated side by side.
@@ -69,6 +72,8 @@ struct Import {
     out: String,
     /// Names of the layers in the file.
     layers: Vec<String>,
+    /// Names of the tensors in the file that are no part of it.
+    left_out: Vec<String>,
     widths: Vec<usize>,
     activation: &'static str,
     activation_from: Origin,
@@ -82,6 +87,9 @@ struct Import {
 /// Writes a network of a checkpoint or a graph as a policy file.
 pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome> {
     let (out, name) = destination(global)?;
+    keys_need_config(global, asked.config.as_deref())?;
+    let read = std::iter::once(asked.file.clone()).chain(asked.config.clone());
+    Inputs::new(read).spare_file(out)?;
     let request = Request {
         networks: asked.network.clone(),
         activation: asked.activation,
@@ -92,11 +100,12 @@ pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome
     let network = with_names(global, asked, found.network)?;
     let mut staged = Staged::new(folder_of(out))?;
     staged.add(name, &network.to_bytes())?;
-    staged.publish()?;
+    staged.publish_sparing(global.existing)?;
     let import = Import {
         file: asked.file.display().to_string(),
         out: out.display().to_string(),
         layers: found.layers,
+        left_out: found.left_out,
         widths: network.widths(),
         activation: network.activation().name(),
         activation_from: found.activation_from,
@@ -108,6 +117,17 @@ pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome
     };
     report(global, &import, || import_text(&import))?;
     Ok(Outcome::Done)
+}
+
+/// Refuses what lies over a configuration where there is none.
+fn keys_need_config(global: &Global, config: Option<&Path>) -> Result<()> {
+    let Keys { profile, set } = &global.changes.keys;
+    let problem = "changes nothing without a configuration; give --config, or leave it out";
+    match (config, profile, set.first()) {
+        (None, Some(_), _) => Err(Error::invalid("--profile", problem)),
+        (None, None, Some(set)) => Err(Error::invalid(format!("--set {set}"), problem)),
+        _ => Ok(()),
+    }
 }
 
 /// The policy file that is to be written, and its name in its folder.
@@ -157,7 +177,7 @@ fn import_text(import: &Import) -> String {
          activation  {} ({})\n\
          output      {} ({})\n\
          inputs      {}\n\
-         digest      {}\n",
+         digest      {}\n{}",
         import.out,
         widths(&import.widths),
         import.parameter_count,
@@ -168,6 +188,26 @@ fn import_text(import: &Import) -> String {
         from(import.output_from, "output"),
         inputs.as_deref().unwrap_or("not named; --config or --state-order names them"),
         import.digest,
+        left_out(&import.left_out),
+    )
+}
+
+/// What of the file is no part of the network; nothing if all is.
+fn left_out(names: &[String]) -> String {
+    if names.is_empty() {
+        return String::new();
+    }
+    let listed: Vec<&str> = names.iter().take(LISTED).map(String::as_str).collect();
+    let more = match names.len() - listed.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!(
+        "left out    {}{more}\n\
+         note: these tensors of the file are no part of the policy; if some of them act on its \
+         inputs or outputs (statistics that normalise observations do), it is another policy \
+         without them\n",
+        listed.join(", ")
     )
 }
 
@@ -203,8 +243,9 @@ struct Action {
 
 /// Prints what a policy file holds.
 pub(super) fn inspect(global: &Global, file: &Path, config: Option<&Path>) -> Result<Outcome> {
+    keys_need_config(global, config)?;
     let network = Mlp::load(file)?;
-    let seed = global.seed.unwrap_or(1);
+    let seed = global.changes.seed.unwrap_or(1);
     let (seed, frame) = match config {
         Some(path) => {
             let (config, frame) = frame(global, path, file, &network)?;

@@ -1,18 +1,36 @@
 //! Progress on standard error, and stopping at Ctrl-C.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use super::args::Global;
+use super::options::Global;
 use crate::error::{Error, Result};
 use crate::scenario::Watch;
 
 /// Set by Ctrl-C or a termination signal.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Exit code of a program that was interrupted.
+const FAILED: i32 = 1;
+
+/// Asks the work to stop, and stops the program where it was asked before: what is being written
+/// then stays under its temporary name, which the next run removes.
+fn interrupt() {
+    let again = INTERRUPTED.swap(true, Ordering::Relaxed);
+    let text = match again {
+        false => "interrupted: stopping at the next chance; again to stop at once\n",
+        true => "error: interrupted again, stopped at once\n",
+    };
+    // Nobody reads what a closed pipe does not take.
+    let _ = std::io::stderr().write_all(text.as_bytes());
+    if again {
+        std::process::exit(FAILED);
+    }
+}
 
 /// Work that is done sooner shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -29,10 +47,10 @@ impl Progress {
     /// A bar for the command, and the end of the work at Ctrl-C.
     pub(super) fn new(global: &Global) -> Self {
         // A second handler is refused: tests of this library may run commands side by side.
-        let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+        let _ = ctrlc::set_handler(interrupt);
         Self {
             begun: Instant::now(),
-            visible: std::io::stderr().is_terminal() && !global.json && !global.quiet,
+            visible: std::io::stderr().is_terminal() && !global.common.json && !global.common.quiet,
             bar: Mutex::new(ProgressBar::hidden()),
         }
     }

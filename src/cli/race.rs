@@ -6,18 +6,26 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::args::{Global, RaceArguments};
+use super::args::RaceArguments;
+use super::options::Global;
 use super::progress::Progress;
 use super::race_input::{RaceInput, names, noise_seeds};
 use super::{Outcome, devices, report};
 use crate::error::Result;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
 use crate::experiment::run::{Experiment, TimingRecord};
-use crate::files::{Staged, json};
+use crate::files::{Existing, Staged, json};
 use crate::report::race_html;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-race";
+
+/// What the columns of the table are.
+const LEGEND: &str = "\
+Judges say what a safe win is. study: the published code's distance in space and the gate at the crossing;
+paper: a positive constraint with the squared cone; rigorous: the same with the cone as a distance.
+published: the study's rate; ms, share: mean wall time of a step of the batch over the races under way;
+unsafe starts aside: the share of starts that violate no rule before anyone moves";
 
 /// What `timing.json` holds: it differs from run to run, so it is no part of the results.
 #[derive(Serialize)]
@@ -34,7 +42,8 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let names = names(&asked.controllers)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.noise_seeds)?;
     let (starts, source) = input.starts(asked.starts.as_deref())?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let out = global.folder(DEFAULT_OUT);
+    input.inputs(&asked.config, asked.starts.as_deref()).spare_folder(&out)?;
     let progress = Progress::new(global);
     let backend = devices::open(global)?;
     let plant = input.plant()?;
@@ -48,6 +57,9 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
         config: input.config.to_json()?,
         folder: out.clone(),
     };
+    if global.existing == Existing::Replaced {
+        experiment.make_way()?;
+    }
     let (record, controllers) = experiment.run(&progress)?;
     progress.finish();
     devices::note_events(global, &backend);
@@ -106,6 +118,10 @@ fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
     ));
     for absent in &record.absent {
         line(format_args!("{:20} did not run: {}", absent.name, absent.reason));
+    }
+    line(format_args!("{LEGEND}"));
+    for note in &record.notes {
+        line(format_args!("note: {note}"));
     }
     line(format_args!("\n{:.1} s on {}", timing.wall_seconds, record.provenance.device));
     for file in files {

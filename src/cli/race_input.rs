@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::folder_of;
+use super::inputs::inputs;
 use crate::backend::{Backend, Program};
 use crate::config::{Config, Overrides, PolicySource};
 use crate::error::{Error, Result};
 use crate::experiment::controller::{Name, World};
 use crate::experiment::settings::RaceSettings;
-use crate::files::StateReader;
+use crate::files::{Inputs, StateReader};
 use crate::model::Plant;
 use crate::policy::Mlp;
 use crate::rollout::{Purpose, Region, Starts, Stream};
@@ -49,6 +50,24 @@ impl RaceInput {
         let certificates = config.settings(&DroneRace::default().states())?;
         let (system, _) = config.race_plant(&policy)?;
         Ok(Self { config, folder, race, certificates, system, policy, networks })
+    }
+
+    /// The files that this and the starts `asked` for were read from; the configuration is at `path`.
+    pub(super) fn inputs(&self, path: &Path, asked: Option<&str>) -> Inputs {
+        let named = &self.race.networks;
+        let networks = [&named.value, &named.disturbance, &named.ppo];
+        let networks = networks.into_iter().filter(|file| !file.is_empty());
+        let networks = networks.map(|file| self.folder.join(file));
+        inputs(path, &self.policy, networks.chain(self.starts_file(asked)))
+    }
+
+    /// The file of the starts `asked` for; none if they are drawn.
+    fn starts_file(&self, asked: Option<&str>) -> Option<PathBuf> {
+        match asked {
+            Some(text) if text.parse::<u64>().is_ok() => None,
+            Some(path) => Some(PathBuf::from(path)),
+            None => Some(self.folder.join(&self.race.starts)),
+        }
     }
 
     /// The plant under the policy.

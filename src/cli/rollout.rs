@@ -5,20 +5,26 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::args::Global;
+use super::inputs::inputs;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
 use crate::backend::{Event, Program};
 use crate::config::Config;
 use crate::error::Result;
-use crate::files::{MeasureWriter, StateReader, check_room};
+use crate::files::{MeasureWriter, StateReader, check_room, spare_existing};
 use crate::model::Plant;
-use crate::rollout::{NON_FINITE, Query, ReachAvoidTask, RolloutSpec, Starts, States, Tightening};
+use crate::rollout::{
+    NON_FINITE, Query, ReachAvoidTask, RolloutSpec, Starts, StateList, States, Tightening,
+};
 use crate::scenario::Watch;
 use crate::scenario::bound::interval;
+use crate::scenario::sampling::sampling;
 
 /// Starts that are held in memory at a time.
 const CHUNK: usize = 1 << 18;
+/// Starts of the first chunk whose rollouts are looked at for what samples do not tell.
+const LOOKED_AT: usize = 16;
 /// The most that a measure takes in a file, bytes.
 const MEASURE_BYTES: u64 = 16;
 /// One minus the confidence of the interval of the success rate.
@@ -38,20 +44,19 @@ struct Summary {
     backend: String,
     device: String,
     events: Vec<Event>,
+    /// What the samples do not tell.
+    notes: Vec<String>,
     wall_seconds: f64,
 }
 
 /// Rolls the starts out and writes their measures.
-pub(super) fn run(
-    global: &Global,
-    config: &Path,
-    starts: &Path,
-    measures: &Path,
-) -> Result<Outcome> {
-    let folder = folder_of(config);
-    let config = Config::load(config, &global.overrides())?;
+pub(super) fn run(global: &Global, path: &Path, starts: &Path, measures: &Path) -> Result<Outcome> {
+    let folder = folder_of(path);
+    let config = Config::load(path, &global.overrides())?;
     let spec = config.spec()?;
     let policy = config.policy_source(folder)?;
+    inputs(path, &policy, [starts.to_owned()]).spare_file(measures)?;
+    spare_existing(measures, global.existing)?;
     let work = Rollout { global, spec, starts, measures };
     let summary = work.run(&config.plant(&policy)?)?;
     report(global, &summary, || text(&summary))?;
@@ -77,11 +82,16 @@ impl Rollout<'_> {
         let progress = Progress::new(self.global);
         let begun = Instant::now();
         progress.begin("rollouts", reader.left().unwrap_or(0));
-        let mut count = Count::default();
+        let (mut count, mut notes) = (Count::default(), Vec::new());
         loop {
             let starts = reader.next(CHUNK)?;
             if starts.is_empty() {
                 break;
+            }
+            if notes.is_empty() {
+                let stride = starts.len().div_ceil(LOOKED_AT);
+                let few = StateList::new(starts.view().size()).with(starts.iter().step_by(stride));
+                notes = sampling(plant, few.view(), self.spec.horizon);
             }
             measure(&program, self.spec, starts.view(), &mut |values| {
                 count.add(values);
@@ -103,6 +113,7 @@ impl Rollout<'_> {
             backend: backend.name().to_owned(),
             device: backend.device(),
             events: backend.events(),
+            notes,
             wall_seconds: begun.elapsed().as_secs_f64(),
         })
     }
@@ -145,13 +156,14 @@ impl Count {
 /// The summary in words.
 fn text(summary: &Summary) -> String {
     let Summary { starts, successes, non_finite, success_interval: [low, high], .. } = summary;
+    let notes: String = summary.notes.iter().map(|note| format!("note: {note}\n")).collect();
     let share = 100.0 * *successes as f64 / *starts as f64;
     format!(
         "{successes} of {starts} starts reach the target safely: {share:.2} % \
          (95 % interval {:.2} % to {:.2} %)\n\
          {non_finite} failed for a state that is not finite\n\
-         measures: {}\n\
-         {} steps, {}, {:.3} s\n",
+         measures (positive where the target is reached safely): {}\n\
+         {} steps, {}, {:.3} s\n{notes}",
         100.0 * low,
         100.0 * high,
         summary.measures,

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::args::{Global, ScenarioArguments};
+use super::args::ScenarioArguments;
+use super::options::Global;
 use super::{Outcome, report};
 use crate::error::{Error, Result};
 use crate::scenario::bound::{
@@ -66,5 +67,7 @@ fn text(counts: &Counts) -> String {
     if let (Some(failures), Some(count)) = (counts.failures, counts.with_failures) {
         text += &format!("at most {failures} failure(s) (Clopper-Pearson): {count}\n");
     }
-    text
+    text + "simple: (2 / epsilon) (ln(1 / beta) + d) with d decision variables, the numbers that the \
+            scenarios bound; exact: the smallest count whose binomial tail is at most beta; each \
+            counts scenarios none of which may fail\n"
 }

@@ -2,15 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use super::args::Global;
+use super::options::Global;
+use serde::Serialize;
+
 use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
-use crate::files::{Staged, StateReader};
+use crate::files::{Existing, Inputs, Staged, StateReader};
 use crate::scenario::record::Record;
-use crate::scenario::{self, CheckReport, Finding, QueryRow};
+use crate::scenario::{self, CheckReport, Figure, Finding, QueryRow};
+
+/// Name of the file with a line per state.
+const ANSWERS: &str = "query.csv";
+
+/// What the lines of `check` mean.
+const FRESH: &str = "\
+stored: what the certificate says; found: computed again from its seed, or on fresh pairs and starts, which
+are drawn anew and may refute a claim, not prove it";
 
 /// A stored certificate with the configuration and the policy that it was made with.
 struct Stored {
@@ -21,11 +31,7 @@ struct Stored {
 
 impl Stored {
     /// Reads what `certify` wrote to `folder`.
-    fn read(global: &Global, folder: &Path) -> Result<Self> {
-        if global.profile.is_some() || global.seed.is_some() || !global.set.is_empty() {
-            let problem = "a stored certificate has its own; leave these flags out";
-            return Err(Error::invalid("--profile, --seed and --set", problem));
-        }
+    fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CERTIFICATE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;
@@ -48,15 +54,19 @@ fn at(path: &Path, error: Error) -> Error {
 
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
-    let stored = Stored::read(global, folder)?;
+    let stored = Stored::read(folder)?;
+    if let Some(out) = &global.out {
+        let read = [states.to_owned(), folder.join(CERTIFICATE), folder.join(POLICY)];
+        Inputs::new(read).spare_file(&out.join(ANSWERS))?;
+    }
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     let rows = ask(global, &stored, states)?;
     match staged {
-        None => report(global, &rows, || csv(&rows))?,
+        None => report(global, &numbered(&rows), || csv(&rows))?,
         Some(staged) => {
-            let path = write(staged, &rows)?;
-            report(global, &rows, || counts(&rows, &path))?;
+            let path = write(staged, &rows, global.existing)?;
+            report(global, &numbered(&rows), || counts(&rows, &path))?;
         }
     }
     Ok(Outcome::Done)
@@ -76,20 +86,32 @@ fn ask(global: &Global, stored: &Stored, states: &Path) -> Result<Vec<QueryRow>>
     Ok(rows)
 }
 
-/// Writes the rows to `query.csv`.
-fn write(mut staged: Staged, rows: &[QueryRow]) -> Result<PathBuf> {
-    staged.add("query.csv", csv(rows).as_bytes())?;
-    Ok(staged.publish()?.remove(0))
+/// Writes the rows to [`ANSWERS`].
+fn write(mut staged: Staged, rows: &[QueryRow], existing: Existing) -> Result<PathBuf> {
+    staged.add(ANSWERS, csv(rows).as_bytes())?;
+    Ok(staged.publish_sparing(existing)?.remove(0))
+}
+
+/// A row with the number of its state in the file, from 0.
+#[derive(Serialize)]
+struct Numbered<'a> {
+    index: usize,
+    #[serde(flatten)]
+    row: &'a QueryRow,
+}
+
+fn numbered(rows: &[QueryRow]) -> Vec<Numbered<'_>> {
+    rows.iter().enumerate().map(|(index, row)| Numbered { index, row }).collect()
 }
 
 /// A line per state.
 fn csv(rows: &[QueryRow]) -> String {
-    let line = |row: &QueryRow| {
+    let line = |(index, row): (usize, &QueryRow)| {
         let QueryRow { tier, check_margin, target_margin } = row;
-        format!("{tier},{check_margin},{target_margin}\n")
+        format!("{index},{tier},{check_margin},{target_margin}\n")
     };
-    let lines: String = rows.iter().map(line).collect();
-    format!("tier,check_margin,target_margin\n{lines}")
+    let lines: String = rows.iter().enumerate().map(line).collect();
+    format!("index,tier,check_margin,target_margin\n{lines}")
 }
 
 /// How many states are of each tier.
@@ -100,12 +122,14 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
         format!("tier {tier} ({name}): {count}\n")
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();
-    format!("{lines}rows: {}\n", path.display())
+    let words =
+        "V_check: the reach-avoid measure with its margins tightened, certified where positive";
+    format!("{lines}{words}\nrows: {}\n", path.display())
 }
 
 /// Verifies the certificate in the folder again.
 pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
-    let stored = Stored::read(global, folder)?;
+    let stored = Stored::read(folder)?;
     let mut found = verify(global, &stored)?;
     // Of a record that does not hold, a page may not even be made.
     if found.holds {
@@ -132,8 +156,8 @@ fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
         let holds = found == bytes;
         findings.push(Finding {
             name: name.to_owned(),
-            stored: format!("as {CERTIFICATE} gives it"),
-            found: if holds { "the same" } else { "other content" }.to_owned(),
+            stored: Figure::Words(format!("as {CERTIFICATE} gives it")),
+            found: Figure::Words(if holds { "the same" } else { "other content" }.to_owned()),
             holds,
         });
     }
@@ -164,5 +188,5 @@ fn findings(found: &CheckReport) -> String {
         true => "the certificate holds",
         false => "the certificate no longer holds",
     };
-    format!("{lines}{verdict}\n")
+    format!("{lines}{FRESH}\n{verdict}\n")
 }

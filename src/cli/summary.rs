@@ -4,12 +4,24 @@ use std::path::PathBuf;
 
 use crate::scenario::record::{Claim, GrowthOutcome, Record};
 
+/// What the columns of the table are.
+const TABLE: &str = "\
+N scenarios were drawn, some failed; d: decision variables, the numbers that the scenarios bound;
+epsilon: risk; beta: chance that the sample misleads; simple, exact: the N that either bound asks for;
+risk: what N and the failures certify";
+/// What the words below the table mean.
+const WORDS: &str = "\
+tier 0: in the target, 1: certified, 2: in the verified ball, 3: none of these; V_check: the reach-avoid
+measure with its margins tightened, certified where positive; a pair: a start with a perturbed one beside
+it, fresh where it is drawn anew; fixed shape: one number scales bounds that a pilot sample fixed";
+
 /// What was claimed, with the numbers behind it, and where the files are.
 pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     let mut lines = vec![headline(record), String::new()];
     lines.extend(record.statements.iter().map(|statement| format!("* {statement}")));
     lines.push(String::new());
     lines.extend(table(record));
+    lines.push(TABLE.to_owned());
     lines.push(String::new());
     let [low, high] = record.global.share_interval;
     lines.push(format!(
@@ -23,6 +35,7 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     lines.push(format!("growth          {}", growth(record)));
     let state = &record.state;
     lines.push(format!("state           tier {}, V_check {:.4}", state.tier, state.check_margin));
+    lines.push(WORDS.to_owned());
     let timing = &record.timing;
     lines.push(format!(
         "work            {} rollouts in {:.2} s on {}",

@@ -1,6 +1,8 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
+mod counts;
 mod keys;
+mod layers;
 mod plant;
 mod profile;
 mod race;
@@ -25,6 +27,7 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use crate::error::{Error, Result};
+use layers::Layers;
 
 /// What the command line lays over a configuration file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,34 +58,15 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`], as for [`Config::load`].
     pub fn from_table(table: Table, origin: &str, overrides: &Overrides) -> Result<Self> {
-        let mut given = table.clone();
-        let mut layers = vec![(origin.to_owned(), table)];
-        for text in &overrides.set {
-            let assignment = keys::parse_assignment(text)?;
-            keys::overlay(&mut given, assignment.clone());
-            layers.push((format!("--set {text}"), assignment));
-        }
-        if let Some(profile) = overrides.profile {
-            given.insert("profile".to_owned(), profile.name().into());
-        }
-        let trains = given.contains_key("train");
-        let mut merged = defaults(&given, origin)?;
-        let valid = keys::with_optional(&merged);
-        for (origin, layer) in &layers {
-            keys::check_known(&valid, layer, origin)?;
-        }
-        keys::overlay(&mut merged, given);
-        for section in ["race", "train"] {
-            merged.get(section).map_or(Ok(()), |keys| keys::check_finite(section, keys))?;
-        }
-        // Without a source text, the message ends with a line that names the key.
-        let wrong_kind = |e: toml::de::Error| {
-            Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
-        };
-        let mut config: Self = merged.try_into().map_err(wrong_kind)?;
+        let sets = overrides.set.iter().map(|text| {
+            keys::parse_assignment(text).map(|assignment| (format!("--set {text}"), assignment))
+        });
+        let sets = sets.collect::<Result<Vec<_>>>()?;
+        let layers = Layers { file: (origin.to_owned(), table), sets, profile: overrides.profile };
+        let mut config = layers.config()?;
         config.seed = overrides.seed.unwrap_or(config.seed);
         // What is about to be trained is not there yet.
-        config.policy.check(trains)?;
+        config.policy.check(layers.trains())?;
         Ok(config)
     }
 
@@ -109,15 +93,37 @@ impl Config {
     /// [`Error::Refused`] if it is not complete or not of this version.
     pub fn from_json(value: &serde_json::Value) -> Result<Self> {
         let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("provenance.config: {e}"));
+        unknown_plant(value).map_or(Ok(()), Err)?;
         let config = Self::deserialize(value).map_err(|e| refused(&e))?;
         config.policy.check(config.train.is_some()).map_err(|e| refused(&e))?;
         Ok(config)
     }
 }
 
+/// The refusal of what is no configuration of a system that this program knows.
+fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
+    let system = value.pointer("/system/name").and_then(serde_json::Value::as_str);
+    if system.is_some_and(|name| profile::SYSTEMS.contains(&name)) {
+        return None;
+    }
+    let plant = match (system, value) {
+        (Some(name), _) => format!("the system `{name}`"),
+        (None, serde_json::Value::String(words)) => format!("`{words}`"),
+        (None, _) => "a system without a name".to_owned(),
+    };
+    Some(Error::Refused(format!(
+        "the certificate is of {plant}, which another program defines; this one knows {}. Its numbers \
+         can be read, and the program that made it can check it (`reachcast::scenario::check`)",
+        profile::SYSTEMS.join(" and ")
+    )))
+}
+
 /// A configuration as JSON.
 fn stored(config: &Config) -> Result<serde_json::Value> {
-    serde_json::to_value(config).map_err(|e| Error::invalid("configuration", e.to_string()))
+    // By way of the text, in which an f32 is the shortest decimal that stands for it.
+    let text = serde_json::to_string(config);
+    text.and_then(|text| serde_json::from_str(&text))
+        .map_err(|e| Error::invalid("configuration", e.to_string()))
 }
 
 /// The defaults of the profile and the system that the table `given` names.

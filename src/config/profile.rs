@@ -8,6 +8,7 @@ use super::section::{
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
+use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::system::{Axis, Cone, DoubleIntegrator, DroneRace, System};
 
@@ -156,10 +157,4 @@ fn by_name<T>(states: &[Axis], value: impl Fn(&Axis, usize) -> T) -> Named<T> {
 /// Owned names.
 fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
     names.map(str::to_owned).to_vec()
-}
-
-/// The decimal that the f32 was written as, so that a configuration says 0.1 and not
-/// 0.10000000149.
-fn decimal(value: f32) -> f64 {
-    value.to_string().parse().unwrap_or(f64::from(value))
 }

@@ -78,7 +78,7 @@ impl Config {
     }
 
     /// The deviation bound.
-    fn deviation_settings(&self) -> Result<DeviationSettings> {
+    pub(super) fn deviation_settings(&self) -> Result<DeviationSettings> {
         let asked = self.deviation;
         Ok(DeviationSettings {
             radius: positive_f32("deviation.radius", asked.radius)?,

@@ -188,7 +188,7 @@ mod tests {
     fn published_starts_violate_as_often_as_published() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/race_starts_500.csv");
         let names = DroneRace::default().states().map(|axis| axis.name);
-        let starts = StateReader::open(&path, names).unwrap().next(501).unwrap();
+        let starts = StateReader::open(&path, names.to_vec()).unwrap().next(501).unwrap().arrays();
         assert_eq!(starts.len(), 500);
         let unsafe_starts =
             Judge::ALL.map(|judge| starts.iter().filter(|x| !safe_at_start(judge, x)).count());

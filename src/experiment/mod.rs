@@ -20,3 +20,4 @@ pub mod summary;
 pub mod sweep;
 #[cfg(test)]
 mod tests;
+mod weights;

@@ -43,6 +43,9 @@ pub struct RaceRecord {
     pub picture: Option<PictureRecord>,
     /// What failed on the adapter and was worked around.
     pub events: Vec<Event>,
+    /// What has to be said beside the figures.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// What V_check was computed with; the same for all controllers and races.

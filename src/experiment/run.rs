@@ -19,12 +19,15 @@ use super::record::{
 use super::roster::{absent, certifies, controller, settings, values};
 use super::settings::RaceSettings;
 use super::summary::Summary;
+use super::weights::note;
 use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, claim_folder};
+use crate::files::{Staged, claim_folder, make_way};
 use crate::policy::Mlp;
+use crate::rollout::States;
+use crate::scenario::sampling::sampling;
 use crate::scenario::settings::Joint;
 use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
@@ -32,6 +35,8 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
+/// Starts whose rollouts under the policy are looked at for what samples do not tell.
+const LOOKED_AT: usize = 16;
 /// Room for record, page and manifest, bytes.
 const RECORD_BYTES: u64 = 2 << 20;
 
@@ -71,6 +76,15 @@ pub struct TimingRecord {
 }
 
 impl Experiment<'_> {
+    /// Removes the results of other work from the folder, once nothing is wrong with this.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::run`] before any race.
+    pub fn make_way(&self) -> Result<()> {
+        self.check(&[])?;
+        make_way(&self.folder, &format!("{:#}\n", self.manifest()))
+    }
+
     /// Runs what is not stored yet and makes the record of all.
     ///
     /// # Errors
@@ -243,7 +257,20 @@ impl Experiment<'_> {
             absent: absent.collect(),
             picture: shown,
             events: self.events(&ran)?,
+            notes: self.notes(summaries),
         })
+    }
+
+    /// What has to be said beside the figures: of states at samples, and of plans whose weights say
+    /// little.
+    fn notes(&self, summaries: &[(Name, Summary)]) -> Vec<String> {
+        let World { program, race, certificates, .. } = self.world;
+        let few = &self.starts[..self.starts.len().min(LOOKED_AT)];
+        let mut notes = sampling(program.plant(), States::from(few), certificates.spec.horizon);
+        notes.extend(summaries.iter().filter_map(|(name, summary)| {
+            note(*name, &settings(*name, race), summary.plan_means())
+        }));
+        notes
     }
 
     /// What failed on the adapter, in this run and in those that stored races of `names` before it.

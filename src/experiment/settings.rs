@@ -13,6 +13,9 @@ use crate::system::{DroneRace, System};
 /// Most control steps of a race: each has random streams of its own.
 const MOST_STEPS: u32 = 10_000;
 
+/// Most improvements of a plan at each control step: more is a slip.
+const MOST_ITERATIONS: u32 = 1000;
+
 /// Ego gain of the rollouts that the study's plans start from, m/s^2.
 pub const STUDY_PLAN_GAIN: f32 = 2.0;
 /// The study's weights of recovery: position, velocity, control.
@@ -255,6 +258,14 @@ impl PlanSettings {
     /// # Errors
     /// [`Error::Invalid`], as [`MppiSpec::new`], and for no iteration.
     pub fn spec(&self, section: &str, system: &DroneRace) -> Result<MppiSpec<3>> {
+        if self.iterations > MOST_ITERATIONS {
+            let problem = format!(
+                "{} improvements of a plan at each control step, at most {MOST_ITERATIONS}; more \
+                 `samples` take part at once",
+                self.iterations
+            );
+            return Err(Error::invalid(format!("{section}.iterations"), problem));
+        }
         if self.iterations == 0 {
             let problem = "0; expected 1 or more";
             return Err(Error::invalid(format!("{section}.iterations"), problem));

@@ -17,6 +17,7 @@ use crate::control::tier::Domain;
 use crate::control::{BarrierForm, Widening};
 use crate::cost::{Fence, LaneCost, RaceCost, RecoveryCost, Safety};
 use crate::files::StateReader;
+use crate::model::{Model, Plant};
 use crate::policy::Mlp;
 use crate::rollout::{NoiseKind, RolloutSpec};
 use crate::scenario::Unwatched;
@@ -30,7 +31,7 @@ pub(super) struct Course {
     pub(super) policy: Mlp,
     value: Mlp,
     pub(super) race: RaceSettings,
-    pub(super) certificates: Settings<12>,
+    pub(super) certificates: Settings,
 }
 
 impl Course {
@@ -44,8 +45,12 @@ impl Course {
     }
 
     pub(super) fn world(&self) -> World<'_> {
+        let plant = Plant::of(self.system, self.policy.clone());
+        // A course cannot hold what borrows its backend: a test leaves it behind.
+        let program = Box::leak(Box::new(self.backend.prepare(&plant).unwrap()));
         World {
             backend: &self.backend,
+            program,
             system: &self.system,
             policy: &self.policy,
             value: Some(&self.value),
@@ -70,20 +75,20 @@ fn network(name: &str) -> Mlp {
 pub(super) fn study_starts(count: usize) -> Vec<[f32; 12]> {
     let names = DroneRace::default().states().map(|axis| axis.name);
     let path = shipped("race_starts_500.csv");
-    StateReader::<12>::open(&path, names).unwrap().next(count).unwrap()
+    StateReader::open(&path, names.to_vec()).unwrap().next(count).unwrap().arrays()
 }
 
-fn certificates(system: &DroneRace) -> Settings<12> {
+fn certificates(system: &DroneRace) -> Settings {
     let spec = RolloutSpec::new(30, 0.95).unwrap();
-    let mut settings = Settings::new(system, [0.0; 12], spec);
+    let mut settings = Settings::new(&Model::of(*system), [0.0; 12], spec);
     settings.constants = ConstantSettings { target: Some(14.15), constraint: Some(14.43) };
     settings.deviation.radius = 0.02;
     (settings.deviation.scenarios, settings.deviation.pilot) = (66, 32);
     let values = |low: f32, count: u16| (0..count).map(|i| low + 0.2 * f32::from(i)).collect();
-    settings.slice = [(0, -0.9, 10), (2, -2.6, 13)]
-        .map(|(state, low, count)| SliceAxis { state, values: values(low, count) });
+    let axis = |(state, low, count)| SliceAxis { state, values: values(low, count) };
+    settings.slice = Some([(0, -0.9, 10), (2, -2.6, 13)].map(axis));
     (settings.growth.rounds, settings.growth.scenarios) = (5, 81);
-    settings.growth.varies = std::array::from_fn(|i| i == 0 || i == 2);
+    settings.growth.varies = (0..12).map(|i| i == 0 || i == 2).collect();
     settings
 }
 

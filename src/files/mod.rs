@@ -4,6 +4,9 @@ mod archive;
 mod array;
 mod claim;
 mod disk;
+mod elements;
+mod inputs;
+mod lines;
 mod npz;
 mod states;
 mod table;
@@ -11,8 +14,10 @@ mod temporary;
 
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
-pub(crate) use claim::claim_folder;
+pub use claim::Existing;
+pub(crate) use claim::{MANIFEST, claim_folder, is_free, make_way, spare_existing};
 pub use disk::check_room;
+pub use inputs::Inputs;
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
 pub use states::StateReader;
 pub use table::{Column, Table};
@@ -24,6 +29,7 @@ use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use claim::spare_other;
 use temporary::{clear, temporary};
 
 /// `value` as a JSON document that ends with its line; errors call it `name`.
@@ -92,6 +98,18 @@ impl Staged {
         written.map_err(|source| Error::Write { path: path.clone(), source })?;
         self.files.push((file, path));
         Ok(())
+    }
+
+    /// The same as [`Staged::publish`], unless `existing` keeps something else that has one of the names.
+    ///
+    /// # Errors
+    /// [`Error::File`] naming what is there; [`Error::Write`].
+    pub fn publish_sparing(self, existing: Existing) -> Result<Vec<PathBuf>> {
+        for (file, path) in &self.files {
+            let written = std::fs::read(file.path());
+            spare_other(path, &written.map_err(|e| Error::file(path, e))?, existing)?;
+        }
+        self.publish()
     }
 
     /// Renames all files to their names, in the order in which they were added.

@@ -95,8 +95,11 @@ impl Table {
     /// Appends a column.
     ///
     /// # Panics
-    /// If it is not as long as the others.
+    /// If it is not as long as the others, or has the name of one: readers of either format take
+    /// columns by their names.
     pub fn add(&mut self, name: &str, column: Column) {
+        let is_new = self.columns.iter().all(|(other, _)| other != name);
+        assert!(is_new, "`{name}` is the name of one column");
         let fits = self.columns.first().is_none_or(|(_, first)| first.len() == column.len());
         assert!(fits, "`{name}` is as long as the other columns");
         self.columns.push((name.to_owned(), column));
@@ -131,7 +134,7 @@ impl Table {
     /// The table as a Parquet file of one row group.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the writer refuses a column, for instance two of one name.
+    /// [`Error::Invalid`] if the writer refuses a column.
     pub fn parquet(&self) -> Result<Vec<u8>> {
         self.parquet_bytes().map_err(|error| Error::invalid("parquet", error.to_string()))
     }
@@ -212,6 +215,12 @@ mod tests {
         assert_eq!(empty.csv().unwrap(), b"samples\n");
         let reader = SerializedFileReader::new(bytes::Bytes::from(empty.parquet().unwrap()));
         assert_eq!(reader.unwrap().metadata().file_metadata().num_rows(), 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "is the name of one column")]
+    fn columns_have_names_of_their_own() {
+        table().add("samples", Column::Count(vec![1, 2]));
     }
 
     #[test]

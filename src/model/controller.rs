@@ -50,18 +50,40 @@ impl Controller {
         S: System<NX, NU>,
         P: Policy<NX, NU> + Send + Sync + 'static,
     {
-        let name = policy.name();
-        if let Some(network) = policy.network() {
-            let network = Arc::new(network.clone());
-            return Self::new(name, Law::Network { observe: None, network, act: None });
-        }
-        let graph = recorded(system, |x, _| policy.control(x).to_vec());
-        let native = Some(Arc::new(CompiledPolicy(policy)) as Arc<dyn NativeFormula>);
-        Self { name, law: Law::Formula(graph), native }
+        let controller = Self::recorded(system, &policy);
+        let native = match controller.law {
+            Law::Formula(_) => Some(Arc::new(CompiledPolicy(policy)) as Arc<dyn NativeFormula>),
+            Law::Network { .. } => None,
+        };
+        Self { native, ..controller }
+    }
+
+    /// The same of a policy that is borrowed, without its compiled form.
+    pub(crate) fn recorded<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Self
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let law = match policy.network() {
+            Some(network) => {
+                let network = Arc::new(network.clone());
+                Law::Network { observe: None, network, act: None }
+            }
+            None => Law::Formula(recorded(system, |x, _| policy.control(x).to_vec())),
+        };
+        Self::new(policy.name(), law)
     }
 
     /// The network, if there is one.
     pub fn network(&self) -> Option<&Mlp> {
+        match &self.law {
+            Law::Formula(_) => None,
+            Law::Network { network, .. } => Some(network),
+        }
+    }
+
+    /// The network, if there is one, as it is shared.
+    pub(crate) fn shared_network(&self) -> Option<&Arc<Mlp>> {
         match &self.law {
             Law::Formula(_) => None,
             Law::Network { network, .. } => Some(network),

@@ -4,6 +4,7 @@ mod controller;
 mod identity;
 mod plant;
 mod recorded;
+pub mod text;
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ pub use plant::Plant;
 
 use crate::formula::Graph;
 pub use crate::system::Parameter;
-use crate::system::{Axis, Body};
+use crate::system::{Axis, Body, Feature};
 use crate::tile::NativeSystem;
 
 /// A plant and its task: what a batch of rollouts is about.
@@ -39,6 +40,8 @@ pub struct Model {
     pub constraint: Graph,
     /// The bodies that a picture shows.
     pub bodies: Vec<Body>,
+    /// The narrowest thing that the margins know of, where it is known.
+    pub smallest_feature: Option<Feature>,
     /// The system as compiled, where it is written in Rust; its parameters are those of the model.
     pub(crate) native: Option<Arc<dyn NativeSystem>>,
 }

@@ -23,8 +23,17 @@ impl Model {
     where
         S: System<NX, NU> + Send + Sync + 'static,
     {
+        let model = Self::recorded(&system);
+        Self { native: Some(Arc::new(CompiledSystem(system))), ..model }
+    }
+
+    /// The same of a system that is borrowed, without its compiled form.
+    pub(crate) fn recorded<S, const NX: usize, const NU: usize>(system: &S) -> Self
+    where
+        S: System<NX, NU>,
+    {
         let record = |formula: &dyn Fn([Expr; NX], [Expr; NU]) -> Vec<Expr>| {
-            recorded(&system, |x, u| formula(x, u))
+            recorded(system, |x, u| formula(x, u))
         };
         Self {
             name: system.name().to_owned(),
@@ -36,7 +45,8 @@ impl Model {
             target: record(&|x, _| vec![system.target(x)]),
             constraint: record(&|x, _| vec![system.constraint(x)]),
             bodies: system.bodies(),
-            native: Some(Arc::new(CompiledSystem(system))),
+            smallest_feature: system.smallest_feature(),
+            native: None,
         }
     }
 }

@@ -57,6 +57,7 @@ impl Mlp {
         while tensors.tensor(&format!("layers.{}.weight", layers.len())).is_ok() {
             layers.push(read_layer(&tensors, layers.len())?);
         }
+        refuse_others(&tensors, layers.len())?;
         let mlp = Self { layers: layers.into(), activation, output, state_order };
         mlp.validate()?;
         Ok(mlp)
@@ -101,6 +102,34 @@ fn word<'a>(
         .get(key)
         .map(String::as_str)
         .ok_or_else(|| format!("metadata has no `{key}`, expected {choices}"))
+}
+
+/// Refuses tensors that are no part of the first `count` layers: a network that left them out would
+/// be another one.
+fn refuse_others(tensors: &SafeTensors<'_>, count: usize) -> std::result::Result<(), String> {
+    let known = |name: &str| {
+        (0..count)
+            .any(|i| ["weight", "bias"].iter().any(|kind| name == format!("layers.{i}.{kind}")))
+    };
+    let mut others = tensors.names();
+    others.retain(|name| !known(name));
+    others.sort_unstable();
+    let Some(first) = others.first() else { return Ok(()) };
+    let beyond = others.iter().any(|name| name.starts_with("layers."));
+    let problem = match (beyond, others.len()) {
+        (true, _) => {
+            format!("there is no `layers.{count}.weight`: the layers have a gap before it")
+        }
+        (false, 1) => "it is no layer, and the network would be used without it".to_owned(),
+        (false, more) => format!(
+            "it is no layer, nor are {} more tensors, and the network would be used without them",
+            more - 1
+        ),
+    };
+    Err(format!(
+        "tensor `{first}`: {problem}; a policy file has layers.{{i}}.weight and layers.{{i}}.bias \
+         alone, i = 0, 1, ..."
+    ))
 }
 
 /// Layer `i` of the file.

@@ -95,6 +95,18 @@ pub(super) fn failures(events: &[Event]) -> String {
     )
 }
 
+/// What has to be said beside the figures; nothing where there is nothing.
+pub(super) fn notes(notes: &[String]) -> String {
+    if notes.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<section class=\"card limits\" aria-labelledby=\"notes\"><h2 id=\"notes\">To be kept in \
+         mind</h2>\n<ul>\n{}</ul></section>\n",
+        items(notes)
+    )
+}
+
 /// The items of a list.
 pub(super) fn items(texts: &[String]) -> String {
     texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()

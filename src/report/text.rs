@@ -47,6 +47,46 @@ pub(super) fn shorten(text: &str, limit: usize) -> String {
     format!("{start}…")
 }
 
+/// Each of `texts` in at most `limit` characters, different texts told apart: what all of them begin
+/// with is left out where their beginnings would look the same, and the place is added where that
+/// is not enough.
+pub(super) fn told_apart(texts: &[&str], limit: usize) -> Vec<String> {
+    let cut = |skipped: usize| -> Vec<String> {
+        let one = |text: &&str| match skipped {
+            0 => shorten(text, limit),
+            _ => shorten(&format!("…{}", text.chars().skip(skipped).collect::<String>()), limit),
+        };
+        texts.iter().map(one).collect()
+    };
+    let differ = |cut: &[String]| {
+        let mut seen: Vec<(&str, &String)> = texts.iter().copied().zip(cut).collect();
+        seen.sort_by_key(|(_, short)| *short);
+        seen.windows(2).all(|pair| pair[0].1 != pair[1].1 || pair[0].0 == pair[1].0)
+    };
+    let plain = cut(0);
+    if differ(&plain) {
+        return plain;
+    }
+    let without = cut(common_beginning(texts));
+    if differ(&without) {
+        return without;
+    }
+    let numbered = |(at, text): (usize, &&str)| {
+        let number = format!("#{} ", at + 1);
+        let left = limit.saturating_sub(number.len()).max(1);
+        number + &shorten(text, left)
+    };
+    texts.iter().enumerate().map(numbered).collect()
+}
+
+/// Characters that all of `texts` begin with.
+fn common_beginning(texts: &[&str]) -> usize {
+    let Some((first, rest)) = texts.split_first() else { return 0 };
+    let shared =
+        |other: &&str| first.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    rest.iter().map(shared).min().unwrap_or(0)
+}
+
 /// Four significant digits, to the nearest.
 pub(super) fn number(value: f64) -> String {
     rounded(value, Rounding::Nearest)
@@ -171,6 +211,25 @@ fn trimmed(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{count, escape, interval, lower, number, shorten, upper};
+
+    #[test]
+    fn cut_texts_are_told_apart() {
+        assert_eq!(told_apart(&["one", "two"], 18), ["one", "two"]);
+        let files = ["policies/race_policy.safetensors", "policies/race_policy_box.safetensors"];
+        assert_eq!(
+            told_apart(&files, 12),
+            ["….safetensors", "…_box.safet…"].map(|t| shorten(t, 12))
+        );
+        // Neither the beginning nor the rest tells these apart.
+        let long: Vec<String> =
+            (0..500).map(|i| format!("{}{i}", "x".repeat(40 + i % 7))).collect();
+        let long: Vec<&str> = long.iter().map(String::as_str).collect();
+        let mut short = told_apart(&long, 12);
+        assert!(short.iter().all(|text| text.chars().count() <= 12), "{short:?}");
+        short.sort();
+        short.dedup();
+        assert_eq!(short.len(), 500);
+    }
 
     #[test]
     fn numbers_are_short_and_rounded_the_safe_way() {

@@ -114,8 +114,13 @@ impl<const NU: usize> MppiSpec<NU> {
             return Err(Error::invalid("temperature", problem));
         }
         for (i, [low, high]) in settings.bounds.into_iter().enumerate() {
-            if !(low < high && low.is_finite() && high.is_finite()) {
-                let problem = format!("control {i} has the empty interval [{low}, {high}]");
+            // No width is a control that stays as it is.
+            if !(low <= high && low.is_finite() && high.is_finite()) {
+                let what = match low.is_finite() && high.is_finite() {
+                    true => "the empty interval",
+                    false => "an end that is not finite in",
+                };
+                let problem = format!("control {i} has {what} [{low}, {high}]");
                 return Err(Error::invalid("bounds", problem));
             }
         }

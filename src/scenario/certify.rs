@@ -8,7 +8,7 @@ use super::ledger::{Entry, Ledger, Spend};
 use super::lipschitz::{self, MarginBox};
 use super::record::{
     ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
-    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing,
+    Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing, decimal,
 };
 use super::settings::Settings;
 use super::{Context, Watch, derived, deviation, global, growth};
@@ -61,6 +61,8 @@ pub fn certify(
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, (&growth, global.band))?;
     let picture = picture(plant, settings, &growth);
+    let mut statements = derived::statements(settings, &deviation, &global, &growth);
+    statements.extend(derived::of_samples(plant, settings, &picture));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
@@ -68,11 +70,11 @@ pub fn certify(
         schema: SCHEMA,
         digests: BTreeMap::new(),
         holds: derived::holds(&deviation, &global, &growth),
-        statements: derived::statements(settings, &deviation, &global, &growth),
+        statements,
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),
         horizon: settings.spec.horizon,
-        gamma: f64::from(settings.spec.gamma),
+        gamma: decimal(settings.spec.gamma),
         constants,
         deviation,
         global,
@@ -272,10 +274,10 @@ fn state(
     let (x, query) = (&*settings.state, Query::Measure);
     let states = States::one(x);
     let margins = global::check_margins(context, &settings.spec, tightening, states, query, band)?;
-    let check_margin = f64::from(margins[0]);
-    let target_margin = f64::from(context.model().target_at(x, 0));
+    let check_margin = decimal(margins[0]);
+    let target_margin = decimal(context.model().target_at(x, 0));
     let tier = super::verify::tier(target_margin, check_margin, growth, x);
-    let constraint_margin = f64::from(context.model().constraint_at(x, 0));
+    let constraint_margin = decimal(context.model().constraint_at(x, 0));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }
 

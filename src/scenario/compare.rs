@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
+use super::finding::{Figure, Finding};
 use super::record::Record;
-use super::verify::Finding;
 
 /// Difference, relative to the larger number or to one, that another device's rounding may make.
 const TOLERANCE: f64 = 1e-3;
@@ -50,8 +50,8 @@ fn finding(differences: Vec<String>) -> Finding {
     };
     Finding {
         name: "every field of the record".to_owned(),
-        stored: "as its seed and configuration give it".to_owned(),
-        found,
+        stored: Figure::Words("as its seed and configuration give it".to_owned()),
+        found: Figure::Words(found),
         holds: differences.is_empty(),
     }
 }

@@ -2,13 +2,14 @@
 
 use super::certify::{constants, hashes, ledger, spendings, system_record};
 use super::record::{
-    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, Record, SliceRecord,
+    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record, SliceRecord,
+    decimal,
 };
 use super::settings::Settings;
-use super::{deviation, global, growth, verify};
+use super::{deviation, global, growth, sampling, verify};
 use crate::error::Result;
 use crate::model::{Model, Plant};
-use crate::rollout::GENERATOR;
+use crate::rollout::{GENERATOR, StateList};
 
 /// `stored` with everything that follows from `settings` and its own counts computed again: claims,
 /// intervals, constants, the ledger, margins of the states, words. What rollouts came to is taken
@@ -20,7 +21,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     let model = &*plant.model;
     let mut record = stored.clone();
     record.horizon = settings.spec.horizon;
-    record.gamma = f64::from(settings.spec.gamma);
+    record.gamma = decimal(settings.spec.gamma);
     record.provenance.seed = settings.seed;
     record.provenance.generator = GENERATOR.to_owned();
     record.provenance.policy = plant.controller.name.clone();
@@ -34,6 +35,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);
     record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    record.statements.extend(of_samples(plant, settings, &record.picture));
     record.holds = holds(&record.deviation, &record.global, &record.growth);
     Ok(record)
 }
@@ -43,8 +45,8 @@ fn margins(record: &mut Record, model: &Model, settings: &Settings) {
     let x = &*settings.state;
     let state = &mut record.state;
     state.x = x.to_vec();
-    state.target_margin = f64::from(model.target_at(x, 0));
-    state.constraint_margin = f64::from(model.constraint_at(x, 0));
+    state.target_margin = decimal(model.target_at(x, 0));
+    state.constraint_margin = decimal(model.constraint_at(x, 0));
     state.tier = verify::tier(state.target_margin, state.check_margin, &record.growth, x);
     let cells = global::slice_through(settings, x);
     let check_margin = std::mem::take(&mut record.slice.check_margin);
@@ -77,6 +79,20 @@ pub(super) fn statements(
     statements.insert(2, share_statement(global, settings));
     statements.extend(growth_statement(growth));
     statements
+}
+
+/// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is
+/// too coarse for them.
+pub(super) fn of_samples(
+    plant: &Plant,
+    settings: &Settings,
+    picture: &PictureRecord,
+) -> Vec<String> {
+    let size = settings.state.len();
+    let first = |x: &&Vec<f32>| x.len() == size;
+    let firsts = picture.rollouts.iter().filter_map(|rollout| rollout.states.first());
+    let starts = StateList::new(size).with(firsts.filter(first));
+    sampling::sampling(plant, starts.view(), settings.spec.horizon)
 }
 
 /// The certified share of the box in words.

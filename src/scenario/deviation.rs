@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
-use super::record::{Claim, DeviationRecord};
+use super::record::{Claim, DeviationRecord, decimal};
 use super::settings::{DeviationSettings, DeviationSource, Joint, Settings};
 use super::{Context, linear};
 use crate::error::{Error, Result};
@@ -14,19 +14,20 @@ use crate::rollout::{
 };
 
 /// Risk, beta and decision variables of each scenario program of a joint method.
-pub(super) struct Program {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Program {
     /// Decision variables d.
-    pub(super) decision_vars: u32,
+    pub(crate) decision_vars: u32,
     /// Risk of one program.
-    pub(super) epsilon: f64,
+    pub(crate) epsilon: f64,
     /// Beta of one program.
-    pub(super) beta: f64,
+    pub(crate) beta: f64,
 }
 
 impl Program {
     /// The program that `joint` makes of the deviation bound over `horizon` steps; the bound of
     /// step 0 is the radius itself and costs nothing.
-    pub(super) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
+    pub(crate) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
         let DeviationSettings { epsilon, beta, joint, .. } = *settings;
         let steps = f64::from(horizon);
         match joint {
@@ -98,7 +99,7 @@ fn record(
     Ok(DeviationRecord {
         claim: claim(model, settings, program)?,
         // As it was written: 0.1, not 0.10000000149.
-        radius: asked.radius.to_string().parse().unwrap_or(f64::from(asked.radius)),
+        radius: decimal(asked.radius),
         control: asked.control,
         joint: asked.joint,
         source: asked.source,

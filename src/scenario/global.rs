@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::Context;
 use super::bound::{certified_risk, interval};
+use super::finding::{Figure, Finding};
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord};
 use super::settings::Settings;
-use super::verify::Finding;
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::{
@@ -296,8 +296,8 @@ pub(super) fn share_overlaps(stored: &GlobalRecord, fresh: &GlobalRecord) -> Fin
     let [fresh_low, fresh_high] = fresh.share_interval;
     Finding {
         name: "certified share on fresh pairs".to_owned(),
-        stored: format!("{low:.6} to {high:.6}"),
-        found: format!("{fresh_low:.6} to {fresh_high:.6}"),
+        stored: Figure::Interval(stored.share_interval),
+        found: Figure::Interval(fresh.share_interval),
         holds: low <= fresh_high && fresh_low <= high,
     }
 }

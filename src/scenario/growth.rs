@@ -2,7 +2,7 @@
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
 use super::boundary::{self, Boundary};
-use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord};
+use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
 use super::{Context, certify};
 use crate::error::{Error, Result};
@@ -125,7 +125,7 @@ fn round(
         query: Query::Measure,
     };
     let mut record = RoundRecord {
-        radius: f64::from(ball.radius),
+        radius: decimal(ball.radius),
         scenarios: settings.growth.scenarios,
         failures: 0,
         nearest_failure: None,
@@ -179,7 +179,7 @@ pub(super) fn derived(
     record.outcome = GrowthOutcome::Exhausted;
     let mut ball = Ball { center, radius: asked.radius, varies: asked.varies.to_vec() };
     for (number, round) in (0..).zip(&mut record.rounds) {
-        (round.radius, round.scenarios) = (f64::from(ball.radius), asked.scenarios);
+        (round.radius, round.scenarios) = (decimal(ball.radius), asked.scenarios);
         let next = round.nearest_failure.and_then(|far| next_radius(asked, number, far));
         ball.radius = next.unwrap_or(ball.radius);
     }
@@ -213,7 +213,7 @@ fn verified(
     ball: Ball,
 ) -> Result<()> {
     record.outcome = GrowthOutcome::Verified;
-    record.radius = f64::from(ball.radius);
+    record.radius = decimal(ball.radius);
     record.claim = Some(claim(model, settings, &ball)?);
     record.volume = Region::Ball(ball).volume();
     Ok(())

@@ -100,6 +100,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::{exact_deviation, state_matrix};
+    use crate::model::Model;
     use crate::real::Real;
     use crate::system::{Axis, DoubleIntegrator, DroneRace, System};
 
@@ -118,7 +119,8 @@ mod tests {
             (25, 0.2851),
             (30, 0.3303),
         ];
-        let matrix = state_matrix(&DroneRace::default()).expect("the race is linear");
+        let matrix =
+            state_matrix(&Model::of(DroneRace::default()), 40).expect("the race is linear");
         let found = exact_deviation(&matrix, 0.1, 30);
         assert_eq!(found.len(), 31);
         for (t, deviation) in expected {
@@ -129,7 +131,8 @@ mod tests {
     /// `A^t = [[1, s], [0, 1]]` has the largest singular value `(s + sqrt(s^2 + 4)) / 2`.
     #[test]
     fn double_integrator_deviation_is_a_tight_supremum() {
-        let matrix = state_matrix(&DoubleIntegrator::default()).expect("it is linear");
+        let matrix =
+            state_matrix(&Model::of(DoubleIntegrator::default()), 40).expect("it is linear");
         let dt = f64::from(0.1_f32);
         assert_eq!(matrix, DMatrix::from_row_slice(2, 2, &[1.0, dt, 0.0, 1.0]));
         for (t, found) in exact_deviation(&matrix, 2.0, 200).into_iter().enumerate() {
@@ -142,7 +145,8 @@ mod tests {
     /// Entries that are off by their rounding still give an upper bound.
     #[test]
     fn the_margin_covers_the_rounding_of_the_entries() {
-        let matrix = state_matrix(&DoubleIntegrator::default()).expect("it is linear");
+        let matrix =
+            state_matrix(&Model::of(DoubleIntegrator::default()), 40).expect("it is linear");
         let rounded = &matrix * (1.0 - 0.5 * super::ROUNDING);
         let s = f64::from(0.1_f32) * 200.0;
         let exact = 0.5 * (s + s.hypot(2.0));
@@ -154,7 +158,7 @@ mod tests {
     #[test]
     fn no_pair_of_race_trajectories_comes_farther_apart() {
         let race = DroneRace::default();
-        let matrix = state_matrix(&race).expect("the race is linear");
+        let matrix = state_matrix(&Model::of(race), 40).expect("the race is linear");
         let bound = exact_deviation(&matrix, 1.0, 40);
         let mut power = DMatrix::identity(12, 12);
         for (t, bound) in bound.into_iter().enumerate() {
@@ -227,10 +231,13 @@ mod tests {
     fn nonlinear_systems_have_no_matrix() {
         use Planar::{Bilinear, Clipped, Dubins, Pendulum, Relay, Switched};
         for system in [Pendulum, Dubins, Clipped, Bilinear, Relay] {
-            assert_eq!(state_matrix(&system), None);
+            assert_eq!(state_matrix(&Model::of(system), 40), None);
         }
         let dt = f64::from(0.1_f32);
         let expected = [1.0, 1.0, 0.0, 0.0, dt, 0.0, 0.0, 0.0, 1.0];
-        assert_eq!(state_matrix(&Switched), Some(DMatrix::from_row_slice(3, 3, &expected)));
+        assert_eq!(
+            state_matrix(&Model::of(Switched), 40),
+            Some(DMatrix::from_row_slice(3, 3, &expected))
+        );
     }
 }

@@ -138,16 +138,17 @@ fn length(vector: impl Iterator<Item = f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{MarginConstants, margins, sampled};
-    use crate::system::{Cone, DoubleIntegrator, DroneRace, System};
+    use super::{MarginBox, MarginConstants, margins, sampled};
+    use crate::model::Model;
+    use crate::system::{Cone, DoubleIntegrator, DroneRace};
 
     /// Constants over the default box; sampled slopes must come to `share` of them, and no farther.
-    fn over_default_box(model: &Model, varies: [bool; NX], share: f64) -> MarginConstants {
-        let states = system.states();
-        let low = std::array::from_fn(|i| states[i].low);
-        let high = std::array::from_fn(|i| states[i].high);
-        let found = margins(system, low, high, varies);
-        let slopes = sampled(system, low, high, varies, 2000, 1);
+    fn over_default_box(model: &Model, varies: &[bool], share: f64) -> MarginConstants {
+        let low: Vec<f32> = model.states.iter().map(|axis| axis.low).collect();
+        let high: Vec<f32> = model.states.iter().map(|axis| axis.high).collect();
+        let region = MarginBox { low: &low, high: &high, varies, horizon: 30 };
+        let found = margins(model, region);
+        let slopes = sampled(model, region, 2000, 1);
         // A slope over 2e-5 between margins below 1e3 is rounded at 1e-13 / 2e-5.
         let rounding = 1e-8;
         assert!(slopes.target <= found.target.constant + rounding, "{slopes:?}");
@@ -179,12 +180,12 @@ mod tests {
         ];
         for (cone, square, share) in truths {
             let race = DroneRace { cone, ..DroneRace::default() };
-            let found = over_default_box(&race, [true; 12], share);
+            let found = over_default_box(&Model::of(race), &[true; 12], share);
             assert_bounds(found.target.constant, 10.0 * 2.0_f64.sqrt());
             assert_bounds(found.constraint.constant, 10.0 * square.sqrt());
             assert_eq!(found.target.pieces, 6);
             let limited = DroneRace { speed_limit: true, ..race };
-            let limited = over_default_box(&limited, [true; 12], share);
+            let limited = over_default_box(&Model::of(limited), &[true; 12], share);
             assert_eq!(limited.constraint.constant, found.constraint.constant);
             assert_eq!(limited.constraint.pieces, found.constraint.pieces + 1);
         }
@@ -193,20 +194,20 @@ mod tests {
     /// With the opponent frozen: one end of each difference, but the corner of two fences.
     #[test]
     fn frozen_coordinates_do_not_count() {
-        let varies = std::array::from_fn(|i| i < 6);
-        let found = over_default_box(&DroneRace::default(), varies, 0.99);
+        let varies: [bool; 12] = std::array::from_fn(|i| i < 6);
+        let found = over_default_box(&Model::of(DroneRace::default()), &varies, 0.99);
         let q = f64::from(0.2_f32);
         assert_bounds(found.target.constant, 10.0);
         // The fences have slope 10 sqrt(2), the cone only 10 sqrt(1 + q^2).
         assert_bounds(found.constraint.constant, 10.0 * 2.0_f64.sqrt().max((1.0 + q * q).sqrt()));
-        let opponent = std::array::from_fn(|i| i >= 6);
-        let found = over_default_box(&DroneRace::default(), opponent, 0.99);
+        let opponent: [bool; 12] = std::array::from_fn(|i| i >= 6);
+        let found = over_default_box(&Model::of(DroneRace::default()), &opponent, 0.99);
         assert_bounds(found.constraint.constant, 10.0 * (1.0 + q * q).sqrt());
     }
 
     #[test]
     fn double_integrator_has_unit_slopes() {
-        let found = over_default_box(&DoubleIntegrator::default(), [true; 2], 0.99);
+        let found = over_default_box(&Model::of(DoubleIntegrator::default()), &[true; 2], 0.99);
         assert_bounds(found.target.constant, 1.0);
         assert_bounds(found.constraint.constant, 1.0);
     }

@@ -6,6 +6,7 @@ mod certify;
 mod compare;
 mod derived;
 pub mod deviation;
+mod finding;
 pub mod global;
 pub mod growth;
 pub mod growth_batch;
@@ -13,6 +14,7 @@ pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
 pub mod record;
+pub mod sampling;
 pub mod settings;
 mod stored;
 pub(crate) mod tail;
@@ -20,7 +22,8 @@ mod verify;
 
 pub(crate) use certify::provenance;
 pub use certify::{Tightened, certify, check_settings, hashes, tightened};
-pub use verify::{CheckReport, Finding, QueryRow, check, query};
+pub use finding::{CheckReport, Figure, Finding};
+pub use verify::{QueryRow, check, query};
 
 use crate::backend::Program;
 use crate::error::Result;

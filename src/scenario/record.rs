@@ -12,6 +12,12 @@ use crate::system::{Axis, Body};
 /// Version of the layout of [`Record`].
 pub const SCHEMA: u32 = 1;
 
+/// The shortest decimal that is this f32, so that a record says 0.4 and not 0.4000000059604645; as an
+/// f32 it is `value` again.
+pub(crate) fn decimal(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
 /// A stored certificate: everything in `certificate.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

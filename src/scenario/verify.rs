@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::bound::lower_bound;
 use super::certify::{certify, hashes, provenance, tightening};
 use super::derived::derived;
+use super::finding::{CheckReport, Figure, Finding};
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
 use super::settings::Settings;
 use super::{Context, Unwatched, Watch, compare, global};
@@ -33,41 +34,6 @@ pub struct QueryRow {
     pub check_margin: f32,
     /// Target margin.
     pub target_margin: f32,
-}
-
-/// One thing that was checked.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// What.
-    pub name: String,
-    /// As stored.
-    pub stored: String,
-    /// As found now.
-    pub found: String,
-    /// Whether the stored claim stands.
-    pub holds: bool,
-}
-
-/// What a check found.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct CheckReport {
-    /// Whether every finding holds.
-    pub holds: bool,
-    /// One by one.
-    pub findings: Vec<Finding>,
-}
-
-impl CheckReport {
-    /// The report of these findings.
-    fn new(findings: Vec<Finding>) -> Self {
-        Self { holds: findings.iter().all(|finding| finding.holds), findings }
-    }
-
-    /// Adds what was found beside.
-    pub fn add(&mut self, findings: Vec<Finding>) {
-        self.holds &= findings.iter().all(|finding| finding.holds);
-        self.findings.extend(findings);
-    }
 }
 
 /// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
@@ -211,14 +177,14 @@ pub fn check(
 fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
     let number = |name: &str, stored: f64, found: f64| Finding {
         name: name.to_owned(),
-        stored: format!("{stored:.6}"),
-        found: format!("{found:.6}"),
+        stored: Figure::Number(stored),
+        found: Figure::Number(found),
         holds: (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
     };
     let count = |name: &str, stored: u64, found: u64, of: u64| Finding {
         name: name.to_owned(),
-        stored: stored.to_string(),
-        found: found.to_string(),
+        stored: Figure::Count(stored),
+        found: Figure::Count(found),
         holds: stored.abs_diff(found) as f64 <= MOVED * of as f64,
     };
     let worst = stored.deviation.bound.iter().zip(&again.deviation.bound);
@@ -226,11 +192,11 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         let farther = (was - is).abs() > (worst.0 - worst.1).abs();
         if farther || worst.0 == 0.0 { (*was, *is) } else { worst }
     });
-    let text = |name: &str, stored: String, found: String| {
+    let text = |name: &str, stored: Figure, found: Figure| {
         let holds = stored == found;
         Finding { name: name.to_owned(), stored, found, holds }
     };
-    let outcome = |record: &Record| format!("{:?}", record.growth.outcome).to_lowercase();
+    let outcome = |record: &Record| Figure::Words(record.growth.outcome.name().to_owned());
     vec![
         number(
             "constant of the target margin",
@@ -262,7 +228,7 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         ),
         text("outcome of local growth", outcome(stored), outcome(again)),
         number("radius of the verified ball", stored.growth.radius, again.growth.radius),
-        text("all claims obtained", stored.holds.to_string(), again.holds.to_string()),
+        text("all claims obtained", Figure::Flag(stored.holds), Figure::Flag(again.holds)),
     ]
 }
 
@@ -271,8 +237,8 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
     let least = lower_bound(failures, trials, FALSE_ALARM);
     Finding {
         name: name.to_owned(),
-        stored: format!("at most {risk:.6}"),
-        found: format!("{failures} of {trials}: at least {least:.6}"),
+        stored: Figure::AtMost { at_most: risk },
+        found: Figure::Trials { failures, trials, at_least: least },
         holds: least <= risk,
     }
 }

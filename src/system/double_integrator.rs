@@ -1,6 +1,6 @@
 //! The double integrator in one dimension, whose reach-avoid set has a closed form.
 
-use super::{Axis, System};
+use super::{Axis, Feature, Parameter, System};
 use crate::policy::Policy;
 use crate::real::Real;
 
@@ -42,19 +42,32 @@ impl System<2, 1> for DoubleIntegrator {
 
     #[inline(always)]
     fn step<R: Real>(&self, [position, velocity]: [R; 2], [u]: [R; 1]) -> [R; 2] {
-        let bound = R::lit(self.acceleration);
+        let u = u.clamp(R::lit(-self.acceleration), R::lit(self.acceleration));
         let dt = R::lit(DT);
-        [position + dt * velocity, velocity + dt * u.clamp(-bound, bound)]
+        [position + dt * velocity, velocity + dt * u]
     }
 
     #[inline(always)]
     fn target<R: Real>(&self, [position, _]: [R; 2]) -> R {
-        R::lit(self.target) - position.abs()
+        R::parameter("target", self.target) - position.abs()
     }
 
     #[inline(always)]
     fn constraint<R: Real>(&self, [position, _]: [R; 2]) -> R {
-        R::lit(self.corridor) - position.abs()
+        R::parameter("corridor", self.corridor) - position.abs()
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        let parameter = Parameter::new;
+        vec![parameter("target", "m", self.target), parameter("corridor", "m", self.corridor)]
+    }
+
+    fn smallest_feature(&self) -> Option<Feature> {
+        let (name, half) = match self.target < self.corridor {
+            true => ("the target", self.target),
+            false => ("the corridor", self.corridor),
+        };
+        Some(Feature { name: name.to_owned(), width: 2.0 * half })
     }
 }
 
@@ -72,7 +85,7 @@ impl Policy<2, 1> for BangBang {
 
     #[inline(always)]
     fn control<R: Real>(&self, [position, _]: [R; 2]) -> [R; 1] {
-        let full = R::lit(self.acceleration);
-        [position.if_lt(R::lit(0.0), full, -full)]
+        let full = self.acceleration;
+        [position.if_lt(R::lit(0.0), R::lit(full), R::lit(-full))]
     }
 }

@@ -1,6 +1,6 @@
 //! The two-drone race: an ego that must pass the gate first, and an opponent under linear feedback.
 
-use super::{Axis, Body, System};
+use super::{Axis, Body, Feature, Parameter, System};
 use crate::real::Real;
 
 /// Step of the explicit Euler integration, seconds.
@@ -69,10 +69,10 @@ impl DroneRace {
     }
 }
 
-/// What a control, clipped to its bounds, adds to a velocity.
+/// A control within its bounds.
 #[inline(always)]
-fn push<R: Real>(gain: R, u: R) -> R {
-    gain * u.clamp(R::lit(-1.0), R::lit(1.0))
+fn clip<R: Real>(u: R) -> R {
+    u.clamp(R::lit(-1.0), R::lit(1.0))
 }
 
 impl System<12, 3> for DroneRace {
@@ -106,21 +106,20 @@ impl System<12, 3> for DroneRace {
     fn step<R: Real>(&self, x: [R; 12], u: [R; 3]) -> [R; 12] {
         let [ego_x, ego_vx, ego_y, ego_vy, ego_z, ego_vz, ..] = x;
         let [.., opp_x, opp_vx, opp_y, opp_vy, opp_z, opp_vz] = x;
+        let [ux, uy, uz] = [clip(u[0]), clip(u[1]), clip(u[2])];
         let dt = R::lit(DT);
-        let gain = R::lit(DT * self.ego_gain);
-        let [ux, uy, uz] = [push(gain, u[0]), push(gain, u[1]), push(gain, u[2])];
-        let scale = DT * self.opponent_gain;
-        let [position, velocity, along] = GAINS;
-        let position = R::lit(scale * position);
-        let velocity = R::lit(scale * velocity);
-        let along = R::lit(scale * along);
+        let gain = dt * R::parameter("ego_gain", self.ego_gain);
+        let scale = dt * R::parameter("opponent_gain", self.opponent_gain);
+        let position = scale * R::lit(GAINS[0]);
+        let velocity = scale * R::lit(GAINS[1]);
+        let along = scale * R::lit(GAINS[2]);
         [
             ego_x + dt * ego_vx,
-            ego_vx + ux,
+            ego_vx + gain * ux,
             ego_y + dt * ego_vy,
-            ego_vy + uy,
+            ego_vy + gain * uy,
             ego_z + dt * ego_vz,
-            ego_vz + uz,
+            ego_vz + gain * uz,
             opp_x + dt * opp_vx,
             opp_vx - (position * opp_x + velocity * opp_vx),
             opp_y + dt * opp_vy,
@@ -150,8 +149,24 @@ impl System<12, 3> for DroneRace {
         R::lit(MARGIN_SCALE) * margin
     }
 
+    fn parameters(&self) -> Vec<Parameter> {
+        let parameter = Parameter::new;
+        vec![
+            parameter("ego_gain", "m/s^2", self.ego_gain),
+            parameter("opponent_gain", "", self.opponent_gain),
+        ]
+    }
+
     fn bodies(&self) -> Vec<Body> {
         let body = |name: &str, x| Body { name: name.to_owned(), x, y: x + 2 };
         vec![body("ego", 0), body("opponent", 6)]
+    }
+
+    fn smallest_feature(&self) -> Option<Feature> {
+        let radius = match self.cone {
+            Cone::Distance => Self::CONE,
+            Cone::Squared | Cone::Root => Self::CONE.sqrt(),
+        };
+        Some(Feature { name: "the cone around the opponent".to_owned(), width: 2.0 * radius })
     }
 }

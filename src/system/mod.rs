@@ -70,6 +70,20 @@ pub trait System<const NX: usize, const NU: usize>: Sync {
     fn bodies(&self) -> Vec<Body> {
         Vec::new()
     }
+    /// The narrowest thing that the margins know of, where it is known: a step that is longer may leap
+    /// over it, since margins are looked at at the samples alone.
+    fn smallest_feature(&self) -> Option<Feature> {
+        None
+    }
+}
+
+/// Something that the margins know of, and how wide it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feature {
+    /// In words, with an article.
+    pub name: String,
+    /// How wide it is, m.
+    pub width: f32,
 }
 
 impl<S: System<NX, NU>, const NX: usize, const NU: usize> System<NX, NU> for &S {
@@ -99,6 +113,9 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> System<NX, NU> for &S 
     }
     fn bodies(&self) -> Vec<Body> {
         (**self).bodies()
+    }
+    fn smallest_feature(&self) -> Option<Feature> {
+        (**self).smallest_feature()
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::checkpoint::{Checkpoint, Progress};
 use super::record::{CurvePoint, NetworkRecord, Origin, TRAIN_SCHEMA, TrainRecord};
 use crate::error::{Error, Result};
-use crate::files::{claim_folder, json};
+use crate::files::{MANIFEST, claim_folder, json, make_way};
 use crate::policy::Mlp;
 use crate::scenario::Watch;
 
@@ -74,7 +74,7 @@ impl Run<'_> {
     /// [`Error::Invalid`] if the loss is not finite, [`Error::Interrupted`] after a checkpoint was
     /// written, and those of the learner.
     pub fn train(&self, learner: &mut dyn Learner, watch: &dyn Watch) -> Result<Trained> {
-        claim_folder(self.folder, &json("experiment.json", &self.origin)?, ROOM_BYTES)?;
+        claim_folder(self.folder, &self.manifest()?, ROOM_BYTES)?;
         let mut standing = match Checkpoint::read(self.folder)? {
             Some(stored) => self.restored(learner, stored)?,
             None => self.begun(learner)?,
@@ -93,6 +93,19 @@ impl Run<'_> {
         }
         store(learner, &mut standing, self.folder)?;
         self.trained(learner, standing)
+    }
+
+    /// Removes the results of other work from the folder.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if they cannot be removed.
+    pub fn make_way(&self) -> Result<()> {
+        make_way(self.folder, &self.manifest()?)
+    }
+
+    /// What the folder says that it holds.
+    fn manifest(&self) -> Result<String> {
+        json(MANIFEST, &self.origin)
     }
 
     /// The state of a run that has not begun: scored once.

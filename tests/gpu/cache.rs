@@ -11,7 +11,7 @@ fn measures(out: &Path, cache: &Path) -> Vec<u8> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let file = out.join("measures.npy");
     let run = Command::new(env!("CARGO_BIN_EXE_reachcast"))
-        .args(["rollout", "configs/race.toml", "--backend", "gpu", "-q"])
+        .args(["rollout", "configs/race.toml", "--backend", "gpu", "-q", "--overwrite"])
         .args(["--starts", "configs/race_starts_500.csv", "--measures"])
         .arg(&file)
         .current_dir(root)

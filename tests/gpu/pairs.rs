@@ -1,5 +1,7 @@
 //! Pairs rolled out side by side against the f64 oracle.
 
+use std::array::from_fn;
+
 use reachcast::backend::gpu::Gpu;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
@@ -73,7 +75,7 @@ fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
     P: Policy<NX, NU>,
 {
     let pairs = task.range.clone().map(|pair| {
-        let starts = task.pairs.pair(pair).map(|x| std::array::from_fn(|i| x[i]));
+        let starts = task.pairs.pair(pair).map(|x| from_fn(|i| x[i]));
         let (nominal, perturbed) =
             pair_measures(plant, starts, &task.spec, task.tightening, task.control);
         (pair_f32(plant, task, starts), [nominal, perturbed])
@@ -94,8 +96,7 @@ fn distances<R: Real, S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, con
     task: &DeviationTask<'_>,
     pair: u64,
 ) -> Vec<R> {
-    let [mut a, mut b] =
-        task.pairs.pair(pair).map(|x| -> [R; NX] { std::array::from_fn(|i| R::lit(x[i])) });
+    let [mut a, mut b] = task.pairs.pair(pair).map(|x| from_fn(|i| R::lit(x[i])));
     let mut all = Vec::new();
     for _ in 0..=task.spec.horizon {
         let gaps = a.iter().zip(&b).map(|(&a, &b)| b - a);

@@ -82,6 +82,7 @@ pub(crate) fn full() -> RaceRecord {
         }],
         picture: Some(picture()),
         events: Vec::new(),
+        notes: Vec::new(),
     }
 }
 

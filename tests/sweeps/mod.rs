@@ -100,6 +100,7 @@ fn grid(axes: Axes<'_>, result: impl Fn(&Values<'_>) -> PointResult) -> SweepRec
         axes: axes.iter().map(axis).collect(),
         total: points.len() as u64,
         points,
+        notes: Vec::new(),
     }
 }
 

@@ -1,74 +1,13 @@
-//! Buffers: parameters of a dispatch, storage that is reused between calls, readback.
+//! Buffers that are reused between calls.
 
 use std::num::NonZeroU64;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
 
 use super::device::Device;
+use super::traffic::Count;
 use crate::error::{Fault, Result};
-
-/// Parameters of one dispatch; twin: `shaders/params.wgsl`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-#[expect(missing_docs, reason = "the names are those of the shader and say what they hold")]
-pub struct Params {
-    pub key_low: u32,
-    pub key_high: u32,
-    pub stream: u32,
-    pub zero: u32,
-    pub pair_key_low: u32,
-    pub pair_key_high: u32,
-    pub pair_stream: u32,
-    pub pair_radius: f32,
-    pub first_low: u32,
-    pub first_high: u32,
-    pub columns: u32,
-    pub stride: u32,
-    pub step: u32,
-    pub steps: u32,
-    pub horizon: u32,
-    pub region_kind: u32,
-    pub paired: u32,
-    pub closed_loop: u32,
-    pub sign_only: u32,
-    pub layer_offset: u32,
-    pub layer_inputs: u32,
-    pub layer_outputs: u32,
-    pub layer_neurons: u32,
-    pub segment_start: u32,
-    pub iteration: u32,
-    pub samples: u32,
-    pub width: u32,
-    pub rounds: u32,
-    pub temperature: f32,
-}
-
-impl Params {
-    /// Bytes of the block.
-    pub(super) const SIZE: NonZeroU64 = match NonZeroU64::new(size_of::<Self>() as u64) {
-        Some(size) => size,
-        None => panic!("the block of parameters is not empty"),
-    };
-
-    /// Bytes from one block to the next: the largest alignment that an adapter may ask for.
-    pub(super) const PITCH: usize = 256;
-
-    /// The parameters for `columns` trajectories from index `first` on.
-    pub(super) fn at(mut self, first: u64, columns: u32) -> Self {
-        self.first_low = first as u32;
-        self.first_high = (first >> 32) as u32;
-        self.columns = columns;
-        self
-    }
-
-    /// The parameters for the steps `step..step + steps`.
-    pub(super) fn over(mut self, step: u32, steps: u32) -> Self {
-        self.step = step;
-        self.steps = steps;
-        self
-    }
-}
 
 /// Bytes of free buffers that are kept for later calls.
 const KEPT_BYTES: u64 = 256 << 20;
@@ -88,6 +27,8 @@ pub(super) enum Use {
     Storage,
     /// Parameters.
     Uniform,
+    /// What the host sends to kernels: parameters, and tables that they read.
+    Inputs,
     /// Results on their way to the host.
     Readback,
     /// Times that queries found.
@@ -100,6 +41,7 @@ impl Use {
         match self {
             Self::Storage => U::STORAGE | U::COPY_SRC | U::COPY_DST,
             Self::Uniform => U::UNIFORM | U::COPY_DST,
+            Self::Inputs => U::UNIFORM | U::STORAGE | U::COPY_DST,
             Self::Readback => U::MAP_READ | U::COPY_DST,
             Self::Timestamps => U::QUERY_RESOLVE | U::COPY_SRC,
         }
@@ -116,12 +58,15 @@ impl Pool {
         let fits = |buffer: &wgpu::Buffer| buffer.size() == size && buffer.usage() == usage;
         let inner = match free.iter().position(fits) {
             Some(at) => free.swap_remove(at),
-            None => device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size,
-                usage,
-                mapped_at_creation: false,
-            }),
+            None => {
+                device.counters.add(Count::Buffer);
+                device.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: None,
+                    size,
+                    usage,
+                    mapped_at_creation: false,
+                })
+            }
         };
         Buffer { inner, bytes, reusable: true, pool: self.clone() }
     }
@@ -146,9 +91,9 @@ impl Buffer {
         wgpu::BufferBinding { buffer: &self.inner, offset: 0, size: NonZeroU64::new(self.bytes) }
     }
 
-    /// Its first block of parameters, moved by a dynamic offset.
-    pub(super) fn first_block(&self) -> wgpu::BufferBinding<'_> {
-        wgpu::BufferBinding { buffer: &self.inner, offset: 0, size: Some(Params::SIZE) }
+    /// `bytes` of it from `offset` on, as a kernel sees them.
+    pub(super) fn part(&self, offset: u64, bytes: u64) -> wgpu::BufferBinding<'_> {
+        wgpu::BufferBinding { buffer: &self.inner, offset, size: NonZeroU64::new(bytes) }
     }
 
     /// All of it, as commands other than kernels see it.
@@ -158,13 +103,28 @@ impl Buffer {
 
     /// Writes `data` at the start, before the next submission.
     pub(super) fn write<T: Pod>(&self, device: &Device, data: &[T]) {
-        let bytes = bytemuck::cast_slice(data);
-        device.queue.write_buffer(&self.inner, 0, bytes);
+        self.write_at(device, 0, bytemuck::cast_slice(data));
+    }
+
+    /// Writes `bytes` from `offset` on, before the next submission.
+    pub(super) fn write_at(&self, device: &Device, offset: u64, bytes: &[u8]) {
+        device.counters.add(Count::Write);
+        device.queue.write_buffer(&self.inner, offset, bytes);
     }
 
     /// Sets the buffer to 0 when `encoder` runs.
     pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.clear_buffer(&self.inner, 0, None);
+    }
+
+    /// Copies its first `bytes` to `sink` from `offset` on when `encoder` runs.
+    pub(super) fn copy(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        (sink, offset): (&Self, u64),
+        bytes: u64,
+    ) {
+        encoder.copy_buffer_to_buffer(&self.inner, 0, &sink.inner, offset, bytes);
     }
 
     /// The first `count` numbers, once all work submitted so far is done.
@@ -174,17 +134,33 @@ impl Buffer {
     pub(super) fn read<T: Pod>(&self, device: &Device, count: usize) -> Result<Vec<T>> {
         let bytes = (count * size_of::<T>()) as u64;
         let mut staging = self.pool.take(device, Use::Readback, bytes);
-        // Until it is unmapped again, nobody else can use it.
-        staging.reusable = false;
         let mut encoder = device.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(&self.inner, 0, &staging.inner, 0, bytes);
+        self.copy(&mut encoder, (&staging, 0), bytes);
         device.submit(encoder.finish())?;
+        staging.mapped(device, bytes, || device.wait(None), bytemuck::pod_collect_to_vec)
+    }
+
+    /// What `take` makes of the first `bytes` of a buffer for readback, after `wait`, which waits for
+    /// the work that fills it.
+    ///
+    /// # Errors
+    /// [`crate::Error::DeviceFailed`], also for failures of earlier work.
+    pub(super) fn mapped<T>(
+        &mut self,
+        device: &Device,
+        bytes: u64,
+        wait: impl FnOnce() -> Result<()>,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T> {
+        // Until it is unmapped again, nobody else can use it.
+        self.reusable = false;
         let (send, mapped) = mpsc::channel();
-        staging.inner.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+        self.inner.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
             // The receiver is gone only if the wait failed, which is reported by itself.
             let _ = send.send(result);
         });
-        device.wait(None)?;
+        wait()?;
+        device.counters.add(Count::Read);
         let failed = |text: String| {
             device.failed(Fault::Validation, &format!("cannot read results: {text}"))
         };
@@ -193,12 +169,11 @@ impl Buffer {
             Ok(Err(e)) => return Err(failed(e.to_string())),
             Err(e) => return Err(failed(e.to_string())),
         }
-        let view = staging.inner.get_mapped_range(0..bytes);
-        let numbers =
-            view.map(|view| bytemuck::pod_collect_to_vec(&view)).map_err(|e| failed(e.to_string()));
-        staging.inner.unmap();
-        staging.reusable = true;
-        numbers
+        let view = self.inner.get_mapped_range(0..bytes);
+        let taken = view.map(|view| take(&view)).map_err(|e| failed(e.to_string()));
+        self.inner.unmap();
+        self.reusable = true;
+        taken
     }
 }
 

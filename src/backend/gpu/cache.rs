@@ -74,7 +74,7 @@ fn whole(mut file: Vec<u8>) -> Option<Vec<u8>> {
 }
 
 /// The folder that the variable names, else one in the user's folder for caches.
-fn folder() -> Option<PathBuf> {
+pub(crate) fn folder() -> Option<PathBuf> {
     match std::env::var_os(VARIABLE) {
         Some(value) if value == "off" => None,
         Some(value) if !value.is_empty() => Some(value.into()),

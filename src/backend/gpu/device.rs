@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::fault::{Faults, Injection, Injector};
+use super::traffic::{Count, Counters};
 use crate::error::{Error, Fault, Result};
 
 /// What an adapter is made of.
@@ -133,6 +134,7 @@ pub(super) struct Device {
     pub(super) adapter: Adapter,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    pub(super) counters: Arc<Counters>,
     faults: Arc<Faults>,
     /// Failures of earlier calls.
     seen: usize,
@@ -163,9 +165,9 @@ impl Device {
     /// [`Error::Device`] if it is gone or does not open.
     pub(super) fn reopened(&self) -> Result<Self> {
         let handle = found_again(&instance(), &self.adapter)?;
-        let injector = Arc::clone(&self.injector);
         Ok(Self {
-            injector,
+            injector: Arc::clone(&self.injector),
+            counters: Arc::clone(&self.counters),
             patience: self.patience,
             ..Self::request(self.adapter.clone(), &handle)?
         })
@@ -195,8 +197,8 @@ impl Device {
                 seen.note(Fault::Lost, text);
             }
         });
-        let (injector, patience) = (Arc::default(), PATIENCE);
-        Ok(Self { adapter, device, queue, faults, seen: 0, injector, patience })
+        let (injector, counters, patience) = (Arc::default(), Arc::default(), PATIENCE);
+        Ok(Self { adapter, device, queue, counters, faults, seen: 0, injector, patience })
     }
 
     /// The same device, whose submissions fail as `asked`.
@@ -224,6 +226,7 @@ impl Device {
     /// # Errors
     /// [`Error::DeviceFailed`] where a test asks for it.
     pub(super) fn submit(&self, commands: wgpu::CommandBuffer) -> Result<wgpu::SubmissionIndex> {
+        self.counters.add(Count::Submission);
         if let Some(fault) = self.injector.next() {
             self.inject(fault);
             self.check()?;
@@ -265,6 +268,7 @@ impl Device {
     /// # Errors
     /// [`Error::DeviceFailed`], also for failures of earlier work of the call.
     pub(super) fn wait(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        self.counters.add(Count::Wait);
         let polled = contained(|| {
             let timeout = Some(self.patience);
             self.device.poll(wgpu::PollType::Wait { submission_index: submission, timeout })

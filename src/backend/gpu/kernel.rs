@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::buffer::Params;
 use super::cache::PipelineCache;
 use super::compose::{Access, Kernel, Slot};
 use super::device::Device;
+use super::params::Params;
+use super::traffic::Count;
 use crate::error::Result;
 
 /// Changes the text of a kernel before it is compiled.
@@ -60,6 +61,7 @@ impl Pipelines {
         if let Some(pipeline) = built.get(&key) {
             return Ok(Arc::clone(pipeline));
         }
+        device.counters.add(Count::Pipeline);
         let module = self.module(device, kernel, &key.1);
         let cache = self.cache.as_ref().map(PipelineCache::handle);
         let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module, cache));
@@ -79,7 +81,7 @@ impl Pipelines {
         }
         #[allow(unsafe_code, reason = "unchecked modules compile two to five times faster")]
         // SAFETY: columns are tested against `columns` or padded to the stride, steps are bounded
-        // by the length of the schedule or of the plans of the problems, and `plan` and
+        // by the length of the schedule or of the plans of the problems, and `inputs`, `plan` and
         // `mppi_plan` size every buffer for that stride, that length and those problems; workgroup
         // memory has the vectors of the widest layer, and `limits` sizes its buffers for its
         // threads; the cell of a map is bounded by the number of its cells, as an integer; the
@@ -138,6 +140,7 @@ impl Pipeline {
             resource: wgpu::BindingResource::Buffer(buffer(slot)),
         };
         let entries: Vec<_> = self.bindings.iter().map(entry).collect();
+        device.counters.add(Count::Group);
         let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(self.kernel.entry()),
             layout: &self.layout,
@@ -170,18 +173,18 @@ impl Bound {
 /// The layout of one binding.
 fn layout_entry(&(slot, access): &(Slot, Access)) -> wgpu::BindGroupLayoutEntry {
     let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
-    let uniform = access == Access::Uniform;
+    let block = access == Access::Uniform;
     wgpu::BindGroupLayoutEntry {
         binding: slot as u32,
         visibility: wgpu::ShaderStages::COMPUTE,
         ty: wgpu::BindingType::Buffer {
             ty: match access {
-                Access::Uniform => wgpu::BufferBindingType::Uniform,
+                Access::Uniform | Access::Constant => wgpu::BufferBindingType::Uniform,
                 Access::Read => storage(true),
                 Access::ReadWrite => storage(false),
             },
-            has_dynamic_offset: uniform,
-            min_binding_size: uniform.then_some(Params::SIZE),
+            has_dynamic_offset: block,
+            min_binding_size: block.then_some(Params::SIZE),
         },
         count: None,
     }

@@ -2,12 +2,14 @@
 
 use std::time::Instant;
 
-use super::buffer::{Buffer, Params};
+use super::batch::Batch;
+use super::buffer::Buffer;
+use super::call::Call;
 use super::compose::{Kernel, Slot, WORKGROUP, limit_kernel};
 use super::kernel::Bound;
 use super::opened::Opened;
+use super::params::Params;
 use super::plan::MAX_TRIPS;
-use super::run::{Batch, Call};
 use crate::error::{Fault, Result};
 
 /// Multiplications and additions of one round of `shaders/peak.wgsl`: 16 chains of 4 links of 2.
@@ -76,11 +78,11 @@ fn flops(call: &Call<'_>) -> Result<f64> {
 
 /// Whether every chain has all its links.
 fn check_peak(call: &Call<'_>, sink: &Buffer, rounds: u32) -> Result<()> {
-    let sums: Vec<f32> = sink.read(&call.device, PEAK_THREADS as usize)?;
+    let sums: Vec<f32> = sink.read(call.device(), PEAK_THREADS as usize)?;
     let expected = (FIRST_SUM + ROUND_LINKS * u64::from(rounds)) as f32;
     match sums.iter().find(|sum| **sum != expected) {
         None => Ok(()),
-        Some(wrong) => Err(call.device.failed(
+        Some(wrong) => Err(call.device().failed(
             Fault::Validation,
             &format!(
                 "the kernel that measures arithmetic counted {wrong} links instead of {expected}"
@@ -103,7 +105,7 @@ fn copied_bytes(call: &Call<'_>, threads: u32) -> Result<f64> {
     let bytes = VECTOR_BYTES * u64::from(vectors);
     let [source, sink] = [(); 2].map(|()| call.storage(bytes));
     let numbers: Vec<[u32; 4]> = (0..vectors).map(|i| [i, !i, i ^ 1, 0]).collect();
-    source.write(&call.device, &numbers);
+    source.write(call.device(), &numbers);
     let copy = bind(call, Kernel::Copy, [&source, &sink])?;
     let params = Params { rounds: COPY_ROUNDS, stride: threads, ..Params::default() };
     let mut copies = 1;
@@ -114,9 +116,9 @@ fn copied_bytes(call: &Call<'_>, threads: u32) -> Result<f64> {
         }
         let seconds = median_seconds(call, &batch)?;
         if seconds >= LONG_ENOUGH_SECONDS || 4 * copies > DISPATCHES {
-            if sink.read::<[u32; 4]>(&call.device, vectors as usize)? != numbers {
+            if sink.read::<[u32; 4]>(call.device(), vectors as usize)? != numbers {
                 let problem = "a copied buffer differs from its source";
-                return Err(call.device.failed(Fault::Validation, problem));
+                return Err(call.device().failed(Fault::Validation, problem));
             }
             return Ok((2 * bytes * copies) as f64 / seconds);
         }
@@ -147,8 +149,8 @@ fn bind(call: &Call<'_>, kernel: Kernel, [source, sink]: [&Buffer; 2]) -> Result
 fn median_seconds(call: &Call<'_>, batch: &Batch<'_>) -> Result<f64> {
     let run = || {
         let begin = Instant::now();
-        call.submit(batch, None)?;
-        call.device.wait(None)?;
+        call.submit(batch)?;
+        call.device().wait(None)?;
         Ok(begin.elapsed().as_secs_f64())
     };
     run()?;

@@ -1,26 +1,38 @@
 //! The GPU backend: recorded physics spliced into the WGSL kernels, run through wgpu.
 
+mod attempt;
+mod batch;
 mod buffer;
 mod cache;
+mod call;
+mod compiled;
 pub mod compose;
 mod deviation;
 mod device;
-mod drive;
 mod fault;
+mod flight;
+mod inputs;
+mod job;
 mod kernel;
 #[cfg(feature = "train-gpu")]
 mod lent;
 mod limits;
 mod mppi;
+mod mppi_network;
 mod mppi_plan;
 mod network;
 mod opened;
+mod params;
 mod plan;
 mod prepared;
+mod program;
 mod reach_avoid;
+mod readback;
 mod recover;
-mod run;
+mod source;
 mod timing;
+mod traffic;
+mod workspace;
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,22 +42,28 @@ use super::cpu::Cpu;
 use super::{Event, MeasureSink, PairSink};
 use crate::cost::Cost;
 use crate::error::Result;
+use crate::model::{Controller, Model};
 use crate::policy::Policy;
 use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, Plant, ReachAvoidTask};
 use crate::system::System;
 
+use job::Subject;
 use opened::{Opened, Setup};
-use recover::State;
+use recover::{State, Typed};
+use source::{Source, Sources};
+use traffic::Count;
 
-pub use buffer::Params;
+pub(crate) use cache::folder as cache_folder;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
 pub use fault::Injection;
 pub use limits::DeviceLimits;
+pub use params::Params;
 pub use plan::NetworkKernels;
 pub(super) use prepared::Prepared;
 pub use timing::KernelTime;
+pub use traffic::Traffic;
 
 /// An adapter, and what becomes of the work where it fails.
 ///
@@ -58,6 +76,7 @@ pub struct Gpu {
     state: Mutex<State>,
     fallback: Option<Cpu>,
     events: Mutex<Vec<Event>>,
+    sources: Sources,
 }
 
 impl Gpu {
@@ -75,6 +94,7 @@ impl Gpu {
             setup,
             fallback: None,
             events: Mutex::default(),
+            sources: Sources::default(),
         })
     }
 
@@ -117,7 +137,7 @@ impl Gpu {
     #[must_use]
     pub fn with_networks(mut self, networks: NetworkKernels) -> Self {
         self.setup.networks = networks;
-        let opened = Opened { setup: self.setup.clone(), ..self.opened().changed(|device| device) };
+        let opened = self.opened().set_up(self.setup.clone());
         self.with_opened(opened)
     }
 
@@ -141,6 +161,12 @@ impl Gpu {
     #[doc(hidden)]
     pub fn submissions(&self) -> u64 {
         self.opened().device.submissions()
+    }
+
+    /// What calls cost the host so far.
+    #[doc(hidden)]
+    pub fn traffic(&self) -> Traffic {
+        self.opened().device.counters.so_far()
     }
 
     /// The same adapter, opened as `opened`, without any failure so far.
@@ -196,7 +222,9 @@ impl Gpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        recover::reach_avoid(self, plant, task, sink)
+        let source = self.recorded(plant)?;
+        let subject = Subject { source: &source.0, values: &source.1 };
+        recover::reach_avoid(self, (subject, &Typed(plant)), task, sink)
     }
 
     /// See [`super::Backend::deviation`].
@@ -210,7 +238,26 @@ impl Gpu {
         S: System<NX, NU>,
         P: Policy<NX, NU>,
     {
-        recover::deviation(self, plant, task, sink)
+        let source = self.recorded(plant)?;
+        let subject = Subject { source: &source.0, values: &source.1 };
+        recover::deviation(self, (subject, &Typed(plant)), task, sink)
+    }
+
+    /// The source of a plant that is given as Rust types, and the values of its parameters: recorded
+    /// and printed at every call.
+    fn recorded<S, P, const NX: usize, const NU: usize>(
+        &self,
+        plant: Plant<'_, S, P>,
+    ) -> Result<(Arc<Source>, Vec<f32>)>
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        let model = Model::recorded(plant.system);
+        let controller = Controller::recorded(plant.system, plant.policy);
+        self.opened().device.counters.add(Count::Text);
+        let source = Source::new(&model, &controller)?;
+        Ok((self.sources.shared(source), model.values()))
     }
 
     /// See [`super::Backend::mppi`].

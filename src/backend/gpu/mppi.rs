@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 
-use super::buffer::{Buffer, Params};
+use super::attempt::Attempt;
+use super::batch::Batch;
+use super::buffer::Buffer;
+use super::call::Call;
 use super::compose::{Kernel, MppiText, PARTIAL_HEADER, Slot, map_of};
 use super::kernel::Bound;
+use super::mppi_network::Network;
 use super::mppi_plan::{MppiPlan, Size};
-use super::network::Network;
 use super::opened::Opened;
-use super::recover::Attempt;
-use super::run::{Batch, Call};
+use super::params::Params;
 use crate::backend::softmin::Partial;
 use crate::cost::{Cost, CostMap};
 use crate::error::Result;
@@ -64,7 +66,7 @@ where
 }
 
 /// The buffers of a call.
-struct Buffers {
+struct Buffers<'a> {
     streams: Buffer,
     starts: Buffer,
     plans: Buffer,
@@ -75,13 +77,13 @@ struct Buffers {
     carry: Buffer,
     partials: Buffer,
     /// Value network and disturbance network.
-    networks: [Option<Network>; 2],
+    networks: [Option<Network<'a>>; 2],
 }
 
-impl Buffers {
+impl<'a> Buffers<'a> {
     fn new<const NU: usize>(
         call: &Call<'_>,
-        size: &Size<'_>,
+        size: &Size<'a>,
         plan: &MppiPlan,
         noise: &Noise<NU>,
     ) -> Self {
@@ -90,10 +92,10 @@ impl Buffers {
         let horizon = size.horizon as usize;
         let rows = spline_words(noise.shape());
         let spline = call.storage(4 * rows.len() as u64);
-        spline.write(&call.device, &rows);
+        spline.write(call.device(), &rows);
         let colored = matches!(noise.shape(), NoiseShape::Colored { .. });
         let groups = problems * u64::from(groups(plan));
-        let network = |mlp: Option<&Mlp>| mlp.map(|mlp| Network::new(call, mlp, plan.stride));
+        let network = |mlp: Option<&'a Mlp>| mlp.map(|mlp| Network::new(call, mlp, plan.stride));
         Self {
             streams: words(4),
             starts: words(size.states),
@@ -127,7 +129,7 @@ impl Buffers {
             _ => &self.totals,
         };
         let bind = |kernel| call.bind(kernel, text.bindings(kernel), text.compose(kernel), buffer);
-        let layers = |network: &Option<Network>| {
+        let layers = |network: &Option<Network<'a>>| {
             network.as_ref().map_or(Ok(Vec::new()), |network| network.bind(call, &self.state))
         };
         let [value, push] = &self.networks;
@@ -159,7 +161,7 @@ struct Timed<'a> {
 struct Chunks<'a, const NX: usize, const NU: usize, const NC: usize> {
     call: &'a Call<'a>,
     plan: MppiPlan,
-    buffers: &'a Buffers,
+    buffers: &'a Buffers<'a>,
     kernels: Kernels,
     task: &'a MppiTask<'a, NX, NU, NC>,
     /// The costs of the map's cells; none without a map.
@@ -200,7 +202,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
         let plans: Vec<f32> = plans.copied().collect();
         let contexts = problems.iter().flat_map(|problem| problem.context.iter().flatten());
         let contexts: Vec<f32> = self.cells.iter().chain(contexts).copied().collect();
-        let device = &self.call.device;
+        let device = self.call.device();
         self.buffers.streams.write(device, &streams);
         self.buffers.starts.write(device, &starts);
         self.buffers.plans.write(device, &plans);
@@ -230,7 +232,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
             for (network, layers) in self.buffers.networks.iter().zip(&self.kernels.layers) {
                 if let Some(network) = network {
                     let (columns, row) = (params.columns, params.stride);
-                    network.forward(&mut batch.dispatches, layers, columns, row);
+                    network.forward(&mut batch.dispatches, layers, (columns, row));
                 }
             }
             let (kernel, params) = (&self.kernels.rollout, params.over(step, steps));
@@ -242,14 +244,14 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
             let groups = problems * groups(&self.plan);
             batch.dispatches.push(&self.kernels.update, &params.over(step, steps), [groups, 1]);
         }
-        self.call.submit(&batch.dispatches, None)
+        self.call.submit(&batch.dispatches)
     }
 
     /// Submits a batch that has no room for a dispatch of `steps` more steps.
     fn make_room<'a>(&'a self, batch: &mut Timed<'a>, steps: u32) -> Result<()> {
         let full = batch.steps > 0 && batch.steps + steps > self.plan.timely_steps;
         if full || batch.dispatches.len() >= DISPATCHES {
-            self.call.submit(&batch.dispatches, None)?;
+            self.call.submit(&batch.dispatches)?;
             *batch = Timed::default();
         }
         batch.steps += steps;
@@ -262,7 +264,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
         let words = partial_words(settings.horizon, NU);
         let groups = groups(&self.plan) as usize;
         let count = merged.len() * groups * words;
-        let read: Vec<u32> = self.buffers.partials.read(&self.call.device, count)?;
+        let read: Vec<u32> = self.buffers.partials.read(self.call.device(), count)?;
         for ((all, _), problem) in merged.iter_mut().zip(read.chunks(groups * words)) {
             for group in problem.chunks(words) {
                 all.merge(&partial(group), settings.temperature);
@@ -275,7 +277,7 @@ impl<const NX: usize, const NU: usize, const NC: usize> Chunks<'_, NX, NU, NC> {
     fn read_costs(&self, merged: &mut [(Partial<NU>, Vec<f32>)], samples: u32) -> Result<()> {
         let width = self.plan.width as usize;
         let count = merged.len() * width;
-        let read: Vec<f32> = self.buffers.totals.read(&self.call.device, count)?;
+        let read: Vec<f32> = self.buffers.totals.read(self.call.device(), count)?;
         for ((_, costs), problem) in merged.iter_mut().zip(read.chunks(width)) {
             let counts = |cost: f32| cost.is_finite() && cost < HUGE;
             let cost = |&cost: &f32| if counts(cost) { cost } else { f32::INFINITY };

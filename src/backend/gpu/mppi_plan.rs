@@ -1,12 +1,12 @@
 //! How MPPI problems are cut up: samples and problems per chunk, rounds of a workgroup, steps per
 //! dispatch.
 
-use super::compose::{PARTIAL_HEADER, WORKGROUP, tile_steps};
-use super::device::Adapter;
-use super::network::{input_quads, output_quads, parameter_quads};
-use super::plan::{
-    COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS, network_flops,
+use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit};
+use super::compose::{
+    PARTIAL_HEADER, WORKGROUP, input_quads, output_quads, parameter_quads, tile_steps,
 };
+use super::device::Adapter;
+use super::plan::{MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS, network_flops};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 

@@ -1,18 +1,17 @@
 //! The network's parameters as the layer kernel wants them, and its layers' dispatches.
 
-use super::buffer::{Buffer, Params, Use};
-use super::compose::{Kernel, LayerShape, Shape, Slot, TILE_PITCH, TILE_QUADS, WORKGROUP, compose};
+use super::batch::Batch;
+use super::buffer::{Buffer, Pool, Use};
+use super::compose::{
+    Kernel, LayerShape, TILE_PITCH, TILE_QUADS, WORKGROUP, input_quads, output_quads,
+    parameter_quads,
+};
+use super::device::Device;
 use super::kernel::Bound;
-use super::run::{Batch, Call};
+use super::params::Params;
+use super::traffic::Count;
 use crate::error::Result;
 use crate::policy::{Layer, Mlp};
-
-pub(super) use super::compose::{input_quads, output_quads};
-
-/// Vectors that the parameters of all layers take.
-pub(super) fn parameter_quads(mlp: &Mlp) -> usize {
-    LayerShape::of(mlp).last().map_or(0, |layer| layer.end() as usize)
-}
 
 /// Appends biases `[outputs / 4]`, then weights `[inputs / 4, outputs / 4]` in blocks of 4 columns
 /// of 4 neurons, padded with 0: a padded neuron stays 0 under every activation.
@@ -37,56 +36,57 @@ fn pack(layer: &Layer, out: &mut Vec<[f32; 4]>) {
     }
 }
 
-/// The parameters of all layers of `mlp`, on the device.
-pub(super) fn upload(call: &Call<'_>, mlp: &Mlp) -> Buffer {
+/// The parameters of all layers of `mlp`, one after the other.
+fn packed(mlp: &Mlp) -> Vec<[f32; 4]> {
     let mut packed = Vec::with_capacity(parameter_quads(mlp));
     for layer in mlp.layers() {
         pack(layer, &mut packed);
     }
-    call.uploaded(&packed)
+    packed
 }
 
-/// A network on the device, a dispatch per layer.
-pub(super) struct Network {
-    weights: Buffer,
+/// The parameters of all layers of `mlp`, on the device.
+pub(super) fn upload(device: &Device, pool: &Pool, mlp: &Mlp) -> Buffer {
+    device.counters.add(Count::Pack);
+    let packed = packed(mlp);
+    let buffer = pool.take(device, Use::Storage, size_of_val(&packed[..]) as u64);
+    buffer.write(device, &packed);
+    buffer
+}
+
+/// The layers of a network that has a dispatch for each.
+pub(super) struct Layers {
     activations: [Buffer; 2],
-    layers: Vec<LayerShape>,
-    shape: Shape,
+    shapes: Vec<LayerShape>,
 }
 
-impl Network {
-    /// Uploads `mlp`; its activations have `row` columns.
-    pub(super) fn new(call: &Call<'_>, mlp: &Mlp, row: u32) -> Self {
-        let layers = LayerShape::of(mlp);
-        let widest = layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
+impl Layers {
+    /// The layers of `mlp`; its activations have `row` columns.
+    pub(super) fn new(device: &Device, pool: &Pool, mlp: &Mlp, row: u32) -> Self {
+        let shapes = LayerShape::of(mlp);
+        let widest = shapes.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let bytes = 16 * u64::from(widest) * u64::from(row);
-        Self {
-            weights: upload(call, mlp),
-            activations: [(); 2].map(|()| call.pool.take(&call.device, Use::Storage, bytes)),
-            layers,
-            shape: Shape::new(mlp.widths()[0], mlp.widths()[mlp.layers().len()], Some(mlp)),
-        }
+        Self { activations: [(); 2].map(|()| pool.take(device, Use::Storage, bytes)), shapes }
     }
 
     /// Where the last layer leaves its outputs.
     pub(super) fn output(&self) -> &Buffer {
-        &self.activations[(self.layers.len() + 1) % 2]
+        &self.activations[(self.shapes.len() + 1) % 2]
     }
 
-    /// The layers bound to `state` as their input.
-    pub(super) fn bind(&self, call: &Call<'_>, state: &Buffer) -> Result<Vec<Bound>> {
-        let bind = |i: usize| {
-            let last = i + 1 == self.layers.len();
+    /// Each layer, bound by `bind` to its source and its sink; the first reads `input`.
+    pub(super) fn bind(
+        &self,
+        input: &Buffer,
+        bind: impl Fn(Kernel, [&Buffer; 2]) -> Result<Bound>,
+    ) -> Result<Vec<Bound>> {
+        let layer = |i: usize| {
+            let last = i + 1 == self.shapes.len();
             let kernel = if last { Kernel::OutputLayer } else { Kernel::HiddenLayer };
-            let source = if i == 0 { state } else { &self.activations[(i + 1) % 2] };
-            let text = compose(kernel, &self.shape, "");
-            call.bind(kernel, kernel.bindings(false), text, |slot| match slot {
-                Slot::Weights => &self.weights,
-                Slot::Source => source,
-                _ => &self.activations[i % 2],
-            })
+            let source = if i == 0 { input } else { &self.activations[(i + 1) % 2] };
+            bind(kernel, [source, &self.activations[i % 2]])
         };
-        (0..self.layers.len()).map(bind).collect()
+        (0..self.shapes.len()).map(layer).collect()
     }
 
     /// Adds the dispatches of all layers over the first `columns` columns, in rows of `row`.
@@ -94,10 +94,9 @@ impl Network {
         &self,
         batch: &mut Batch<'a>,
         bound: &'a [Bound],
-        columns: u32,
-        row: u32,
+        (columns, row): (u32, u32),
     ) {
-        for (bound, layer) in bound.iter().zip(&self.layers) {
+        for (bound, layer) in bound.iter().zip(&self.shapes) {
             let params = Params {
                 columns,
                 stride: row,
@@ -117,6 +116,7 @@ impl Network {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::gpu::compose::parameter_quads;
     use crate::policy::{Activation, OutputActivation};
 
     #[test]
@@ -127,9 +127,8 @@ mod tests {
             inputs: 5,
             outputs: 3,
         };
-        let mut packed = Vec::new();
-        pack(&layer, &mut packed);
         let mlp = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Tanh).expect("whole");
+        let packed = packed(&mlp);
         assert_eq!(packed.len(), parameter_quads(&mlp));
         assert_eq!(packed[0], [10.0, 20.0, 30.0, 0.0]);
         assert_eq!(packed[1], [0.0; 4], "bias of the padded tile");

@@ -1,8 +1,8 @@
 //! How a batch is cut up: columns per chunk, steps per dispatch, steps per submission.
 
-use super::compose::{Fused, WORKGROUP};
+use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit};
+use super::compose::{Fused, WORKGROUP, input_quads, output_quads, parameter_quads};
 use super::device::{Adapter, AdapterKind};
-use super::network::{input_quads, output_quads, parameter_quads};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 
@@ -12,10 +12,6 @@ use crate::policy::Mlp;
 /// wrong; no other limit is known to be lower.
 pub(super) const MAX_TRIPS: u64 = 60_000;
 
-/// Columns are a multiple of this, so that workgroups are whole.
-pub(super) const COLUMN_UNIT: u64 = WORKGROUP as u64;
-/// Most columns of a chunk under a formula: enough threads for any GPU.
-pub(super) const FORMULA_COLUMNS: u64 = 1 << 18;
 /// Most columns of a chunk under a network, which has a thread per 8 neurons of 8 columns.
 pub(super) const NETWORK_COLUMNS: u64 = 1 << 14;
 /// Most columns of a chunk whose rollouts run a network themselves, a workgroup of at least 64
@@ -27,40 +23,6 @@ const FUSED_COLUMNS: u64 = 1 << 16;
 const FUSED_WIDTH: usize = 128;
 /// Most device memory of one call, bytes.
 pub(super) const MEMORY_BYTES: u64 = 256 << 20;
-
-/// Most operations of one submission, as counted from formulas and networks.
-///
-/// Some systems reset a device after 2 s. This takes half a second at 34 GFLOP/s, which a small
-/// integrated GPU reaches, and on a large one still many times what a submission costs.
-const WORK_FLOPS: u64 = 1 << 34;
-
-/// What a plan may ask of an adapter; halved where the adapter fails at it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Limit {
-    /// Columns of a chunk.
-    pub(super) columns: u64,
-    /// Operations of a submission.
-    pub(super) flops: u64,
-}
-
-impl Default for Limit {
-    fn default() -> Self {
-        Self { columns: FORMULA_COLUMNS, flops: WORK_FLOPS }
-    }
-}
-
-impl Limit {
-    /// Half of it, after a chunk of `columns` columns; `None` if that was the smallest there is.
-    pub(super) fn half(self, columns: u64) -> Option<Self> {
-        let columns = columns / 2 / COLUMN_UNIT * COLUMN_UNIT;
-        (columns > 0).then_some(Self { columns, flops: self.flops / 2 })
-    }
-
-    /// How many pieces of `each` operations a submission takes, at least one.
-    pub(super) fn pieces(self, each: u64) -> u64 {
-        (self.flops / each.max(1)).max(1)
-    }
-}
 
 /// What is asked of the rollouts, as far as it decides the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +47,7 @@ impl Work {
     }
 
     /// Trajectories of a column.
-    fn sides(self) -> u32 {
+    pub(super) fn sides(self) -> u32 {
         if self == Self::Pairs { 2 } else { 1 }
     }
 }
@@ -183,6 +145,9 @@ pub(super) struct Size<'a> {
     pub(super) network: Option<&'a Mlp>,
     /// The same, where they run it themselves.
     pub(super) fused: Option<&'a Fused>,
+    /// Numbers that the network sees, where a kernel of its own evaluates them; 0 where it sees the
+    /// states.
+    pub(super) seen: usize,
     /// Starts or pairs.
     pub(super) count: u64,
 }
@@ -224,11 +189,11 @@ impl Plan {
         work: Work,
         size: &Size<'_>,
     ) -> Result<Self> {
-        let Size { states, network, fused, count, .. } = *size;
+        let Size { states, network, fused, seen, count, .. } = *size;
         let driven = Driven::new(network, fused);
         let segment = work.segment(driven);
         let layered = network.filter(|_| driven == Driven::Layered);
-        let parts = column_bytes(work, states, layered, segment);
+        let parts = column_bytes(work, (states, seen), layered, segment);
         let largest = parts.iter().copied().max().unwrap_or(1);
         let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
         let fitting = (binding / largest).min(MEMORY_BYTES / parts.iter().sum::<u64>());
@@ -260,7 +225,12 @@ impl Plan {
 }
 
 /// Bytes that each buffer holds per column.
-fn column_bytes(work: Work, states: usize, network: Option<&Mlp>, segment: u32) -> Vec<u64> {
+fn column_bytes(
+    work: Work,
+    (states, seen): (usize, usize),
+    network: Option<&Mlp>,
+    segment: u32,
+) -> Vec<u64> {
     let sides = u64::from(work.sides());
     let state = 16 * input_quads(states) as u64 * sides;
     let (folds, origin, measure) = (8 * sides, 4, 4 * sides);
@@ -273,7 +243,7 @@ fn column_bytes(work: Work, states: usize, network: Option<&Mlp>, segment: u32) 
     if let Some(mlp) = network {
         let widths = mlp.layers().iter().map(|layer| output_quads(layer.outputs));
         let widest = 16 * widths.max().unwrap_or(0) as u64 * sides;
-        parts.extend([widest, widest]);
+        parts.extend([widest, widest, 16 * input_quads(seen) as u64 * sides]);
     }
     parts
 }
@@ -302,6 +272,7 @@ fn too_large(adapter: &Adapter, columns: u64, parameters: u64, binding: u64) -> 
 
 #[cfg(test)]
 mod tests {
+    use super::super::attempt::WORK_FLOPS;
     use super::*;
     use crate::policy::{Activation, Layer, OutputActivation};
 
@@ -321,7 +292,7 @@ mod tests {
         (network, fused): (Option<&'a Mlp>, Option<&'a Fused>),
         count: u64,
     ) -> Size<'a> {
-        Size { states, flops: 200, network, fused, count }
+        Size { states, flops: 200, network, fused, seen: 0, count }
     }
 
     fn planned(adapter: &Adapter, work: Work, size: &Size<'_>) -> Result<Plan> {
@@ -341,7 +312,7 @@ mod tests {
                     let plan = planned(&Adapter::made_up(binding), work, &size);
                     let plan = plan.expect("a plan within the limits");
                     let layered = network.filter(|_| fused.is_none());
-                    let bytes = column_bytes(work, 12, layered, plan.segment);
+                    let bytes = column_bytes(work, (12, 0), layered, plan.segment);
                     let stride = u64::from(plan.stride);
                     assert_eq!(stride % COLUMN_UNIT, 0);
                     assert!(bytes.iter().all(|bytes| bytes * stride <= binding));

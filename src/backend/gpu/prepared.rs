@@ -1,35 +1,88 @@
 //! A plant as an adapter runs it.
 
+use std::sync::Arc;
+
 use super::Gpu;
+use super::job::Subject;
+use super::recover::{self, Instead};
+use super::source::Source;
+use super::traffic::Count;
+use crate::backend::cpu::Cpu;
 use crate::backend::{MeasureSink, PairSink};
 use crate::error::{Error, Result};
 use crate::model::Plant;
 use crate::rollout::{DeviationTask, Farthest, ReachAvoidTask};
 
-/// A plant prepared on an adapter.
-pub(in crate::backend) struct Prepared<'a>(&'a Gpu);
+/// A plant prepared on an adapter: printed once, its network's parameters uploaded once, each kernel
+/// compiled when it is first needed. Where the adapter is opened again, so is all of that.
+pub(in crate::backend) struct Prepared<'a> {
+    gpu: &'a Gpu,
+    source: Arc<Source>,
+    /// The values of the model's parameters.
+    values: Vec<f32>,
+    plant: Plant,
+}
 
 impl Gpu {
     /// See [`crate::backend::Backend::prepare`].
-    pub(in crate::backend) fn prepare(&self, _plant: &Plant) -> Result<Prepared<'_>> {
-        Ok(Prepared(self))
+    pub(in crate::backend) fn prepare(&self, plant: &Plant) -> Result<Prepared<'_>> {
+        let opened = self.opened();
+        let printed = || opened.device.counters.add(Count::Text);
+        let source = self.sources.of_plant(plant, printed)?;
+        let flight = opened.flight();
+        let program = opened.program(&flight, &source);
+        match program.map(drop).and_then(|()| flight.device.check()) {
+            // A call will meet it again, and knows what to do.
+            Err(Error::DeviceFailed { .. }) => opened.clear(),
+            Err(Error::Device(_)) if self.fallback.is_some() => {}
+            other => other?,
+        }
+        Ok(Prepared { gpu: self, source, values: plant.model.values(), plant: plant.clone() })
     }
 }
 
 impl Prepared<'_> {
+    /// See [`crate::backend::Program::reach_avoid`].
     pub(in crate::backend) fn reach_avoid(
         &self,
-        _task: &ReachAvoidTask<'_>,
-        _sink: MeasureSink<'_>,
+        task: &ReachAvoidTask<'_>,
+        sink: MeasureSink<'_>,
     ) -> Result<()> {
-        Err(Error::Device(format!("to come: {:?}", self.0)))
+        recover::reach_avoid(self.gpu, (self.subject(), &self.plant), task, sink)
     }
 
+    /// See [`crate::backend::Program::deviation`].
     pub(in crate::backend) fn deviation(
         &self,
-        _task: &DeviationTask<'_>,
-        _sink: PairSink<'_>,
+        task: &DeviationTask<'_>,
+        sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
-        Err(Error::Device(format!("to come: {:?}", self.0)))
+        recover::deviation(self.gpu, (self.subject(), &self.plant), task, sink)
+    }
+
+    /// What calls roll out.
+    fn subject(&self) -> Subject<'_> {
+        Subject { source: &self.source, values: &self.values }
+    }
+}
+
+/// A CPU prepares the plant when it takes over, once per call that it takes over.
+impl Instead for Plant {
+    fn reach_avoid(
+        &self,
+        cpu: &Cpu,
+        task: &ReachAvoidTask<'_>,
+        sink: MeasureSink<'_>,
+    ) -> Result<()> {
+        cpu.prepare(self)?.reach_avoid(cpu, task, sink)
+    }
+
+    fn deviation(
+        &self,
+        cpu: &Cpu,
+        task: &DeviationTask<'_>,
+        sink: PairSink<'_>,
+    ) -> Result<Vec<Farthest>> {
+        cpu.prepare(self)?.deviation(cpu, task, sink)
     }
 }

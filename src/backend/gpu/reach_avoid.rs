@@ -1,192 +1,119 @@
 //! Reach-avoid measures on the device: chunks of trajectories, compacted where only signs count.
 
-use super::buffer::{Buffer, Params};
+use std::ops::Range;
+
+use super::attempt::Attempt;
+use super::batch::Batch;
 use super::compose::{Kernel, Slot};
-use super::drive::Drive;
-use super::kernel::Bound;
+use super::job::{Job, Request, Subject};
 use super::opened::Opened;
-use super::plan::Work;
-use super::recover::Attempt;
-use super::run::{Batch, Job, check_starts, region_vectors, schedule, start_params};
+use super::params::Params;
+use super::plan::{Plan, Work};
+use super::workspace::{Buffers, Kernels, MEASURES_AT, Workspace};
 use crate::backend::MeasureSink;
 use crate::error::Result;
-use crate::policy::{Mlp, Policy};
-use crate::rollout::{Plant, Query, ReachAvoidTask};
-use crate::system::System;
+use crate::rollout::{Query, ReachAvoidTask};
 
-/// See [`crate::backend::Backend::reach_avoid`].
-pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
+/// Bytes of the number of survivors.
+const SURVIVORS_BYTES: u64 = 4;
+
+/// See [`crate::backend::Program::reach_avoid`].
+pub(super) fn reach_avoid(
     adapter: (&Opened, &Attempt),
-    plant: Plant<'_, S, P>,
+    subject: Subject<'_>,
     task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<()> {
     let count = task.range.end.saturating_sub(task.range.start);
     if count == 0 {
         return Ok(());
     }
-    check_starts(&task.starts)?;
-    let work = match task.query {
-        Query::Measure => Work::Measure,
-        Query::Sign => Work::Sign,
+    let (work, sign_only) = match task.query {
+        Query::Measure => (Work::Measure, 0),
+        Query::Sign => (Work::Sign, 1),
     };
-    let job = Job::new(adapter, plant, work, count)?;
-    let buffers = Buffers::new(&job, plant.policy.network(), task)?;
-    let chunks = Chunks {
-        kernels: [buffers.bind(&job, 0)?, buffers.bind(&job, 1)?],
-        job: &job,
-        buffers: &buffers,
-        params: Params {
-            stride: job.plan.stride,
-            sign_only: u32::from(work == Work::Sign),
-            ..start_params(&task.starts, &task.spec)
-        },
-    };
+    let (starts, spec, tightening) = (&task.starts, &task.spec, task.tightening);
+    let mut job = Job::new(adapter, subject, Request { work, starts, spec, tightening, count })?;
+    let stride = job.plan.stride;
+    let params = Params { stride, sign_only, ..Params::of_starts(starts, spec) };
     let mut first = task.range.start;
     while first < task.range.end {
-        let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
-        job.upload_starts(&task.starts, first, columns, &buffers.sets[0].state);
-        chunks.run(first, columns)?;
-        let values: Vec<f32> = buffers.measures.read(&job.call.device, columns as usize)?;
+        let columns = (task.range.end - first).min(u64::from(stride)) as u32;
+        job.space.inputs.set_starts(starts, first, columns);
+        let values = roll(&mut job, params.at(first, columns))?;
         sink(first, &values)?;
         first += u64::from(columns);
     }
+    job.finish();
     Ok(())
 }
 
-/// The buffers of a call.
-struct Buffers {
-    schedule: Buffer,
-    region: Buffer,
-    measures: Buffer,
-    survivors: Buffer,
-    sets: [Columns; 2],
-    drive: Drive,
-}
-
-impl Buffers {
-    fn new(job: &Job<'_>, network: Option<&Mlp>, task: &ReachAvoidTask<'_>) -> Result<Self> {
-        Ok(Self {
-            schedule: job.call.uploaded(&schedule(&task.spec, task.tightening)?),
-            region: job.call.uploaded(&region_vectors(&task.starts)),
-            measures: job.call.storage(4 * u64::from(job.plan.stride)),
-            survivors: job.call.storage(4),
-            sets: [Columns::new(job, task.starts.size()), Columns::new(job, task.starts.size())],
-            drive: Drive::new(job, network),
-        })
-    }
-
-    /// The kernels on the set `from`, which compact into the other one.
-    fn bind(&self, job: &Job<'_>, from: usize) -> Result<Kernels> {
-        let (set, kept) = (&self.sets[from], &self.sets[1 - from]);
-        let buffer = |slot| match slot {
-            Slot::Region => &self.region,
-            Slot::Schedule => &self.schedule,
-            Slot::State => &set.state,
-            Slot::Folds => &set.folds,
-            Slot::Origin => &set.origin,
-            Slot::KeptState => &kept.state,
-            Slot::KeptFolds => &kept.folds,
-            Slot::KeptOrigin => &kept.origin,
-            Slot::Survivors => &self.survivors,
-            Slot::Control | Slot::Weights => self.drive.source().unwrap_or(&self.measures),
-            _ => &self.measures,
+/// Rolls out the starts of `params`, until the horizon or until all are decided: their values.
+fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
+    let measures = 4 * u64::from(params.columns);
+    let Job { flight, plan, space, .. } = job;
+    let Workspace { inputs, readback, buffers, kernels, .. } = space;
+    let mut batch = Batch::default();
+    batch.push_columns(Kernel::Sample, &kernels[0].sample, &params);
+    let (mut step, mut set) = (0, 0);
+    loop {
+        let end = params.horizon.saturating_add(1).min(step + plan.segment);
+        segment(&mut batch, (&kernels[set], &*buffers), *plan, (params, step..end));
+        step = end;
+        let last = step > params.horizon;
+        let compacted = kernels[set].after.as_ref().filter(|_| !last);
+        if let Some(compact) = compacted {
+            batch.push_columns(Kernel::Compact, compact, &params);
+        }
+        inputs.write(&flight.device, &batch);
+        let clear = |encoder: &mut _| {
+            if compacted.is_some() {
+                buffers.of(Slot::Survivors).clear(encoder);
+            }
         };
-        Ok(Kernels {
-            sample: job.bind(Kernel::Sample, buffer)?,
-            rollout: job.bind(Kernel::ReachAvoid, buffer)?,
-            compact: job.bind(Kernel::Compact, buffer)?,
-            layers: self.drive.bind(job, &set.state)?,
-        })
-    }
-}
-
-/// One of the two sets of buffers that compaction moves trajectories between.
-struct Columns {
-    state: Buffer,
-    folds: Buffer,
-    origin: Buffer,
-}
-
-impl Columns {
-    fn new(job: &Job<'_>, states: usize) -> Self {
-        let stride = u64::from(job.plan.stride);
-        Self {
-            state: job.call.storage(16 * states.div_ceil(4) as u64 * stride),
-            folds: job.call.storage(8 * stride),
-            origin: job.call.storage(4 * stride),
-        }
-    }
-}
-
-/// The kernels bound to one set of buffers.
-struct Kernels {
-    sample: Bound,
-    rollout: Bound,
-    compact: Bound,
-    layers: Vec<Bound>,
-}
-
-/// What the chunks of a call share.
-struct Chunks<'a> {
-    job: &'a Job<'a>,
-    buffers: &'a Buffers,
-    kernels: [Kernels; 2],
-    params: Params,
-}
-
-impl Chunks<'_> {
-    /// Rolls out the starts `first..first + columns`, until the horizon or until all are decided.
-    fn run(&self, first: u64, columns: u32) -> Result<()> {
-        let plan = self.job.plan;
-        let mut params = self.params.at(first, columns);
-        let mut batch = Batch::default();
-        batch.push_columns(Kernel::Sample, &self.kernels[0].sample, &params);
-        let (mut step, mut set) = (0, 0);
-        while step <= params.horizon {
-            let end = params.horizon.saturating_add(1).min(step + plan.segment);
-            self.segment(&mut batch, set, params, step..end);
-            step = end;
-            if params.sign_only == 0 || step > params.horizon {
-                self.job.call.submit(&batch, None)?;
-            } else {
-                let compact = &self.kernels[set].compact;
-                batch.push_columns(Kernel::Compact, compact, &params);
-                self.job.call.submit(&batch, Some(&self.buffers.survivors))?;
-                params.columns = self.buffers.survivors.read::<u32>(&self.job.call.device, 1)?[0];
-                set = 1 - set;
-                if params.columns == 0 {
-                    break;
-                }
+        // Measures come along with the number of survivors: there may be none.
+        let copy = |encoder: &mut _| {
+            if compacted.is_some() {
+                readback.copy(encoder, buffers.of(Slot::Survivors), (0, SURVIVORS_BYTES));
             }
-            batch = Batch::default();
-        }
-        Ok(())
-    }
-
-    /// Adds the dispatches of some steps.
-    fn segment<'a>(
-        &'a self,
-        batch: &mut Batch<'a>,
-        set: usize,
-        params: Params,
-        steps: std::ops::Range<u32>,
-    ) {
-        let kernels = &self.kernels[set];
-        let mut step = steps.start;
-        while step < steps.end {
-            let count = self.job.plan.steps.min(steps.end - step);
-            if step < params.horizon {
-                let drive = &self.buffers.drive;
-                drive.forward(batch, &kernels.layers, params.columns, params.stride);
+            if compacted.is_some() || last {
+                readback.copy(encoder, buffers.of(Slot::Measures), (MEASURES_AT, measures));
             }
-            let params = params.over(step, count);
-            batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params);
-            step += count;
+        };
+        flight.submit(&batch, clear, copy)?;
+        batch = Batch::default();
+        if compacted.is_none() && !last {
+            continue;
         }
+        let decided = compacted.is_some();
+        let found = readback.read(flight, MEASURES_AT + measures, |bytes| {
+            let (head, tail) = bytes.split_at(MEASURES_AT as usize);
+            let survivors = if decided { bytemuck::pod_read_unaligned(&head[..4]) } else { 0 };
+            let done = survivors == 0;
+            (survivors, done.then(|| bytemuck::pod_collect_to_vec(tail)))
+        })?;
+        match found {
+            (_, Some(values)) => return Ok(values),
+            (survivors, None) => params.columns = survivors,
+        }
+        set = 1 - set;
+    }
+}
+
+/// Adds the dispatches of some steps.
+fn segment<'a>(
+    batch: &mut Batch<'a>,
+    (kernels, buffers): (&'a Kernels, &Buffers),
+    plan: Plan,
+    (params, steps): (Params, Range<u32>),
+) {
+    let mut step = steps.start;
+    while step < steps.end {
+        let count = plan.steps.min(steps.end - step);
+        if step < params.horizon {
+            kernels.drive(batch, buffers, (params.columns, params.stride), step);
+        }
+        batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params.over(step, count));
+        step += count;
     }
 }

@@ -6,8 +6,9 @@
 use std::cell::Cell;
 use std::sync::{Arc, MutexGuard, PoisonError};
 
+use super::attempt::{Attempt, Limit};
+use super::job::Subject;
 use super::opened::Opened;
-use super::plan::Limit;
 use super::{Gpu, deviation, mppi, reach_avoid};
 use crate::backend::cpu::Cpu;
 use crate::backend::{Action, Event, MeasureSink, PairSink};
@@ -39,14 +40,6 @@ impl State {
     }
 }
 
-/// An attempt at the rest of a call on an adapter.
-pub(super) struct Attempt {
-    /// What the plan may ask of the adapter.
-    pub(super) limit: Limit,
-    /// Columns of a chunk, once they are planned.
-    pub(super) columns: Cell<u64>,
-}
-
 /// Who makes an attempt.
 enum Runner<'a> {
     Adapter(&'a Opened, &'a Attempt),
@@ -71,41 +64,79 @@ impl Progress {
     }
 }
 
-/// See [`crate::backend::Backend::reach_avoid`].
-pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
-    gpu: &Gpu,
-    plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_>,
-    sink: MeasureSink<'_>,
-) -> Result<()>
+/// The CPU's part of a call, for where the adapter fails for good.
+pub(super) trait Instead {
+    /// See [`crate::backend::Program::reach_avoid`].
+    fn reach_avoid(
+        &self,
+        cpu: &Cpu,
+        task: &ReachAvoidTask<'_>,
+        sink: MeasureSink<'_>,
+    ) -> Result<()>;
+
+    /// See [`crate::backend::Program::deviation`].
+    fn deviation(
+        &self,
+        cpu: &Cpu,
+        task: &DeviationTask<'_>,
+        sink: PairSink<'_>,
+    ) -> Result<Vec<Farthest>>;
+}
+
+impl<S, P, const NX: usize, const NU: usize> Instead for Typed<'_, S, P, NX, NU>
 where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
+    fn reach_avoid(
+        &self,
+        cpu: &Cpu,
+        task: &ReachAvoidTask<'_>,
+        sink: MeasureSink<'_>,
+    ) -> Result<()> {
+        cpu.reach_avoid(self.0, task, sink)
+    }
+
+    fn deviation(
+        &self,
+        cpu: &Cpu,
+        task: &DeviationTask<'_>,
+        sink: PairSink<'_>,
+    ) -> Result<Vec<Farthest>> {
+        cpu.deviation(self.0, task, sink)
+    }
+}
+
+/// A system and its policy as Rust types.
+pub(super) struct Typed<'a, S, P, const NX: usize, const NU: usize>(pub(super) Plant<'a, S, P>);
+
+/// See [`crate::backend::Program::reach_avoid`].
+pub(super) fn reach_avoid(
+    gpu: &Gpu,
+    (subject, instead): (Subject<'_>, &dyn Instead),
+    task: &ReachAvoidTask<'_>,
+    sink: MeasureSink<'_>,
+) -> Result<()> {
     gpu.persevere("starts", task.range.start, |runner, progress| {
         let task = ReachAvoidTask { range: progress.next.get()..task.range.end, ..task.clone() };
         let sink: MeasureSink<'_> =
             &mut |first, values| progress.deliver(values.len(), || sink(first, values));
         match runner {
             Runner::Adapter(opened, attempt) => {
-                reach_avoid::reach_avoid((opened, attempt), plant, &task, sink)
+                reach_avoid::reach_avoid((opened, attempt), subject, &task, sink)
             }
-            Runner::Cpu(cpu) => cpu.reach_avoid(plant, &task, sink),
+            Runner::Cpu(cpu) => instead.reach_avoid(cpu, &task, sink),
         }
     })
 }
 
-/// See [`crate::backend::Backend::deviation`].
-pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
+/// See [`crate::backend::Program::deviation`].
+pub(super) fn deviation(
     gpu: &Gpu,
-    plant: Plant<'_, S, P>,
+    (subject, instead): (Subject<'_>, &dyn Instead),
     task: &DeviationTask<'_>,
     sink: PairSink<'_>,
-) -> Result<Vec<Farthest>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> Result<Vec<Farthest>> {
     let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
     gpu.persevere("pairs", task.range.start, |runner, progress| {
         let task = DeviationTask { range: progress.next.get()..task.range.end, ..task.clone() };
@@ -114,10 +145,10 @@ where
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                deviation::deviation((opened, attempt), plant, &task, (&mut farthest, sink))
+                deviation::deviation((opened, attempt), subject, &task, (&mut farthest, sink))
             }
             Runner::Cpu(cpu) => {
-                let rest = cpu.deviation(plant, &task, sink)?;
+                let rest = instead.deviation(cpu, &task, sink)?;
                 let steps = farthest.iter_mut().zip(rest);
                 steps.for_each(|(farthest, found)| *farthest = farthest.merge(found));
                 Ok(())
@@ -173,7 +204,7 @@ impl Gpu {
             if let Some(cpu) = self.fallback.as_ref().filter(|_| on_cpu) {
                 return run(Runner::Cpu(cpu), &progress);
             }
-            let attempt = Attempt { limit, columns: Cell::new(limit.columns) };
+            let attempt = Attempt::new(limit);
             match run(Runner::Adapter(&opened, &attempt), &progress) {
                 Err(error) if !progress.refused.get() => {
                     let (fault, problem) = self.survivable(error)?;
@@ -214,7 +245,7 @@ impl Gpu {
         if let (Fault::OutOfMemory | Fault::Timeout, Some(limit)) = (fault, smaller) {
             state.limit = limit;
             // Buffers that were made without memory are of no use, the others are in the way.
-            failed.pool.clear();
+            failed.clear();
             return Some(Action::SmallerChunks(limit.columns));
         }
         if fault == Fault::Lost && !state.reopened {

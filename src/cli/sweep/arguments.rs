@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use crate::cli::options::{Changes, Replace};
+
 /// What `sweep` is asked for.
 #[derive(Args, Clone, Debug)]
 pub(in crate::cli) struct SweepArguments {
@@ -18,10 +20,17 @@ pub(in crate::cli) struct SweepArguments {
     /// Steps of a plan (races), or of a rollout (certificates)
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub(in crate::cli) horizon: Option<String>,
+    /// Folder of the results [default: reachcast-sweep]
+    #[arg(long, value_name = "DIR")]
+    pub(in crate::cli) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(in crate::cli) replace: Replace,
     #[command(flatten, next_help_heading = "Races")]
     pub(in crate::cli) race: RaceAxes,
     #[command(flatten, next_help_heading = "Certificates")]
     pub(in crate::cli) certificate: CertificateAxes,
+    #[command(flatten, next_help_heading = "Configuration")]
+    pub(in crate::cli) changes: Changes,
 }
 
 /// What the points of a sweep are.

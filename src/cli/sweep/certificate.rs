@@ -5,13 +5,15 @@ use std::path::Path;
 use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::Backend;
-use crate::cli::args::Global;
 use crate::cli::folder_of;
+use crate::cli::inputs::inputs;
+use crate::cli::options::Global;
 use crate::cli::progress::Progress;
 use crate::config::{Config, Overrides, PolicySource};
 use crate::error::{Error, Result};
 use crate::experiment::sweep::record::PointResult;
 use crate::experiment::sweep::{Store, certificate_point, certificate_sha256, certificate_sweep};
+use crate::files::Existing;
 use crate::model::Plant;
 use crate::scenario::bound::CountRule;
 use crate::scenario::check_settings;
@@ -40,6 +42,7 @@ pub(super) fn run(
     let axes = (grid.records(), points.len() as u64);
     let base = Config::load(&asked.config, &sweep.base)?;
     let policy = base.policy_source(folder_of(&asked.config))?;
+    inputs(&asked.config, &policy, []).spare_folder(out)?;
     let plant = base.plant(&policy)?;
     let program = backend.prepare(&plant)?;
     let record = certificate_sweep(&program, base.seed, base.to_json()?, axes);
@@ -49,6 +52,9 @@ pub(super) fn run(
         "schema": record.schema,
         "provenance": record.provenance,
     });
+    if global.existing == Existing::Replaced {
+        Store::make_way(out, &identity, &record)?;
+    }
     let mut store = Store::open(out, &identity, record)?;
     for (values, sha256) in points.into_iter().zip(hashes) {
         store.point(sha256, values.clone(), || {
@@ -66,7 +72,7 @@ impl Sweep<'_> {
             Some("exact") => Some(CountRule::Exact),
             _ => Some(CountRule::Simple),
         };
-        let overrides = self.grid.overrides(&self.base, values, None)?;
+        let mut overrides = self.grid.overrides(&self.base, values, None)?;
         let sets = |assignment: &&String| {
             COUNTS.contains(&assignment.split('=').next().unwrap_or_default().trim())
         };
@@ -75,10 +81,26 @@ impl Sweep<'_> {
                            to set them";
             return Err(Error::invalid(set.as_str(), problem));
         }
+        if rule.is_none() {
+            self.keep_counts(&mut overrides)?;
+        }
         let config = Config::load(self.config, &overrides);
         let config = config.map_err(|error| self.grid.blamed(error, values))?;
         let policy = config.policy_source(folder_of(self.config))?;
         Ok((config, policy, rule))
+    }
+
+    /// Sets the counts of the configuration, which would follow from what the axes ask for, unless
+    /// `overrides` set them.
+    fn keep_counts(&self, overrides: &mut Overrides) -> Result<()> {
+        let base = Config::load(self.config, &self.base)?;
+        let counts = [base.deviation.scenarios, base.growth.scenarios];
+        for (key, count) in COUNTS.iter().zip(counts) {
+            if !overrides.set.iter().any(|set| set.trim_start().starts_with(key)) {
+                overrides.set.push(format!("{key}={count}"));
+            }
+        }
+        Ok(())
     }
 
     /// SHA-256 of a point that can be certified.

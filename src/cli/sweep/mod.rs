@@ -7,12 +7,11 @@ mod grid;
 mod race;
 mod text;
 
-use std::path::PathBuf;
-
-use super::args::Global;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::error::Result;
+use crate::experiment::sweep::record::{PointRecord, PointResult, SweepRecord};
 use crate::report::sweep_html;
 use arguments::Of;
 
@@ -21,10 +20,19 @@ pub(super) use arguments::SweepArguments;
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-sweep";
 
+/// Whether every certificate holds; races claim nothing.
+fn outcome(record: &SweepRecord) -> Outcome {
+    let fails = |point: &PointRecord| match &point.result {
+        PointResult::Race(_) => false,
+        PointResult::Certificate(certificate) => !certificate.holds,
+    };
+    if record.points.iter().any(fails) { Outcome::NotObtained } else { Outcome::Done }
+}
+
 /// Runs the points that are not stored yet and writes the tables and the page of all.
 pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
     let grid = axes::grid(asked)?;
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let out = global.folder(DEFAULT_OUT);
     let progress = Progress::new(global);
     let backend = devices::open(global)?;
     let work = (&backend, &progress, out.as_path());
@@ -36,5 +44,5 @@ pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
     devices::note_events(global, &backend);
     let files = store.finish(sweep_html)?;
     report(global, store.record(), || text::text(store.record(), &files))?;
-    Ok(Outcome::Done)
+    Ok(outcome(store.record()))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::{Backend, Program};
-use crate::cli::args::Global;
+use crate::cli::options::Global;
 use crate::cli::progress::Progress;
 use crate::cli::race_input::{RaceInput, name, noise_seeds};
 use crate::config::Overrides;
@@ -14,6 +14,7 @@ use crate::experiment::controller::Name;
 use crate::experiment::run::Experiment;
 use crate::experiment::sweep::Store;
 use crate::experiment::sweep::record::PointResult;
+use crate::files::Existing;
 use crate::scenario::Watch;
 
 /// What every point has.
@@ -38,6 +39,7 @@ pub(super) fn run(
     let base = global.overrides();
     let input = RaceInput::load(&asked.config, &base)?;
     let (starts, source) = input.starts(asked.race.starts.as_deref())?;
+    input.inputs(&asked.config, asked.race.starts.as_deref()).spare_folder(out)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.race.noise_seeds.unwrap_or(1))?;
     let config = asked.config.as_path();
     let sweep = Sweep { config, base, grid, backend, out, starts, source, noise_seeds };
@@ -49,7 +51,11 @@ pub(super) fn run(
     let program = backend.prepare(&plant)?;
     let shared = sweep.experiment(&input, &program)?;
     let record = shared.sweep(grid.records(), points.len() as u64);
-    let mut store = Store::open(out, &shared.sweep_identity(), record)?;
+    let identity = shared.sweep_identity();
+    if global.existing == Existing::Replaced {
+        Store::make_way(out, &identity, &record)?;
+    }
+    let mut store = Store::open(out, &identity, record)?;
     let total = points.len();
     for (i, (values, sha256)) in points.into_iter().zip(hashes).enumerate() {
         let label = grid.label(i, total, &values);

@@ -19,7 +19,24 @@ pub(super) fn text(record: &SweepRecord, files: &[PathBuf]) -> String {
         text += &(cells.collect::<Vec<_>>().join("  ") + "\n");
     }
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    text += legend(record);
+    text.extend(record.notes.iter().map(|note| format!("note: {note}\n")));
     text + "\nfiles  " + &names.join("\n       ") + "\n"
+}
+
+/// What the columns are.
+fn legend(record: &SweepRecord) -> &'static str {
+    match record.starts {
+        Some(_) => {
+            "effective: mean of 1 / sum w^2 over the plans, from 1 to K; best cost: mean of the smallest \
+             of a plan's samples; median, p95, p99: ms of a control step of one race that flies alone\n"
+        }
+        None => {
+            "N: pairs of the deviation bound; certified share: interval of the certified set's share of \
+             the box; growth, radius: what came of the ball around a boundary point; holds: whether \
+             every claim that was asked for was obtained\n"
+        }
+    }
 }
 
 /// What every point shares.

@@ -5,20 +5,27 @@ mod work;
 
 use std::path::Path;
 
-use super::args::Global;
+use super::options::Global;
 use super::{Outcome, folder_of};
 use crate::config::Config;
 use crate::error::Result;
+use crate::files::Inputs;
 use crate::train::settings::Method;
 
+/// Where the results go unless `--out` says otherwise.
+const DEFAULT_OUT: &str = "reachcast-train";
+
 /// Trains what the configuration asks for.
-pub(super) fn run(global: &Global, config: &Path, method: Option<Method>) -> Result<Outcome> {
-    let folder = folder_of(config);
-    let mut config = Config::load(config, &global.overrides())?;
+pub(super) fn run(global: &Global, path: &Path, method: Option<Method>) -> Result<Outcome> {
+    let folder = folder_of(path);
+    let mut config = Config::load(path, &global.overrides())?;
     if let (Some(method), Some(train)) = (method, &mut config.train) {
         train.method = method;
     }
     config.train_settings()?;
+    let policy = config.policy.file.as_ref().map(|file| folder.join(file));
+    let read = std::iter::once(path.to_owned()).chain(policy);
+    Inputs::new(read).spare_folder(&global.folder(DEFAULT_OUT))?;
     #[cfg(feature = "train")]
     return work::run(global, &config, folder);
     #[cfg(not(feature = "train"))]

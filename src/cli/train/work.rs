@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::backend::Backend;
-use crate::cli::args::{BackendName, Global};
+use crate::cli::options::{BackendName, Global};
 use crate::cli::progress::Progress;
+use crate::cli::train::DEFAULT_OUT;
 use crate::cli::{Outcome, devices, report};
 use crate::config::{Config, Job, SystemJob};
 use crate::error::Result;
-use crate::files::{Staged, json};
+use crate::files::{Existing, Staged, json};
 use crate::policy::{Activation, OutputActivation, Policy};
 use crate::report::train_html;
 use crate::rollout::{Plant, Purpose, Stream};
@@ -27,9 +28,6 @@ use crate::train::samples::Source;
 use crate::train::settings::{Method, TrainSettings};
 use crate::train::value::{Lesson, Value};
 
-/// Where the results go unless `--out` says otherwise.
-const DEFAULT_OUT: &str = "reachcast-train";
-
 /// Bytes that a training frees and takes at every iteration, and no more than glibc heeds.
 const KEPT: usize = 24 << 20;
 
@@ -37,12 +35,14 @@ const KEPT: usize = 24 << 20;
 pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Outcome> {
     let begun = Instant::now();
     keep_memory();
-    let out = global.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT));
+    let out = global.folder(DEFAULT_OUT);
     let (backend, progress) = (opened(global)?, Progress::new(global));
     let device = Device::of(&backend)?;
     let settings = config.train_settings()?;
+    let existing = global.existing;
+    let (backend_used, watch) = (&backend, &progress);
     let training =
-        Training { config, settings, backend: &backend, device, watch: &progress, out: &out };
+        Training { config, settings, backend: backend_used, device, watch, out: &out, existing };
     let mut trained = match settings.method {
         Method::Analytic | Method::Ddpg | Method::Ppo => config.with_system(training)?,
         Method::Value | Method::ActionValue => {
@@ -60,7 +60,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
 
 /// The backend that the flags ask for; of a program without tensors on adapters, `auto` is the CPU.
 fn opened(global: &Global) -> Result<Backend> {
-    let unasked = global.backend == BackendName::Auto && global.device.is_none();
+    let unasked = global.common.backend == BackendName::Auto && global.common.device.is_none();
     match unasked && cfg!(not(feature = "train-gpu")) {
         true => devices::cpu(global).map(Backend::Cpu),
         false => devices::open(global),
@@ -81,6 +81,7 @@ struct Training<'a> {
     device: Device,
     watch: &'a Progress,
     out: &'a Path,
+    existing: Existing,
 }
 
 impl Training<'_> {
@@ -113,6 +114,9 @@ impl Training<'_> {
         let origin = Origin { method: self.settings.method, provenance };
         let TrainSettings { interval, patience, .. } = *self.settings;
         let run = Run { folder: self.out, origin, total, interval, patience };
+        if self.existing == Existing::Replaced {
+            run.make_way()?;
+        }
         self.device.contained(|| run.train(learner, self.watch))
     }
 }

@@ -81,13 +81,13 @@ fn recovery_steers_to_ball_then_cell_then_gate() {
     let x = at(0.7, -1.55, 0.0, 0.6);
     let cells = slice_through(&course.certificates, &x);
     let ball = |verified| {
-        let varies = course.certificates.growth.varies;
-        let ball = Ball { center: at(0.2, -1.55, 0.0, 0.6), radius: 0.3, varies };
+        let varies = course.certificates.growth.varies.clone();
+        let ball = Ball { center: at(0.2, -1.55, 0.0, 0.6).to_vec(), radius: 0.3, varies };
         LocalGrowth { ball, verified, rounds: 2, f64_reruns: 0 }
     };
     let [verified, failed] = [true, false].map(ball);
     // Two certified cells; by hand, the nearer is at x = 0.5, y = -1.2 or what is left of it.
-    let marked = |x: &[f32; 12]| {
+    let marked = |x: &[f32]| {
         let near = |a: f32, b: f32| (a - b).abs() < 1e-3;
         (near(x[0], 0.5) && near(x[2], -1.2)) || (near(x[0], -0.9) && near(x[2], -1.6))
     };
@@ -102,7 +102,7 @@ fn recovery_steers_to_ball_then_cell_then_gate() {
     };
     let none = vec![false; cells.len()];
     let planned = [x, at(0.11, -0.7, 0.0, 0.6)];
-    let close = |hybrid: &Hybrid<'_>, standing: &Standing<12>, expected: [f32; 3]| {
+    let close = |hybrid: &Hybrid<'_>, standing: &Standing, expected: [f32; 3]| {
         let point = hybrid.recovery_point(&x, standing, &planned);
         let off = point.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(off < 1e-5, "{point:?}, expected {expected:?}");
@@ -233,7 +233,7 @@ fn tier_two_is_inside_a_verified_ball() {
             assert_ne!(decision.tier, Some(Tier::Local));
             continue;
         };
-        let center = growth.ball.center;
+        let center = &growth.ball.center;
         let distance = f64::from(x[0] - center[0]).hypot(f64::from(x[2] - center[2]));
         // Rounding aside, which no state of these needs.
         let within = growth.verified && distance <= f64::from(growth.ball.radius);

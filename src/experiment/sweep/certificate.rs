@@ -25,6 +25,7 @@ pub fn certificate_sweep(
         axes,
         total,
         points: Vec::new(),
+        notes: Vec::new(),
     }
 }
 

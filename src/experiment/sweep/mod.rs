@@ -1,6 +1,7 @@
 //! Sweeps: a grid of settings, raced or certified point by point.
 
 mod certificate;
+mod notes;
 mod race;
 pub mod record;
 mod store;

@@ -30,6 +30,7 @@ impl Experiment<'_> {
             axes,
             total,
             points: Vec::new(),
+            notes: Vec::new(),
         }
     }
 

@@ -31,6 +31,9 @@ pub struct SweepRecord {
     pub total: u64,
     /// The points that are done, in the order of the grid.
     pub points: Vec<PointRecord>,
+    /// What has to be said beside the figures.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 impl SweepRecord {

@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::notes::notes;
 use super::record::{PointRecord, PointResult, SweepRecord};
 use super::table::table;
 use crate::backend::Event;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, claim_folder, json};
+use crate::files::{Staged, claim_folder, json, make_way};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);
@@ -48,13 +49,23 @@ impl Store {
     /// [`Error::File`] if the folder holds another experiment, [`Error::Write`] if it cannot be
     /// written to, [`Error::NoRoom`] if its disk is too full.
     pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
-        let axes: Vec<&str> = record.axes.iter().map(|axis| axis.name.as_str()).collect();
-        let manifest = serde_json::json!({ "axes": axes, "shared": identity });
         let need = record.total * POINT_BYTES + PAGE_BYTES;
-        claim_folder(folder, &format!("{manifest:#}\n"), need)?;
+        claim_folder(folder, &manifest(identity, &record), need)?;
         Staged::within(folder, POINTS)?;
         let folder = folder.to_owned();
         Ok(Self { folder, record, written: None })
+    }
+
+    /// Removes the results of other work than this sweep from `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if they cannot be removed.
+    pub fn make_way(
+        folder: &Path,
+        identity: &serde_json::Value,
+        record: &SweepRecord,
+    ) -> Result<()> {
+        make_way(folder, &manifest(identity, record))
     }
 
     /// Adds the point with the values `values` and the hash `sha256`: the stored one, else what
@@ -109,6 +120,7 @@ impl Store {
     /// # Errors
     /// [`Error::Write`].
     pub fn finish(&mut self, page: impl FnOnce(&SweepRecord) -> String) -> Result<Vec<PathBuf>> {
+        self.record.notes = notes(&self.record);
         let mut files = self.tables()?;
         let mut staged = Staged::new(&self.folder)?;
         staged.add("report.html", page(&self.record).as_bytes())?;
@@ -121,6 +133,13 @@ impl Store {
     pub fn record(&self) -> &SweepRecord {
         &self.record
     }
+}
+
+/// What the folder of the sweep says that it holds.
+fn manifest(identity: &serde_json::Value, record: &SweepRecord) -> String {
+    let axes: Vec<&str> = record.axes.iter().map(|axis| axis.name.as_str()).collect();
+    let manifest = serde_json::json!({ "axes": axes, "shared": identity });
+    format!("{manifest:#}\n")
 }
 
 /// The result that the file at `path` holds; none where there is no file.

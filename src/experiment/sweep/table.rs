@@ -109,7 +109,7 @@ fn certificate_columns(table: &mut Table, points: &[&CertificatePoint]) {
     let outcomes = points.iter().map(|point| point.growth.name().to_owned()).collect();
     table.add("growth", Column::Text(outcomes));
     table.add("rounds", count(&|point| point.rounds));
-    table.add("radius", float(&|point| point.radius));
+    table.add("ball_radius", float(&|point| point.radius));
     table.add("holds", count(&|point| u64::from(point.holds)));
     table.add("beta_total", float(&|point| point.beta_total));
     table.add("seconds", float(&|point| point.seconds));

@@ -45,6 +45,20 @@ impl<'a> Dense<'a> {
     }
 }
 
+/// Names of the tensors that are no part of the layers `chosen`; those of no dense layer first, as
+/// the statistics that observations are normalised with.
+pub(super) fn left_out(tensors: &[Tensor], chosen: &[Dense<'_>]) -> Vec<String> {
+    let parts = |layers: &[Dense<'_>]| -> HashSet<String> {
+        let tensors = layers.iter().flat_map(|layer| [Some(layer.weight), layer.bias]);
+        tensors.flatten().map(|tensor| tensor.name.clone()).collect()
+    };
+    let (used, of_layers) = (parts(chosen), parts(&dense(tensors)));
+    let names = tensors.iter().map(|tensor| tensor.name.clone());
+    let mut left: Vec<String> = names.filter(|name| !used.contains(name)).collect();
+    left.sort_by_key(|name| of_layers.contains(name));
+    left
+}
+
 /// The layers of the networks `asked`, one after the other; of the only network if none is.
 ///
 /// # Errors

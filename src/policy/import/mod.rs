@@ -58,6 +58,8 @@ pub struct Imported {
     pub network: Mlp,
     /// Names of its layers in the file.
     pub layers: Vec<String>,
+    /// Names of the tensors that are no part of it, those of no dense layer first.
+    pub left_out: Vec<String>,
     /// Who said what the hidden activation is.
     pub activation_from: Origin,
     /// Who said what the last activation is.
@@ -104,6 +106,7 @@ pub fn from_bytes(path: &Path, bytes: &[u8], request: &Request) -> Result<Import
 fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Imported, String> {
     let (mut checkpoint, tensors) = Checkpoint::open(bytes)?;
     let chosen = layers::choose(&tensors, &request.networks)?;
+    let left_out = layers::left_out(&tensors, &chosen);
     let mut numbers = |tensor: &checkpoint::Tensor| {
         let numbers = checkpoint.numbers(tensor, request.cast);
         numbers.map_err(|problem| format!("`{}`: {problem}", tensor.name))
@@ -133,6 +136,7 @@ fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Impor
     Ok(Imported {
         network: network.map_err(|e| e.to_string())?,
         layers: names,
+        left_out,
         activation_from: origin(request.activation.is_some()),
         output_from: origin(request.output.is_some()),
     })
@@ -156,6 +160,7 @@ fn as_stated((network, layers): (Mlp, Vec<String>), request: &Request) -> Result
         _ => Ok(Imported {
             network,
             layers,
+            left_out: Vec::new(),
             activation_from: Origin::File,
             output_from: Origin::File,
         }),

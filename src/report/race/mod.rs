@@ -30,7 +30,7 @@ pub fn race_html(record: &RaceRecord) -> String {
         head = shell::head("race study", &format!("{SHEET_STYLE}{RACE_STYLE}"), Scripts::Own),
         header = header(record),
         statements = statements(record),
-        adapter = shell::failures(&record.events),
+        adapter = shell::failures(&record.events) + &shell::notes(&record.notes),
         success = success::figure(record).html(),
         failures = failures::figure(record).html(),
         tiers = tiers::figure(record).html(),

@@ -8,7 +8,7 @@ use super::rows;
 use crate::report::figure::{Figure, Swatch};
 use crate::report::scale::Scale;
 use crate::report::sheet::panels;
-use crate::report::text::percent;
+use crate::report::text::{number, percent};
 
 /// Axes that a figure has room for: across, lines, panels.
 const DEPTH: usize = 3;
@@ -32,16 +32,33 @@ pub(super) fn figure(grid: &Grid<'_>, measure: &Measure, ceiling: Option<f64>) -
     let layout = Layout::new(grid, DEPTH);
     let chart =
         scale(&layout, measure).map(|scale| Chart { layout: &layout, measure, scale, ceiling });
+    let constant = constant(&layout, measure);
+    let drawn = chart.as_ref().filter(|_| constant.is_none());
     Figure {
         id: measure.id,
         title: measure.title.to_owned(),
-        legend: chart.as_ref().map_or_else(Vec::new, legend),
-        caption: caption(&layout, measure, chart.as_ref()),
-        drawing: match &chart {
-            Some(chart) => Ok(drawing(chart)),
-            None => Err("Nothing of this was measured.".to_owned()),
+        legend: drawn.map_or_else(Vec::new, legend),
+        caption: caption(&layout, measure, drawn),
+        drawing: match (&chart, constant) {
+            (Some(_), Some(value)) => {
+                Err(format!("The same at all points shown: {}, {}.", measure.label, number(value)))
+            }
+            (Some(chart), None) => Ok(drawing(chart)),
+            (None, _) => Err("Nothing of this was measured.".to_owned()),
         },
     }
+}
+
+/// The value that all of several points have, with the same intervals: nothing to be drawn.
+fn constant(layout: &Layout<'_, '_>, measure: &Measure) -> Option<f64> {
+    let places = layout.panel_places().into_iter();
+    let readings = places.flat_map(|panel| {
+        let lines = layout.line_places().into_iter();
+        lines.flat_map(move |line| layout.readings(measure, line, panel))
+    });
+    let readings: Vec<_> = readings.flatten().map(|read| (read.value, read.bands)).collect();
+    let (first, rest) = readings.split_first()?;
+    (!rest.is_empty() && rest.iter().all(|other| other == first)).then_some(first.0)
 }
 
 /// One scale for everything that is shown; `None` without a value.

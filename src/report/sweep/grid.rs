@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::readings;
 use crate::experiment::sweep::record::{AxisRecord, PointRecord, SweepRecord};
-use crate::report::text::{ordinary, shorten};
+use crate::report::text::{ordinary, shorten, told_apart};
 
 /// Characters of a value in a legend, a title or a sentence.
 const VALUE: usize = 40;
@@ -17,6 +17,8 @@ pub(super) struct Axis<'a> {
     pub(super) name: &'a str,
     /// Values with the numbers that they stand for: ascending if all are numbers.
     pub(super) values: Vec<(&'a str, Option<f64>)>,
+    /// Values short enough for a line, told apart.
+    short: Vec<String>,
 }
 
 impl<'a> Axis<'a> {
@@ -27,7 +29,8 @@ impl<'a> Axis<'a> {
         if values.iter().all(|(_, number)| number.is_some()) {
             values.sort_by(|(_, a), (_, b)| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
         }
-        Self { name: &record.name, values }
+        let texts: Vec<&str> = values.iter().map(|(text, _)| *text).collect();
+        Self { name: &record.name, short: told_apart(&texts, VALUE), values }
     }
 
     /// Whether every value is a number.
@@ -37,7 +40,13 @@ impl<'a> Axis<'a> {
 
     /// The value at a place, short enough for a line.
     pub(super) fn value(&self, place: usize) -> String {
-        shorten(self.values.get(place).map_or("", |(text, _)| text), VALUE)
+        self.short.get(place).cloned().unwrap_or_default()
+    }
+
+    /// All values in at most `limit` characters, told apart.
+    pub(super) fn texts(&self, limit: usize) -> Vec<String> {
+        let texts: Vec<&str> = self.values.iter().map(|(text, _)| *text).collect();
+        told_apart(&texts, limit)
     }
 
     /// Name and value.

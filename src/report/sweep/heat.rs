@@ -119,8 +119,8 @@ fn outward(span: Span) -> Span {
 
 /// An axis with one place per value.
 fn places(axis: &Axis<'_>) -> plot::Axis {
-    let ticks =
-        (0..axis.values.len()).map(|place| (place as f64, shorten(&axis.value(place), NAME)));
+    let ticks = axis.texts(NAME).into_iter().enumerate();
+    let ticks = ticks.map(|(place, text)| (place as f64, text));
     let high = axis.values.len() as f64 - 0.5;
     plot::Axis { span: Span { low: -0.5, high }, ticks: ticks.collect() }
 }

@@ -178,7 +178,7 @@ fn body(grid: &Grid<'_>, figures: &[Figure], findings: &Findings) -> String {
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
          <div class=\"gallery\">\n{figures}</div></section>\n{}",
         items(&findings.limits),
-        shell::failures(&grid.record.events()),
+        shell::failures(&grid.record.events()) + &shell::notes(&grid.record.notes),
         numbers(grid)
     )
 }

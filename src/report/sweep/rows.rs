@@ -5,7 +5,6 @@ use super::lines;
 use crate::report::plot::{Axis, Labels, Plot};
 use crate::report::sheet::WIDTH;
 use crate::report::span::Span;
-use crate::report::text::shorten;
 
 /// Width of a lone plot, and of one of several panels.
 const WIDTHS: [f64; 2] = [440.0, WIDTH];
@@ -22,10 +21,9 @@ pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usi
     let (count, places) = (layout.length(), layout.line_places());
     let height = ((ROW[0] + ROW[1] * places.len() as f64) * count as f64).max(LEAST);
     let width = WIDTHS[usize::from(panel.is_some())];
-    let name = |row: usize| {
-        let value = layout.across.map(|axis| layout.slice.grid.axes[axis].value(row));
-        shorten(&value.unwrap_or_default(), NAMES[usize::from(panel.is_some())])
-    };
+    let limit = NAMES[usize::from(panel.is_some())];
+    let names = layout.across.map(|axis| layout.slice.grid.axes[axis].texts(limit));
+    let name = |row: usize| names.as_ref().map_or_else(String::new, |names| names[row].clone());
     let middle = |row: usize| (count - row) as f64 - 0.5;
     let rows = Axis {
         span: Span { low: 0.0, high: count as f64 },

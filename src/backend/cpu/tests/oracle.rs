@@ -51,7 +51,7 @@ fn networks_are_as_near_to_f64_as_the_scalar_loop() {
         let plant = Plant { system: &system, policy: &policy };
         let (mut truth, mut worst_scalar) = (Vec::new(), 0.0_f64);
         for index in 0..COUNT {
-            let start = race_starts().start(index);
+            let start = race_starts().start_array(index);
             truth.push(measure(plant, start, &spec, &tightening));
             let states = trajectory::<f32, _, _, 12, 3>(plant, start, spec.horizon);
             let scalar = scalar_measure(&system, &states, &spec, &tightening);
@@ -106,7 +106,7 @@ fn deviation_of_a_formula_is_the_scalar_loop() {
         let mut farthest = vec![Farthest::NONE; 31];
         let mut measures = Vec::new();
         for pair in task.range.clone() {
-            let starts = task.pairs.load::<1>(pair).map(|x| x.map(|lane| lane.0[0]));
+            let starts = array_pair(&task, pair);
             let states = scalar_pair(plant, starts, &spec, control);
             for (t, farthest) in farthest.iter_mut().enumerate() {
                 let gaps = states[0][t].iter().zip(&states[1][t]);
@@ -163,8 +163,7 @@ fn deviation_of_a_network_is_near_f64() {
         let (_, measures) = deviation(&cpu(2), plant, &task);
         let mut worst = 0.0_f64;
         for (pair, measure) in measures.iter().enumerate() {
-            let starts = task.pairs.load::<1>(pair as u64);
-            let starts = starts.map(|x| x.map(|lane| lane.0[0]));
+            let starts = array_pair(&task, pair as u64);
             let (nominal, perturbed) = pair_measures(plant, starts, &spec, &tightening, control);
             worst = worst.max((f64::from(measure.nominal) - nominal).abs());
             worst = worst.max((f64::from(measure.perturbed) - perturbed).abs());
@@ -173,4 +172,9 @@ fn deviation_of_a_network_is_near_f64() {
         // Margins are of the order of 10, an f32 has 24 bits, and errors add up over 30 steps.
         assert!(worst < 30.0 * 10.0 * f64::from(f32::EPSILON), "{control:?}: {worst}");
     }
+}
+
+/// A pair of the race: nominal, then perturbed.
+fn array_pair(task: &DeviationTask<'_>, pair: u64) -> [[f32; 12]; 2] {
+    task.pairs.pair(pair).map(|start| std::array::from_fn(|i| start[i]))
 }

@@ -43,15 +43,28 @@ pub(super) fn state_glue(states: usize) -> String {
     text += "fn store_state(column: u32, x: State) {\n";
     text += &format!("    let stride = {stride};\n");
     for quad in 0..quads {
-        let entry = |i: usize| {
-            if i < states { format!("x[{i}]") } else { "0.0".to_owned() }
-        };
-        let entries: Vec<String> = (4 * quad..4 * quad + 4).map(entry).collect();
-        let entries = entries.join(", ");
-        text += &format!("    state[{quad}u * stride + column] = vec4<f32>({entries});\n");
+        let entries = padded("x", quad, states);
+        text += &format!("    state[{quad}u * stride + column] = {entries};\n");
     }
     text += "}\n";
     text
+}
+
+/// `listed_start`: a start that the host lists, `[NX / 4, columns]` vectors of 4 coordinates.
+pub(super) fn listed_glue(states: usize) -> String {
+    let mut text = String::from("fn listed_start(column: u32) -> State {\n");
+    for quad in 0..states.div_ceil(4) {
+        text += &format!("    let v{quad} = region[{quad}u * params.columns + column];\n");
+    }
+    let all: Vec<String> = (0..states).map(component).collect();
+    text + &format!("    return State({});\n}}\n", all.join(", "))
+}
+
+/// The vector number `quad` of the `length` numbers of `name`, padded with 0.
+pub(super) fn padded(name: &str, quad: usize, length: usize) -> String {
+    let entry = |i: usize| if i < length { format!("{name}[{i}]") } else { "0.0".to_owned() };
+    let entries: Vec<String> = (4 * quad..4 * quad + 4).map(entry).collect();
+    format!("vec4<f32>({})", entries.join(", "))
 }
 
 /// `state_finite`, free of loops.

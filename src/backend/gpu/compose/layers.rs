@@ -1,6 +1,6 @@
 //! How a network lies on the device, and the text of the kernels that run it.
 
-use super::glue::component;
+use super::glue::{component, padded};
 use super::{TILE_PITCH, TILE_QUADS, WORKGROUP};
 use crate::formula::wgsl::function;
 use crate::formula::{Expr, record};
@@ -21,6 +21,11 @@ pub(in super::super) fn input_quads(width: usize) -> usize {
 /// Vectors of 4 neurons, up to a whole tile.
 pub(in super::super) fn output_quads(width: usize) -> usize {
     width.div_ceil(4).next_multiple_of(TILE_QUADS as usize)
+}
+
+/// Vectors that the parameters of all layers take.
+pub(in super::super) fn parameter_quads(mlp: &Mlp) -> usize {
+    LayerShape::of(mlp).last().map_or(0, |layer| layer.end() as usize)
 }
 
 /// Where the parameters of a layer lie, and its size in vectors of 4.
@@ -97,11 +102,11 @@ pub(super) fn layer_text(network: Option<(Activation, OutputActivation)>, last: 
     [recorded_activations(network), last, TILE.to_owned(), MLP.to_owned()].join("\n")
 }
 
-/// `drive` by a network that the rollout runs itself.
+/// `drive` by a network that the rollout runs itself, whose activations `glue` puts and takes.
 pub(super) fn fused_text(
-    network: Option<(Activation, OutputActivation)>,
+    activations: (Activation, OutputActivation),
     fused: &Fused,
-    [states, controls]: [usize; 2],
+    glue: &str,
 ) -> String {
     let sizes = format!(
         "const FUSED_QUADS: u32 = {}u;\nconst LAYER_COUNT: u32 = {}u;\n",
@@ -109,11 +114,11 @@ pub(super) fn fused_text(
         fused.layers.len()
     );
     [
-        recorded_activations(network),
+        recorded_activations(Some(activations)),
         sizes,
         TILE.to_owned(),
         layer_table(&fused.layers),
-        activation_glue(states, controls),
+        glue.to_owned(),
         MLP_FUSED.to_owned(),
     ]
     .join("\n")
@@ -131,20 +136,18 @@ fn layer_table(layers: &[LayerShape]) -> String {
     text + "    }\n}\n"
 }
 
-/// `put_state` and `control_at`, free of loops.
-fn activation_glue(states: usize, controls: usize) -> String {
-    let mut text = String::from("fn put_state(column: u32, x: State) {\n");
-    for quad in 0..states.div_ceil(4) {
-        let entry = |i: usize| if i < states { format!("x[{i}]") } else { "0.0".to_owned() };
-        let entries: Vec<String> = (4 * quad..4 * quad + 4).map(entry).collect();
-        text += &format!("    put({quad}u, column, vec4<f32>({}));\n", entries.join(", "));
+/// `put_inputs` and `outputs_at`, free of loops.
+pub(super) fn activation_glue(inputs: usize, outputs: usize) -> String {
+    let mut text = String::from("fn put_inputs(column: u32, seen: Inputs) {\n");
+    for quad in 0..inputs.div_ceil(4) {
+        text += &format!("    put({quad}u, column, {});\n", padded("seen", quad, inputs));
     }
-    text += "}\nfn control_at(column: u32) -> Control {\n";
-    for quad in 0..controls.div_ceil(4) {
+    text += "}\nfn outputs_at(column: u32) -> Outputs {\n";
+    for quad in 0..outputs.div_ceil(4) {
         text += &format!("    let v{quad} = input_at({quad}u, column);\n");
     }
-    let all: Vec<String> = (0..controls).map(component).collect();
-    text + &format!("    return Control({});\n}}\n", all.join(", "))
+    let all: Vec<String> = (0..outputs).map(component).collect();
+    text + &format!("    return Outputs({});\n}}\n", all.join(", "))
 }
 
 /// `hidden_activation` and `output_activation`; the identity where there is no network.

@@ -4,14 +4,16 @@ mod glue;
 mod layers;
 mod limits;
 mod mppi;
+mod physics_glue;
 mod plant;
 
 pub use layers::Fused;
-pub(super) use layers::{LayerShape, input_quads, output_quads};
+pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::{map_of, tile_steps};
-pub use plant::{Shape, compose};
+pub use plant::PlantText;
+pub(super) use plant::layer_kernel;
 
 /// Threads of a workgroup, one trajectory, pair or tile of a layer each.
 pub const WORKGROUP: u32 = 64;
@@ -37,6 +39,8 @@ pub enum Kernel {
     Deviation,
     /// Finds the farthest pair of each step.
     Reduce,
+    /// Evaluates what a network sees.
+    Observe,
     /// A hidden layer of the network.
     HiddenLayer,
     /// The last layer of the network.
@@ -58,6 +62,8 @@ pub enum Kernel {
 pub enum Access {
     /// The uniform block of parameters, at a dynamic offset.
     Uniform,
+    /// Uniform numbers that all dispatches of a call share.
+    Constant,
     /// Storage that is read.
     Read,
     /// Storage that is read and written.
@@ -70,7 +76,7 @@ pub enum Access {
 pub enum Slot {
     /// `params`.
     Params = 0,
-    /// `region`: one vector per coordinate.
+    /// `region`: one vector per coordinate, or the starts that the host lists.
     Region = 1,
     /// `schedule`: one vector per step.
     Schedule = 2,
@@ -80,7 +86,7 @@ pub enum Slot {
     Folds = 4,
     /// `origin`: place of each column in the chunk.
     Origin = 5,
-    /// `control`: vectors of 4 controls of the network.
+    /// `control`: vectors of 4 outputs of the network.
     Control = 6,
     /// `measures` or `pair_measures`, by place in the chunk.
     Measures = 7,
@@ -122,11 +128,13 @@ pub enum Slot {
     Push = 25,
     /// `partials`: softmin of each workgroup.
     Partials = 26,
+    /// `values`: the parameters of the model, in vectors of 4.
+    Values = 27,
 }
 
 impl Kernel {
     /// The kernels of measures, pairs and networks.
-    pub const ROLLOUT: [Self; 7] = [
+    pub const ROLLOUT: [Self; 8] = [
         Self::Sample,
         Self::ReachAvoid,
         Self::Compact,
@@ -134,6 +142,7 @@ impl Kernel {
         Self::Reduce,
         Self::HiddenLayer,
         Self::OutputLayer,
+        Self::Observe,
     ];
 
     /// The kernels of MPPI.
@@ -150,6 +159,7 @@ impl Kernel {
             Self::Compact => "compact",
             Self::Deviation => "deviation",
             Self::Reduce => "reduce",
+            Self::Observe => "observe",
             Self::HiddenLayer | Self::OutputLayer => "mlp",
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
@@ -201,6 +211,7 @@ impl Kernel {
                 (S::Distances, ReadWrite),
             ],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
+            Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
             Self::HiddenLayer | Self::OutputLayer => {
                 &[(S::Weights, Read), (S::Source, Read), (S::Sink, ReadWrite)]
             }

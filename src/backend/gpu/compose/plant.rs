@@ -1,12 +1,15 @@
 //! The text of the kernels of measures, pairs and networks.
 
-use super::glue::{
-    FINITE, PARAMS, RNG, call, component, constants, finite_glue, recorded_pair, state_glue,
-};
-use super::layers::{Fused, fused_text, layer_text};
+use super::glue::{FINITE, PARAMS, RNG, component, constants, finite_glue, state_glue};
+use super::glue::{listed_glue, recorded_pair};
+use super::layers::{Fused, activation_glue, fused_text, layer_text};
+use super::physics_glue::physics_glue;
 use super::{Access, Kernel, Slot};
+use crate::backend::physics::{Part, Physics, Role};
+use crate::error::{Error, Result};
 use crate::formula::wgsl::{Product, function, function_with};
 use crate::formula::{Expr, record};
+use crate::model::{Controller, Law, Model};
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::real::Real;
 
@@ -17,110 +20,293 @@ const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
+const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
 
-/// What the text of a kernel depends on besides the physics.
+/// What the texts have of the network that drives.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shape {
-    /// Number of states.
-    pub states: usize,
-    /// Number of controls.
-    pub controls: usize,
-    /// Activations of the network, where the policy is one.
-    pub network: Option<(Activation, OutputActivation)>,
+pub(super) struct Driver {
+    /// Activation of hidden layers and of the last one.
+    pub(super) activations: (Activation, OutputActivation),
+    /// Numbers that it sees.
+    pub(super) inputs: usize,
+    /// Numbers that it says.
+    pub(super) outputs: usize,
     /// Its layers, where the rollouts run them.
-    pub fused: Option<Fused>,
+    pub(super) fused: Option<Fused>,
 }
 
-impl Shape {
-    /// The shape for a system of that many states and controls, driven by a formula or by a network
-    /// whose layers have kernels of their own.
-    pub fn new(states: usize, controls: usize, network: Option<&Mlp>) -> Self {
-        let network = network.map(|mlp| (mlp.activation(), mlp.output()));
-        Self { states, controls, network, fused: None }
+/// The texts of the kernels of a model and who drives it; values of parameters and weights are no
+/// part of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantText {
+    pub(super) states: usize,
+    pub(super) controls: usize,
+    pub(super) parameters: usize,
+    /// Seconds between two steps; 0 where the model does not say.
+    pub(super) period: f32,
+    pub(super) driver: Option<Driver>,
+    pub(super) physics: Physics,
+}
+
+impl PlantText {
+    /// Prints the formulas of `model` and `controller`, whose network, if any, runs in layers.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
+    /// what is not known there, or the network does not fit.
+    pub fn new(model: &Model, controller: &Controller) -> Result<Self> {
+        check_formulas(model, controller)?;
+        let physics = Physics::new(model, controller);
+        check_reads(&physics)?;
+        Ok(Self {
+            states: model.states.len(),
+            controls: model.controls.len(),
+            parameters: model.parameters.len(),
+            period: model.period.unwrap_or(0.0),
+            driver: controller.network().map(|mlp| driver(mlp, None)),
+            physics,
+        })
+    }
+
+    /// The same texts where the rollouts run the layers of a network themselves.
+    #[must_use]
+    pub fn fusing(mut self, fused: Option<Fused>) -> Self {
+        if let Some(driver) = &mut self.driver {
+            driver.fused = fused;
+        }
+        self
+    }
+
+    /// Number of states.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+
+    /// Number of parameters of the model.
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+
+    /// Whether a kernel of its own evaluates what the network sees.
+    pub fn observes(&self) -> bool {
+        let layered = self.driver.as_ref().is_some_and(|driver| driver.fused.is_none());
+        layered && self.physics.function(Role::Observe).is_some()
+    }
+
+    /// The layers that the rollouts run themselves.
+    pub fn fused(&self) -> Option<&Fused> {
+        self.driver.as_ref().and_then(|driver| driver.fused.as_ref())
+    }
+
+    /// Operations of the formulas for one step: a line of the text is one.
+    pub fn operations(&self) -> u64 {
+        self.physics.functions.iter().map(|one| one.text.lines().count() as u64).sum()
     }
 
     /// What `kernel` binds.
     pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
-        let mut list = kernel.bindings(self.network.is_some());
-        if self.fused.is_some() {
+        let mut list = kernel.bindings(self.driver.is_some());
+        if self.fused().is_some() {
             let control = list.iter_mut().filter(|(slot, _)| *slot == Slot::Control);
             control.for_each(|(slot, _)| *slot = Slot::Weights);
+        }
+        if self.roles(kernel).iter().any(|role| self.reads(*role, Part::Parameters)) {
+            list.push((Slot::Values, Access::Constant));
         }
         list
     }
 
     /// Threads of a workgroup of `kernel`, which has [`Kernel::workgroup`] trajectories.
     pub fn lanes(&self, kernel: Kernel) -> u32 {
-        match (kernel, &self.fused) {
+        match (kernel, self.fused()) {
             (Kernel::ReachAvoid | Kernel::Deviation, Some(fused)) => fused.lanes(),
             _ => kernel.workgroup(),
         }
     }
-}
 
-/// The WGSL module of `kernel` for the physics of a plant (see [`crate::backend::physics`]); for
-/// those of MPPI see [`super::MppiText`].
-pub fn compose(kernel: Kernel, shape: &Shape, physics: &str) -> String {
-    let states = shape.states;
-    let folds = || [FINITE, FOLD].concat();
-    let rollout = || {
+    /// The WGSL module of `kernel`, one of [`Kernel::ROLLOUT`]; for those of MPPI see
+    /// [`super::MppiText`].
+    ///
+    /// # Panics
+    /// For any other kernel.
+    pub fn compose(&self, kernel: Kernel) -> String {
+        let states = self.states;
+        let folds = || [FINITE, FOLD].concat();
+        let parts = match kernel {
+            Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
+            Kernel::ReachAvoid => vec![self.rollout(kernel), REACH_AVOID.to_owned()],
+            Kernel::Deviation => {
+                vec![self.rollout(kernel), recorded_distance(states), DEVIATION.to_owned()]
+            }
+            Kernel::Compact => vec![folds(), COMPACT.to_owned()],
+            Kernel::Reduce => vec![REDUCE.to_owned()],
+            Kernel::HiddenLayer | Kernel::OutputLayer => {
+                let activations = self.driver.as_ref().map(|driver| driver.activations);
+                vec![layer_text(activations, kernel == Kernel::OutputLayer)]
+            }
+            Kernel::Observe => vec![self.observation(), OBSERVE.to_owned()],
+            other => panic!("{other:?} is no kernel of a plant"),
+        };
+        let shared = vec![constants(states, self.controls), PARAMS.to_owned()];
+        [shared, parts].concat().join("\n")
+    }
+
+    /// What draws starts and pairs.
+    fn draw(&self) -> String {
+        let glue = [state_glue(self.states), listed_glue(self.states)].concat();
+        [glue, RNG.to_owned(), recorded_normals()].join("\n")
+    }
+
+    /// What judges and drives a rollout.
+    fn rollout(&self, kernel: Kernel) -> String {
         let lanes = format!(
             "const LANES: u32 = {}u;\n// Whether `drive` is called by all threads together.\n\
              const TOGETHER: bool = {};\n",
-            shape.lanes(kernel),
-            shape.fused.is_some()
+            self.lanes(kernel),
+            self.fused().is_some()
         );
-        let glue = [lanes, state_glue(states), finite_glue(states), plant_glue(shape)].concat();
-        [folds(), glue, physics.to_owned(), JUDGE.to_owned()].join("\n")
-    };
-    let draw = || [state_glue(states), RNG.to_owned(), recorded_normals()].join("\n");
-    let parts = match kernel {
-        Kernel::Sample => vec![folds(), draw(), SAMPLE.to_owned()],
-        Kernel::ReachAvoid => vec![rollout(), REACH_AVOID.to_owned()],
-        Kernel::Deviation => vec![rollout(), recorded_distance(states), DEVIATION.to_owned()],
-        Kernel::Compact => vec![folds(), COMPACT.to_owned()],
-        Kernel::Reduce => vec![REDUCE.to_owned()],
-        Kernel::HiddenLayer => vec![layer_text(shape.network, false)],
-        Kernel::OutputLayer => vec![layer_text(shape.network, true)],
-        Kernel::MppiStart | Kernel::MppiRollout | Kernel::MppiUpdate => {
-            panic!("{kernel:?} is composed by MppiText")
+        let states = self.states;
+        let glue = [state_glue(states), finite_glue(states), self.functions(kernel)].concat();
+        [FINITE, FOLD, &lanes, &glue, &self.drive(), JUDGE].join("\n")
+    }
+
+    /// What evaluates the inputs of a network.
+    fn observation(&self) -> String {
+        let quads = self.driver.as_ref().map_or(0, |driver| driver.inputs.div_ceil(4));
+        let mut store = String::from("fn store_seen(column: u32, seen: Inputs) {\n");
+        for quad in 0..quads {
+            let entries = super::glue::padded("seen", quad, self.seen());
+            store += &format!("    sink[{quad}u * params.stride + column] = {entries};\n");
         }
-        Kernel::Peak | Kernel::Copy => panic!("{kernel:?} is composed by `limit_kernel`"),
-    };
-    let shared = vec![constants(states, shape.controls), PARAMS.to_owned()];
-    [shared, parts].concat().join("\n")
+        [state_glue(self.states), self.functions(Kernel::Observe), store + "}\n"].join("\n")
+    }
+
+    /// Numbers that the network sees.
+    fn seen(&self) -> usize {
+        self.driver.as_ref().map_or(0, |driver| driver.inputs)
+    }
+
+    /// The recorded functions that `kernel` calls, and what calls them.
+    fn functions(&self, kernel: Kernel) -> String {
+        physics_glue(self, &self.roles(kernel))
+    }
+
+    /// The recorded functions that `kernel` calls.
+    fn roles(&self, kernel: Kernel) -> Vec<Role> {
+        let roles = match kernel {
+            Kernel::Observe => vec![Role::Observe],
+            Kernel::ReachAvoid | Kernel::Deviation => {
+                let mut roles =
+                    vec![Role::Step, Role::Target, Role::Constraint, Role::Control, Role::Act];
+                roles.extend(self.fused().map(|_| Role::Observe));
+                roles
+            }
+            _ => Vec::new(),
+        };
+        roles.into_iter().filter(|role| self.physics.function(*role).is_some()).collect()
+    }
+
+    fn reads(&self, role: Role, part: Part) -> bool {
+        self.physics.function(role).is_some_and(|function| function.reads(part))
+    }
+
+    /// `drive`: the controls at a state, by the formula, from the last layer's outputs, or by the
+    /// network that the rollout runs itself.
+    fn drive(&self) -> String {
+        let Some(driver) = &self.driver else {
+            return "fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {\n    \
+                    return control_of(x, t);\n}\n"
+                .to_owned();
+        };
+        if let Some(fused) = &driver.fused {
+            let glue = activation_glue(driver.inputs, driver.outputs);
+            return fused_text(driver.activations, fused, &glue);
+        }
+        let slot = Slot::Control as u32;
+        let mut text = format!(
+            "@group(0) @binding({slot}) var<storage, read> control: array<vec4<f32>>;\n\
+             fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {{\n    \
+             let stride = params.stride * (1u + params.paired);\n"
+        );
+        for quad in 0..driver.outputs.div_ceil(4) {
+            text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
+        }
+        let all: Vec<String> = (0..driver.outputs).map(component).collect();
+        text + &format!("    return acted(x, Outputs({}), t);\n}}\n", all.join(", "))
+    }
 }
 
-/// Calls of the recorded functions of the plant.
-fn plant_glue(shape: &Shape) -> String {
-    let (x, u) = (("x", "State", shape.states), ("u", "Control", shape.controls));
-    let mut text = [
-        call("advance", "plant_step", &[x, u], ("State", shape.states)),
-        call("target_at", "plant_target", &[x], ("f32", 1)),
-        call("constraint_at", "plant_constraint", &[x], ("f32", 1)),
-    ]
-    .concat();
-    if shape.network.is_none() {
-        text += &call("control_of", "plant_control", &[x], ("Control", shape.controls));
-        text += "fn drive(lane: u32, column: u32, x: State) -> Control {\n    \
-                 return control_of(x);\n}\n";
-        return text;
+/// What the texts have of `mlp`.
+pub(super) fn driver(mlp: &Mlp, fused: Option<Fused>) -> Driver {
+    let widths = mlp.widths();
+    Driver {
+        activations: (mlp.activation(), mlp.output()),
+        inputs: widths[0],
+        outputs: widths[widths.len() - 1],
+        fused,
     }
-    if let Some(fused) = &shape.fused {
-        return text + &fused_text(shape.network, fused, [shape.states, shape.controls]);
+}
+
+/// The WGSL module of a hidden or the last layer of `mlp`, whoever it drives.
+pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
+    let Driver { activations, inputs, outputs, .. } = driver(mlp, None);
+    let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
+    [constants(inputs, outputs), PARAMS.to_owned(), text].join("\n")
+}
+
+/// The sizes of every formula must be those of its place: kernels do not check.
+fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
+    let (inputs, states, controls) = (model.inputs(), model.states.len(), model.controls.len());
+    let mut expected = vec![
+        ("step", &model.step, [inputs, states]),
+        ("target", &model.target, [inputs, 1]),
+        ("constraint", &model.constraint, [inputs, 1]),
+    ];
+    if let Law::Formula(graph) = &controller.law {
+        expected.push(("control", graph, [inputs, controls]));
     }
-    let slot = Slot::Control as u32;
-    text += &format!(
-        "@group(0) @binding({slot}) var<storage, read> control: array<vec4<f32>>;\n\
-         fn drive(lane: u32, column: u32, x: State) -> Control {{\n    \
-         let stride = params.stride * (1u + params.paired);\n"
-    );
-    for quad in 0..shape.controls.div_ceil(4) {
-        text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
+    if let Law::Network { observe, network, act } = &controller.law {
+        let Driver { inputs: seen, outputs: said, .. } = driver(network, None);
+        check_network(
+            observe.is_some() || seen == states,
+            act.is_some() || said == controls,
+            || {
+                format!(
+                    "maps {seen} inputs to {said} outputs; the system has {states} states and \
+                 {controls} controls"
+                )
+            },
+        )?;
+        expected.extend(observe.iter().map(|graph| ("observe", graph, [inputs, seen])));
+        expected.extend(act.iter().map(|graph| ("act", graph, [inputs + said, controls])));
     }
-    let all: Vec<String> = (0..shape.controls).map(component).collect();
-    text += &format!("    return Control({});\n}}\n", all.join(", "));
-    text
+    for (place, graph, sizes) in expected {
+        let found = [graph.inputs, graph.outputs.len()];
+        if found != sizes {
+            let problem = format!(
+                "maps {} inputs to {} outputs; {} to {} were expected",
+                found[0], found[1], sizes[0], sizes[1]
+            );
+            return Err(Error::invalid(place, problem));
+        }
+    }
+    Ok(())
+}
+
+fn check_network(inputs: bool, outputs: bool, problem: impl FnOnce() -> String) -> Result<()> {
+    if inputs && outputs { Ok(()) } else { Err(Error::invalid("network", problem())) }
+}
+
+/// Only the step knows the controls.
+fn check_reads(physics: &Physics) -> Result<()> {
+    let reads = |role| role != Role::Step;
+    match physics.functions.iter().find(|one| reads(one.role) && one.reads(Part::Control)) {
+        None => Ok(()),
+        Some(function) => {
+            let problem = "reads a control, which only the step knows";
+            Err(Error::invalid(function.role.name(), problem))
+        }
+    }
 }
 
 /// `normal_pair` and `ln_unit`, their products kept apart from sums.

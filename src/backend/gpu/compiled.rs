@@ -1,0 +1,65 @@
+//! The kernels of a plant on a device, and the parameters of its network there.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::buffer::{Buffer, Pool};
+use super::compose::{Kernel, PlantText};
+use super::device::Device;
+use super::kernel::{Pipeline, Pipelines};
+use super::network::upload;
+use super::plan::{NetworkKernels, fused};
+use super::source::Source;
+use super::traffic::Count;
+use crate::error::Result;
+
+/// The kernels of a plant, each compiled when it is first needed, and its network's parameters.
+pub(super) struct Compiled {
+    pub(super) text: PlantText,
+    weights: Option<Buffer>,
+    pipelines: Arc<Pipelines>,
+    built: Mutex<HashMap<Kernel, Arc<Pipeline>>>,
+}
+
+impl Compiled {
+    /// The plant of `source`, whose network runs as `networks` says; nothing compiled yet.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if a network is to be fused and does not fit.
+    pub(super) fn new(
+        (device, pool): (&Device, &Pool),
+        pipelines: &Arc<Pipelines>,
+        source: &Source,
+        networks: NetworkKernels,
+    ) -> Result<Self> {
+        let network = source.network.as_deref();
+        let fused = fused(&device.adapter, network, networks)?;
+        Ok(Self {
+            text: source.text.clone().fusing(fused),
+            weights: network.map(|mlp| upload(device, pool, mlp)),
+            pipelines: Arc::clone(pipelines),
+            built: Mutex::default(),
+        })
+    }
+
+    /// The network's parameters, if there is one.
+    pub(super) fn weights(&self) -> Option<&Buffer> {
+        self.weights.as_ref()
+    }
+
+    /// The pipeline of `kernel`.
+    ///
+    /// # Errors
+    /// [`crate::Error::DeviceFailed`] if the driver refuses the text.
+    pub(super) fn pipeline(&self, device: &Device, kernel: Kernel) -> Result<Arc<Pipeline>> {
+        let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = built.get(&kernel) {
+            return Ok(Arc::clone(pipeline));
+        }
+        device.counters.add(Count::Text);
+        let (bindings, text) = (self.text.bindings(kernel), self.text.compose(kernel));
+        let pipeline = self.pipelines.pipeline(device, kernel, bindings, text)?;
+        built.insert(kernel, Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+}

@@ -1,0 +1,83 @@
+//! A call that rolls a plant out: its plan, its submissions, its workspace.
+
+use std::sync::Arc;
+
+use super::attempt::Attempt;
+use super::flight::Flight;
+use super::opened::Opened;
+use super::plan::{Plan, Work};
+use super::program::Program;
+use super::source::Source;
+use super::workspace::{Shape, Workspace};
+use crate::error::{Error, Result};
+use crate::rollout::{RolloutSpec, Starts, Tightening};
+
+/// What a call rolls out: a plant, and the values of its parameters.
+#[derive(Clone, Copy)]
+pub(super) struct Subject<'a> {
+    pub(super) source: &'a Arc<Source>,
+    pub(super) values: &'a [f32],
+}
+
+/// What a call asks for.
+#[derive(Clone, Copy)]
+pub(super) struct Request<'a> {
+    pub(super) work: Work,
+    pub(super) starts: &'a Starts<'a>,
+    pub(super) spec: &'a RolloutSpec,
+    pub(super) tightening: &'a Tightening,
+    /// Starts or pairs.
+    pub(super) count: u64,
+}
+
+/// A call that rolls a plant out.
+pub(super) struct Job<'a> {
+    pub(super) flight: Flight<'a>,
+    pub(super) plan: Plan,
+    pub(super) space: Workspace,
+    program: Arc<Program>,
+}
+
+impl<'a> Job<'a> {
+    /// The call for `request` of `subject`: its inputs set, nothing written or submitted yet.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the parts of the request do not fit, and those of the device.
+    pub(super) fn new(
+        (opened, attempt): (&'a Opened, &Attempt),
+        subject: Subject<'_>,
+        request: Request<'_>,
+    ) -> Result<Self> {
+        let Request { work, starts, spec, tightening, count } = request;
+        check_starts(starts, subject.source.text.states())?;
+        // Before the first buffer is made: what fails from here on is this call's.
+        let flight = opened.flight();
+        let program = opened.program(&flight, subject.source)?;
+        let plan = program.plan(&flight.device, attempt, (work, count))?;
+        let listed = matches!(starts, Starts::Listed(_));
+        let shape = Shape { work, listed, horizon: spec.horizon, plan };
+        let mut space = program.take(&flight, shape)?;
+        space.inputs.set_values(subject.values);
+        space.inputs.set_schedule(spec, tightening)?;
+        space.inputs.set_region(starts);
+        Ok(Self { flight, plan, space, program })
+    }
+
+    /// Keeps the workspace: the call has gone well.
+    pub(super) fn finish(self) {
+        self.program.keep(self.space);
+    }
+}
+
+/// # Errors
+/// [`Error::Invalid`] for an empty list of starts, and for starts that are no states.
+fn check_starts(starts: &Starts<'_>, states: usize) -> Result<()> {
+    let problem = match starts {
+        Starts::Listed(list) if list.is_empty() => "the list is empty".to_owned(),
+        _ if starts.size() != states => {
+            format!("starts of {} numbers; the model has {states} states", starts.size())
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::invalid("starts", problem))
+}

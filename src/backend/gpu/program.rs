@@ -1,0 +1,99 @@
+//! A plant prepared on a device: its kernels, and the buffers of its calls.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::attempt::Attempt;
+use super::buffer::Pool;
+use super::compiled::Compiled;
+use super::device::Device;
+use super::flight::Flight;
+use super::kernel::Pipelines;
+use super::plan::{NetworkKernels, Plan, Size, Work};
+use super::source::Source;
+use super::workspace::{Shape, Workspace};
+use crate::error::Result;
+
+/// Workspaces that are kept: one for each thread and shape that calls take turns with.
+const KEPT: usize = 4;
+/// Largest workspace that is kept, bytes: beyond it, binding its buffers anew is nothing beside the
+/// work, and the pool keeps them.
+const KEPT_BYTES: u64 = 8 << 20;
+
+/// A plant prepared on a device.
+pub(super) struct Program {
+    source: Arc<Source>,
+    compiled: Compiled,
+    kept: Mutex<Vec<Workspace>>,
+}
+
+impl Program {
+    /// The plant of `source` on `device`, its network's parameters uploaded.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if a network is to be fused and does not fit.
+    pub(super) fn new(
+        on: (&Device, &Pool),
+        pipelines: &Arc<Pipelines>,
+        source: &Arc<Source>,
+        networks: NetworkKernels,
+    ) -> Result<Self> {
+        let compiled = Compiled::new(on, pipelines, source, networks)?;
+        Ok(Self { source: Arc::clone(source), compiled, kept: Mutex::default() })
+    }
+
+    /// Whether it is the plant of `source`.
+    pub(super) fn is(&self, source: &Arc<Source>) -> bool {
+        Arc::ptr_eq(&self.source, source)
+    }
+
+    /// How `count` starts or pairs are cut up.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if not even the smallest chunk fits.
+    pub(super) fn plan(
+        &self,
+        device: &Device,
+        attempt: &Attempt,
+        (work, count): (Work, u64),
+    ) -> Result<Plan> {
+        let network = self.source.network.as_deref();
+        let text = &self.compiled.text;
+        let size = Size {
+            states: text.states(),
+            flops: text.operations(),
+            network,
+            fused: text.fused(),
+            seen: network.filter(|_| text.observes()).map_or(0, |mlp| mlp.widths()[0]),
+            count,
+        };
+        let plan = Plan::new(&device.adapter, attempt.limit, work, &size)?;
+        attempt.columns.set(u64::from(plan.stride));
+        Ok(plan)
+    }
+
+    /// A workspace of `shape`: a kept one, or a new one.
+    ///
+    /// # Errors
+    /// [`crate::Error::DeviceFailed`] if the driver refuses a kernel.
+    pub(super) fn take(&self, flight: &Flight<'_>, shape: Shape) -> Result<Workspace> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = kept.iter().position(|workspace| workspace.shape == shape) {
+            return Ok(kept.remove(at));
+        }
+        drop(kept);
+        let network = self.source.network.as_deref();
+        Workspace::new(flight, (&self.compiled, network), shape)
+    }
+
+    /// Keeps `workspace` for a later call.
+    pub(super) fn keep(&self, workspace: Workspace) {
+        if workspace.size() > KEPT_BYTES {
+            return;
+        }
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.push(workspace);
+        if kept.len() > KEPT {
+            kept.remove(0);
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Plants as the kernels need them, on no device yet.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::compose::PlantText;
+use crate::error::Result;
+use crate::model::{Controller, Model, Plant};
+use crate::policy::Mlp;
+
+/// Sources that are remembered.
+const REMEMBERED: usize = 16;
+
+/// A plant printed, and the network that drives it, if one does.
+pub(super) struct Source {
+    /// The texts of its kernels, its network in layers.
+    pub(super) text: PlantText,
+    /// The network.
+    pub(super) network: Option<Arc<Mlp>>,
+}
+
+impl Source {
+    /// Prints `model` and `controller`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] where their parts do not fit.
+    pub(super) fn new(model: &Model, controller: &Controller) -> Result<Self> {
+        let network = controller.shared_network().cloned();
+        Ok(Self { text: PlantText::new(model, controller)?, network })
+    }
+
+    /// Whether both have the same kernels and the same parameters of a network, bit by bit.
+    fn same(&self, other: &Self) -> bool {
+        let networks = match (&self.network, &other.network) {
+            (None, None) => true,
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other) || same_bits(one, other),
+            _ => false,
+        };
+        networks && self.text == other.text
+    }
+}
+
+/// Whether two networks have the same layers, bit by bit: 0 and -0 differ.
+fn same_bits(one: &Mlp, other: &Mlp) -> bool {
+    let bits = |numbers: &[f32], others: &[f32]| {
+        bytemuck::cast_slice::<f32, u32>(numbers) == bytemuck::cast_slice::<f32, u32>(others)
+    };
+    let mut layers = one.layers().iter().zip(other.layers());
+    one.widths() == other.widths()
+        && (one.activation(), one.output()) == (other.activation(), other.output())
+        && layers.all(|(a, b)| bits(&a.weight, &b.weight) && bits(&a.bias, &b.bias))
+}
+
+/// The sources that were asked for last.
+#[derive(Default)]
+pub(super) struct Sources(Mutex<Vec<Remembered>>);
+
+/// A source, and the plant that it was printed for, where that is shared.
+struct Remembered {
+    plant: Option<Plant>,
+    source: Arc<Source>,
+}
+
+impl Sources {
+    /// The source of a plant that is shared: a look-up if the same one was asked for before; else
+    /// `printed` notes that it was printed.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] where its parts do not fit.
+    pub(super) fn of_plant(&self, plant: &Plant, printed: impl FnOnce()) -> Result<Arc<Source>> {
+        if let Some(source) = self.known(plant) {
+            return Ok(source);
+        }
+        printed();
+        let source = Source::new(&plant.model, &plant.controller)?;
+        Ok(self.remember(Some(plant.clone()), source))
+    }
+
+    /// The source that is the same as `source`, if one was asked for before, else itself.
+    pub(super) fn shared(&self, source: Source) -> Arc<Source> {
+        self.remember(None, source)
+    }
+
+    /// The source of this very plant.
+    fn known(&self, plant: &Plant) -> Option<Arc<Source>> {
+        let same = |known: &Plant| {
+            Arc::ptr_eq(&known.model, &plant.model)
+                && Arc::ptr_eq(&known.controller, &plant.controller)
+        };
+        let list = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = list.iter().find(|known| known.plant.as_ref().is_some_and(same));
+        found.map(|known| Arc::clone(&known.source))
+    }
+
+    fn remember(&self, plant: Option<Plant>, source: Source) -> Arc<Source> {
+        let mut list = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = list.iter().position(|known| known.source.same(&source));
+        // The last one asked for stands last.
+        let entry = match known {
+            Some(at) => {
+                let Remembered { plant: before, source } = list.remove(at);
+                Remembered { plant: plant.or(before), source }
+            }
+            None => Remembered { plant, source: Arc::new(source) },
+        };
+        let source = Arc::clone(&entry.source);
+        list.push(entry);
+        if list.len() > REMEMBERED {
+            list.remove(0);
+        }
+        source
+    }
+}

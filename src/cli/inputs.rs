@@ -1,0 +1,19 @@
+//! The files that a command reads.
+
+use std::path::{Path, PathBuf};
+
+use crate::config::PolicySource;
+use crate::files::Inputs;
+
+/// The configuration at `config`, the policy's file if it has one, and `more`.
+pub(super) fn inputs(
+    config: &Path,
+    policy: &PolicySource,
+    more: impl IntoIterator<Item = PathBuf>,
+) -> Inputs {
+    let network = match policy {
+        PolicySource::Network { path, .. } => Some(path.clone()),
+        PolicySource::Formula(_) => None,
+    };
+    Inputs::new(std::iter::once(config.to_owned()).chain(network).chain(more))
+}

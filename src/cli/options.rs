@@ -1,0 +1,110 @@
+//! The options that commands share, and what a command is told by them.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::args::Arguments;
+use crate::config::{Overrides, Profile};
+use crate::files::Existing;
+
+/// Most threads: beyond what any processor runs at once they only cost.
+const MOST_THREADS: i64 = 1024;
+
+/// Options of every command; none of them changes a result on the CPU.
+#[derive(Args, Clone, Debug)]
+pub(super) struct Common {
+    /// Who runs the rollouts; `auto` takes a hardware GPU if there is one, else the CPU
+    #[arg(long, global = true, value_enum, default_value_t = BackendName::Auto)]
+    pub(super) backend: BackendName,
+    /// The GPU adapter whose name contains this, as `devices` lists them
+    #[arg(long, global = true, value_name = "NAME")]
+    pub(super) device: Option<String>,
+    /// Go on on the CPU where no adapter opens, or where it fails for good; it is reported
+    #[arg(long, global = true)]
+    pub(super) fallback: bool,
+    /// Threads of the CPU backend [default: as many as the processor runs at once]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
+    pub(super) threads: Option<u16>,
+    /// Print one JSON document on standard output and nothing else
+    #[arg(long, global = true)]
+    pub(super) json: bool,
+    /// Print errors only
+    #[arg(short, long, global = true)]
+    pub(super) quiet: bool,
+}
+
+/// What lies over the keys of a configuration.
+#[derive(Args, Clone, Debug, Default)]
+pub(super) struct Keys {
+    /// Profile whose defaults count, instead of the configuration's
+    #[arg(long, value_enum)]
+    pub(super) profile: Option<Profile>,
+    /// Override a key of the configuration, for instance rollout.horizon=40; repeatable
+    #[arg(long, value_name = "SECTION.KEY=VALUE")]
+    pub(super) set: Vec<String>,
+}
+
+/// Everything that lies over a configuration with random numbers.
+#[derive(Args, Clone, Debug, Default)]
+pub(super) struct Changes {
+    /// Seed of every random stream, instead of the configuration's
+    #[arg(long, value_name = "N")]
+    pub(super) seed: Option<u64>,
+    #[command(flatten)]
+    pub(super) keys: Keys,
+}
+
+/// Whether results may take the place of others.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub(super) struct Replace {
+    /// Replace what an earlier command left at that place
+    #[arg(long)]
+    pub(super) overwrite: bool,
+}
+
+/// What every command is told by its options, those that it does not have left out.
+#[derive(Clone, Debug)]
+pub(super) struct Global {
+    /// Options of every command.
+    pub(super) common: Common,
+    /// What lies over the configuration.
+    pub(super) changes: Changes,
+    /// Where the results go.
+    pub(super) out: Option<PathBuf>,
+    /// What becomes of results that are there.
+    pub(super) existing: Existing,
+}
+
+impl Global {
+    /// What lies over a configuration file.
+    pub(super) fn overrides(&self) -> Overrides {
+        let Changes { seed, keys: Keys { profile, set } } = self.changes.clone();
+        Overrides { profile, seed, set }
+    }
+
+    /// The folder of the results, `usual` unless another one was named.
+    pub(super) fn folder(&self, usual: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| PathBuf::from(usual))
+    }
+}
+
+impl Arguments {
+    /// The options that are not of one command alone.
+    pub(super) fn global(&self) -> Global {
+        let (changes, out, replace) = self.command.options();
+        let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
+        Global { common: self.common.clone(), changes, out: out.cloned(), existing }
+    }
+}
+
+/// The values of `--backend`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum BackendName {
+    /// A hardware GPU if there is one, else the CPU; never a software adapter
+    Auto,
+    /// The native CPU backend
+    Cpu,
+    /// A GPU, or a software adapter where there is none
+    Gpu,
+}

@@ -1,0 +1,98 @@
+//! The layers of a configuration: the file, what is set over it, and which of them is to blame.
+
+use toml::Table;
+
+use super::counts;
+use super::section::{Config, Profile};
+use super::{defaults, keys};
+use crate::error::{Error, Result};
+
+/// A document with the name that errors have for it.
+pub(super) type Layer = (String, Table);
+
+/// What a configuration is made of, but for the defaults.
+pub(super) struct Layers {
+    /// The file.
+    pub(super) file: Layer,
+    /// What is set over it, in order.
+    pub(super) sets: Vec<Layer>,
+    /// Profile instead of the file's.
+    pub(super) profile: Option<Profile>,
+}
+
+impl Layers {
+    /// The configuration that all layers make.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the layer that is to blame: a setting without which the others are
+    /// right, else the file.
+    pub(super) fn config(&self) -> Result<Config> {
+        let mut config = self.merged(|_| true, &self.file.0).map_err(|error| {
+            let culprit = (0..self.sets.len()).rev().find(|&one| {
+                let others = self.merged(|set| set != one, "");
+                others.is_ok() && self.merged(|set| set <= one, "").is_err()
+            });
+            let named = |one: usize| self.merged(|_| true, &self.sets[one].0).err();
+            culprit.and_then(named).unwrap_or(error)
+        })?;
+        let has = |table: &Table, section: &str| {
+            table.get(section).is_some_and(|keys| keys.get("scenarios").is_some())
+        };
+        let standing = |section: &str| match self.sets.iter().any(|(_, set)| has(set, section)) {
+            true => None,
+            false if has(&self.file.1, section) => self.merged(|_| false, "").ok(),
+            false => self.plain().ok(),
+        };
+        counts::follow(&mut config, standing("deviation"), standing("growth"));
+        Ok(config)
+    }
+
+    /// The configuration of the file and of the sets whose numbers are `taken`; errors blame `origin`.
+    fn merged(&self, taken: impl Fn(usize) -> bool, origin: &str) -> Result<Config> {
+        let mut given = self.given(&taken);
+        self.name_profile(&mut given);
+        let mut merged = defaults(&given, origin)?;
+        let valid = keys::with_optional(&merged);
+        keys::check_known(&valid, &self.file.1, &self.file.0)?;
+        for (_, (name, set)) in self.sets.iter().enumerate().filter(|(number, _)| taken(*number)) {
+            keys::check_known(&valid, set, name)?;
+        }
+        keys::overlay(&mut merged, given);
+        for section in ["race", "train"] {
+            merged.get(section).map_or(Ok(()), |keys| keys::check_finite(section, keys))?;
+        }
+        // Without a source text, the message ends with a line that names the key.
+        let wrong_kind = |e: toml::de::Error| {
+            Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
+        };
+        merged.try_into().map_err(wrong_kind)
+    }
+
+    /// The file with the sets over it whose numbers are `taken`.
+    fn given(&self, taken: &impl Fn(usize) -> bool) -> Table {
+        let mut given = self.file.1.clone();
+        let sets = self.sets.iter().enumerate().filter(|(number, _)| taken(*number));
+        sets.for_each(|(_, (_, set))| keys::overlay(&mut given, set.clone()));
+        given
+    }
+
+    /// The defaults of the profile and the system in question.
+    fn plain(&self) -> Result<Config> {
+        let mut given = self.given(&|_| true);
+        self.name_profile(&mut given);
+        let plain = defaults(&given, &self.file.0)?;
+        plain.try_into().map_err(|e| Error::invalid("defaults", format!("{e}")))
+    }
+
+    /// Puts the profile that counts into `given`.
+    fn name_profile(&self, given: &mut Table) {
+        if let Some(profile) = self.profile {
+            given.insert("profile".to_owned(), profile.name().into());
+        }
+    }
+
+    /// Whether the file or a set has the section `train`.
+    pub(super) fn trains(&self) -> bool {
+        self.given(&|_| true).contains_key("train")
+    }
+}

@@ -1,0 +1,129 @@
+//! From a description to a controller: its formulas recorded, its network read.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::description::Description;
+use super::policy::{NetworkPolicy, Policy};
+use super::written::Written;
+use crate::error::{Error, Result};
+use crate::formula::text::Values;
+use crate::formula::{Graph, record};
+use crate::model::controller::{Controller, Law};
+use crate::policy::Mlp;
+
+impl Description {
+    /// The policy: its formulas recorded over the inputs of the model, its network read.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there is no policy, a formula is too large or asks for an output that the
+    /// network does not have; [`Error::File`] if the network cannot be read or has another width.
+    pub fn controller(&self) -> Result<Controller> {
+        let missing = || self.origin.refuse("policy", "missing; expected a section with a policy");
+        match self.policy.as_ref().ok_or_else(missing)? {
+            Policy::Formulas(formulas) => {
+                let law = Law::Formula(self.recorded("policy.formula", formulas)?);
+                Ok(Controller::new("formula", law))
+            }
+            Policy::Network(policy) => self.network(policy),
+        }
+    }
+
+    fn network(&self, policy: &NetworkPolicy) -> Result<Controller> {
+        let network = Mlp::load(&policy.file)?;
+        self.check_inputs(policy, &network)?;
+        self.check_outputs(policy, &network)?;
+        let observe = policy.observe.as_deref();
+        let observe = observe.map(|formulas| self.recorded("policy.observe", formulas));
+        let outputs = outputs(&network);
+        let act = policy.act.as_deref().map(|formulas| self.act(formulas, outputs));
+        let widths: Vec<String> = network.widths().iter().map(ToString::to_string).collect();
+        let law = Law::Network {
+            observe: observe.transpose()?,
+            network: Arc::new(network),
+            act: act.transpose()?,
+        };
+        Ok(Controller::new(format!("mlp {}", widths.join("-")), law))
+    }
+
+    /// Refuses a network that does not take what it would be given.
+    fn check_inputs(&self, policy: &NetworkPolicy, network: &Mlp) -> Result<()> {
+        let inputs = network.widths()[0];
+        let (given, what) = match &policy.observe {
+            Some(observe) => (observe.len(), "formulas in `observe`"),
+            None => (self.states.len(), "states; `observe` gives a network other inputs"),
+        };
+        if given != inputs {
+            let problem =
+                format!("the network takes {inputs} inputs, the model has {given} {what}");
+            return Err(Error::file(&policy.file, problem));
+        }
+        match network.state_order() {
+            Some(order) if policy.observe.is_none() => self.check_order(&policy.file, order),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses a network whose inputs have other names than the states.
+    fn check_order(&self, file: &Path, order: &[String]) -> Result<()> {
+        let states: Vec<&str> = self.states.iter().map(|state| state.axis.name.as_str()).collect();
+        if order.iter().eq(&states) {
+            return Ok(());
+        }
+        let problem = format!(
+            "its inputs are `{}`, the states of the model are `{}`; `observe` gives a network its \
+             inputs by name",
+            order.join(","),
+            states.join(",")
+        );
+        Err(Error::file(file, problem))
+    }
+
+    /// Refuses a network that does not give what is asked for.
+    fn check_outputs(&self, policy: &NetworkPolicy, network: &Mlp) -> Result<()> {
+        let outputs = outputs(network);
+        let Some(act) = &policy.act else {
+            let controls = self.controls.len();
+            if outputs == controls {
+                return Ok(());
+            }
+            let problem = format!(
+                "the network has {outputs} outputs, the model has {controls} controls; `act` makes \
+                 controls of other outputs"
+            );
+            return Err(Error::file(&policy.file, problem));
+        };
+        for written in act {
+            let beyond = written.formula.outputs().find(|out| out.number as usize >= outputs);
+            if let Some(found) = beyond {
+                let problem = format!(
+                    "`out[{}]` is none of the network's outputs, 0 to {}",
+                    found.number,
+                    outputs - 1
+                );
+                return Err(written.refuse(&self.origin, found.at, problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// The controls over the inputs of the model and the `outputs` of the network behind them.
+    fn act(&self, formulas: &[Written], outputs: usize) -> Result<Graph> {
+        let needed = self.lets.needed(formulas);
+        let own: usize = formulas.iter().map(|written| written.formula.operations()).sum();
+        self.check_size("policy.act", own + self.lets.operations(&needed))?;
+        let graph = record(self.inputs() + outputs, |inputs| {
+            let (inputs, outputs) = inputs.split_at(self.inputs());
+            let names = self.lets.values(inputs, &needed);
+            let values = Values { names: &names, outputs };
+            formulas.iter().map(|written| written.formula.value(values)).collect()
+        });
+        self.check_size("policy.act", graph.nodes.len())?;
+        Ok(graph)
+    }
+}
+
+/// The number of outputs of `network`.
+fn outputs(network: &Mlp) -> usize {
+    network.widths().last().copied().unwrap_or_default()
+}

@@ -1,0 +1,125 @@
+//! What a text says about a model and its policy, checked, its formulas parsed.
+
+use toml::Table;
+
+use super::axes::{self, State};
+use super::dynamics::{self, Dynamics};
+use super::lets::Lets;
+use super::names::{Scope, Seconds};
+use super::origin::Origin;
+use super::policy::{self, Policy};
+use super::section::Section;
+use super::task::{self, Task};
+use crate::error::Result;
+use crate::formula::text::{LONGEST_TEXT, shown};
+use crate::system::{Axis, Body, Parameter};
+
+/// Keys of `[model]`.
+const KEYS: [&str; 9] =
+    ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task"];
+/// Sections of `[model]` that pictures alone need.
+const PICTURES: [&str; 1] = ["bodies"];
+/// Sections of `[model]` that are refused by name, and what they would be.
+const LATER: [(&str, &str); 6] = [
+    ("disturbances", "numbers that are drawn at every step"),
+    ("noise", "measurement noise"),
+    ("costs", "costs of plans"),
+    ("references", "references of costs"),
+    ("maps", "maps of costs"),
+    ("shapes", "shapes of pictures"),
+];
+
+/// A model and its policy as a text describes them: every name known, every formula parsed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// Short name.
+    pub name: String,
+    /// States in order.
+    pub states: Vec<State>,
+    /// Controls in order, with their bounds.
+    pub controls: Vec<Axis>,
+    /// Numbers that are fixed for a rollout.
+    pub parameters: Vec<Parameter>,
+    /// Seconds between two steps, where the text says.
+    pub period: Option<f32>,
+    /// How the state moves on.
+    pub dynamics: Dynamics,
+    /// The margins.
+    pub task: Task,
+    /// What pictures show.
+    pub bodies: Vec<Body>,
+    /// What makes the controls, where the text says.
+    pub policy: Option<Policy>,
+    pub(super) lets: Lets,
+    pub(super) origin: Origin,
+}
+
+impl Description {
+    /// Reads the sections `model` and `policy`.
+    pub(super) fn read(table: &Table, origin: &Origin) -> Result<Self> {
+        let root = Section::root(origin, table);
+        let model = root.required("model", "a section that describes the plant and its task")?;
+        check_keys(&model)?;
+        check_length(&model)?;
+        let mut scope = Scope::default();
+        let name = name(&model)?;
+        let states = model.required("states", "the states by name")?;
+        let states = axes::states(&states, &mut scope)?;
+        let controls = model.required("controls", "the controls by name")?;
+        let controls = axes::controls(&controls, &mut scope)?;
+        let parameters = axes::parameters(model.section("parameters")?, &mut scope)?;
+        let time = dynamics::time(model.section("time")?.as_ref())?;
+        scope.declare_time(if time.period.is_some() { Seconds::Known } else { Seconds::Unknown });
+        let lets = Lets::read(model.section("let")?, &mut scope)?;
+        let state_names: Vec<&str> = states.iter().map(|state| state.axis.name.as_str()).collect();
+        let control_names: Vec<&str> = controls.iter().map(|axis| axis.name.as_str()).collect();
+        let policy = root.section("policy")?;
+        let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
+        Ok(Self {
+            dynamics: dynamics::dynamics(&model, &state_names, time, &scope)?,
+            task: task::task(&model.required("task", "the kind and its margins")?, &scope)?,
+            bodies: task::bodies(model.section("bodies")?, &scope)?,
+            policy: policy.transpose()?,
+            name,
+            states,
+            controls,
+            parameters,
+            period: time.period,
+            lets,
+            origin: origin.clone(),
+        })
+    }
+}
+
+/// Refuses keys of `[model]` that are unknown, and those that do not work yet.
+fn check_keys(model: &Section<'_>) -> Result<()> {
+    let later = LATER.iter().map(|(key, _)| *key);
+    model.only(KEYS.into_iter().chain(PICTURES).chain(later))?;
+    match LATER.iter().find(|(key, _)| model.has(key)) {
+        Some((key, what)) => {
+            Err(model.refuse(key, format!("{what} do not work yet; leave the section out")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a model whose keys and formulas together are too long.
+fn check_length(model: &Section<'_>) -> Result<()> {
+    let length = model.length();
+    if length > LONGEST_TEXT {
+        let problem = format!("a model of {length} bytes, at most {LONGEST_TEXT} are read");
+        return Err(model.refuse_whole(problem));
+    }
+    Ok(())
+}
+
+fn name(model: &Section<'_>) -> Result<String> {
+    let missing = || model.refuse("name", "missing; expected a short name");
+    let name = model.text("name")?.ok_or_else(missing)?;
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
+        let problem = format!("`{}`; expected 1 to 64 letters, digits, `-` and `_`", shown(name));
+        return Err(model.refuse("name", problem));
+    }
+    Ok(name.to_owned())
+}

@@ -1,0 +1,86 @@
+//! What a check found: figures as stored and as found, with words only where there is no number.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// One side of a finding; plain numbers are numbers in JSON too.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Figure {
+    /// A number of rollouts.
+    Count(u64),
+    /// A number.
+    Number(f64),
+    /// Whether something is so.
+    Flag(bool),
+    /// Lower and upper end.
+    Interval([f64; 2]),
+    /// A bound.
+    AtMost {
+        /// The largest value.
+        at_most: f64,
+    },
+    /// Failures of fresh trials, and the risk that they show.
+    Trials {
+        /// Trials that failed.
+        failures: u64,
+        /// All of them.
+        trials: u64,
+        /// The smallest risk that is left.
+        at_least: f64,
+    },
+    /// Anything else.
+    Words(String),
+}
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(count) => write!(f, "{count}"),
+            Self::Number(number) => write!(f, "{number:.6}"),
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Interval([low, high]) => write!(f, "{low:.6} to {high:.6}"),
+            Self::AtMost { at_most } => write!(f, "at most {at_most:.6}"),
+            Self::Trials { failures, trials, at_least } => {
+                write!(f, "{failures} of {trials}: at least {at_least:.6}")
+            }
+            Self::Words(words) => f.write_str(words),
+        }
+    }
+}
+
+/// One thing that was checked.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What.
+    pub name: String,
+    /// As stored.
+    pub stored: Figure,
+    /// As found now.
+    pub found: Figure,
+    /// Whether the stored claim stands.
+    pub holds: bool,
+}
+
+/// What a check found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckReport {
+    /// Whether every finding holds.
+    pub holds: bool,
+    /// One by one.
+    pub findings: Vec<Finding>,
+}
+
+impl CheckReport {
+    /// The report of these findings.
+    pub(super) fn new(findings: Vec<Finding>) -> Self {
+        Self { holds: findings.iter().all(|finding| finding.holds), findings }
+    }
+
+    /// Adds what was found beside.
+    pub fn add(&mut self, findings: Vec<Finding>) {
+        self.holds &= findings.iter().all(|finding| finding.holds);
+        self.findings.extend(findings);
+    }
+}
