@@ -4,8 +4,8 @@ use reachcast::Fault;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Gpu, Injection};
 use reachcast::backend::{Action, Backend};
+use reachcast::model::Plant;
 use reachcast::report::html;
-use reachcast::rollout::Plant;
 use reachcast::scenario::record::Record;
 use reachcast::scenario::settings::Settings;
 use reachcast::scenario::{Unwatched, certify, check};
@@ -17,26 +17,26 @@ use crate::gpu;
 const POLICY: BangBang = BangBang { acceleration: 1.0 };
 
 /// The double integrator, of which a ball beyond the certified set is verified.
-fn integrator() -> (DoubleIntegrator, Settings<2>) {
+fn integrator() -> (Plant, Settings) {
     let system = DoubleIntegrator::default();
     let mut settings = settings(&system, 30);
-    settings.state = [0.9, 0.6];
+    settings.state = vec![0.9, 0.6];
     settings.growth.radius = 0.2;
-    (system, settings)
+    (Plant::of(system, POLICY), settings)
 }
 
 fn certificate(backend: &Backend) -> Record {
-    let (system, settings) = integrator();
-    let plant = Plant { system: &system, policy: &POLICY };
+    let (plant, settings) = integrator();
+    let program = backend.prepare(&plant).expect("a program");
     let config = serde_json::json!({ "seed": settings.seed });
-    certify(backend, plant, &settings, config, &Unwatched).expect("a certificate")
+    certify(&program, &settings, config, &Unwatched).expect("a certificate")
 }
 
 /// Whether every finding of a check on `backend` holds.
 fn holds(backend: &Backend, record: &Record) -> bool {
-    let (system, settings) = integrator();
-    let plant = Plant { system: &system, policy: &POLICY };
-    let report = check(backend, plant, record, &settings, &Unwatched).expect("a check");
+    let (plant, settings) = integrator();
+    let program = backend.prepare(&plant).expect("a program");
+    let report = check(&program, record, &settings, &Unwatched).expect("a check");
     report.findings.iter().filter(|finding| !finding.holds).for_each(|f| println!("{f:?}"));
     report.holds
 }
