@@ -12,8 +12,9 @@ use reachcast::backend::cpu::Cpu;
 use reachcast::bench::data::{self, PLAN};
 use reachcast::config::{Config, Overrides, Profile};
 use reachcast::cost::{Fence, RACE_CONTEXT, RaceCost, RecoveryCost, Safety};
+use reachcast::model::Plant;
 use reachcast::policy::Mlp;
-use reachcast::rollout::{CostQuery, MppiProblem, MppiSpec, MppiTask, Plant, Query, ValueTerm};
+use reachcast::rollout::{CostQuery, MppiProblem, MppiSpec, MppiTask, Query, ValueTerm};
 use reachcast::scenario::global::{check_margins, slice_through};
 use reachcast::scenario::growth_batch::{Request, grow_each};
 use reachcast::scenario::{Context, Unwatched, tightened};
@@ -103,11 +104,11 @@ fn hybrid_step(criterion: &mut Criterion) {
     let load = |file: &str| Mlp::load(&root.join("configs/policies").join(file)).expect("network");
     let (policy, network) = (load("race_policy.safetensors"), load("race_value.safetensors"));
     let backend = Backend::Cpu(Cpu::new(None).expect("threads"));
-    let plant = Plant { system: &system, policy: &policy };
-    let context = Context { backend: &backend, plant, watch: &Unwatched };
+    let program = backend.prepare(&Plant::of(system, policy)).expect("a program");
+    let context = Context { program: &program, watch: &Unwatched };
     let losses = tightened(context, &settings).expect("deviation bound").losses;
     // A centre that fails at any radius, so that all rounds are flown.
-    let mut center = settings.state;
+    let mut center = settings.state.clone();
     (center[0], center[2], center[6], center[8]) = (0.0, -1.0, 0.1, -0.9);
     let request = [Request { center, seed: 1, call: 0 }];
     let (spec, problems) = (spec(500), problems(1));
@@ -117,7 +118,8 @@ fn hybrid_step(criterion: &mut Criterion) {
         MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
     let cells = slice_through(&settings, &settings.state);
     let slice = || {
-        check_margins(context, &settings.spec, &losses, &cells, Query::Sign, 0.0).expect("a slice")
+        check_margins(context, &settings.spec, &losses, cells.view(), Query::Sign, 0.0)
+            .expect("a slice")
     };
     let grow = || grow_each(context, &settings, &request, 0.0).expect("a ball");
     assert_eq!(grow()[0].rounds, settings.growth.rounds, "all rounds are flown");

@@ -19,6 +19,7 @@ use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Choice, Gpu};
 use reachcast::bench::data::{self, Data, HORIZON};
 use reachcast::bench::limits::multiply;
+use reachcast::model;
 use reachcast::policy::{Mlp, Policy};
 use reachcast::rollout::{
     DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts,
@@ -76,7 +77,7 @@ impl Bench {
         let system = DroneRace::default();
         let plant = Plant { system: &system, policy };
         let task = ReachAvoidTask {
-            starts: Starts::listed(&self.data.starts),
+            starts: Starts::listed(&*self.data.starts),
             range: 0..count,
             spec: self.spec,
             tightening: &self.tightening,
@@ -107,7 +108,7 @@ impl Bench {
         let plant = Plant { system: &system, policy };
         let task = DeviationTask {
             pairs: Pairs {
-                nominal: Starts::listed(&self.data.starts),
+                nominal: Starts::listed(&*self.data.starts),
                 radius: 0.1,
                 stream: Stream::new(1, Purpose::User, 0),
             },
@@ -186,22 +187,22 @@ fn scalar_loop(criterion: &mut Criterion) {
 /// of 159 starts all have failures.
 fn growth_round(criterion: &mut Criterion) {
     let bench = Bench::new();
-    let system = DroneRace::default();
-    let plant = Plant { system: &system, policy: &*bench.data.policy };
-    let mut settings = Settings::new(&system, bench.data.starts[0], bench.spec);
+    let plant = model::Plant::of(DroneRace::default(), Mlp::clone(&bench.data.policy));
+    let mut settings = Settings::new(&plant.model, bench.data.starts[0], bench.spec);
     let axis = |state, low: f32, cells: u8| SliceAxis {
         state,
         values: (0..cells).map(|i| low + 0.1 * f32::from(i)).collect(),
     };
-    settings.slice = [axis(0, -0.9, 18), axis(2, -2.6, 26)];
+    settings.slice = Some([axis(0, -0.9, 18), axis(2, -2.6, 26)]);
     settings.growth.rounds = 5;
     // A start beside the fence, whose neighbourhood fails however small the ball.
     let mut point = bench.data.starts[0];
     (point[0], point[2]) = (0.6, -0.55);
-    let boundary = Boundary { point, distance: 0.0 };
+    let boundary = Boundary { point: point.to_vec(), distance: 0.0 };
     let mut group = criterion.benchmark_group("growth");
     for (name, backend) in &bench.backends {
-        let context = Context { backend, plant, watch: &Unwatched };
+        let program = backend.prepare(&plant).expect("a program");
+        let context = Context { program: &program, watch: &Unwatched };
         group.bench_function(BenchmarkId::new(*name, "slice + 5 x 159"), |b| {
             b.iter(|| {
                 let slice = global::slice(context, &settings, &bench.tightening, 0.0);

@@ -3,9 +3,10 @@
 
 use reachcast::Result;
 use reachcast::backend::{Backend, cpu::Cpu};
+use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
-use reachcast::rollout::{Plant, RolloutSpec};
+use reachcast::rollout::RolloutSpec;
 use reachcast::scenario::{Unwatched, certify, record::Record, settings::Settings};
 use reachcast::system::{Axis, Body, System};
 
@@ -63,11 +64,11 @@ impl Policy<3, 1> for Steer {
 /// The certificate for starts left of the obstacle, 6 seconds to reach the target.
 pub(crate) fn certificate(backend: &Backend) -> Result<Record> {
     let spec = RolloutSpec::new(60, 0.98)?;
-    let mut settings = Settings::new(&Dubins, [-2.4, 0.9, 0.4], spec);
+    let plant = Plant::of(Dubins, Steer);
+    let mut settings = Settings::new(&plant.model, [-2.4, 0.9, 0.4], spec);
     settings.deviation.radius = 0.02;
     settings.global.draws = 4000;
-    let (system, policy) = (&Dubins, &Steer);
-    certify(backend, Plant { system, policy }, &settings, "dubins".into(), &Unwatched)
+    certify(&backend.prepare(&plant)?, &settings, "dubins".into(), &Unwatched)
 }
 
 fn main() -> Result<()> {

@@ -11,9 +11,11 @@ use common::{ClosedForm, FALSE_ALARM, binomial_limit, cpu, literal, settings, su
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::Error;
+use reachcast::backend::{Backend, Program};
+use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
-use reachcast::rollout::{Plant, Purpose, Tightening};
+use reachcast::rollout::{Purpose, Tightening};
 use reachcast::scenario::bound::{certified_risk, required_scenarios};
 use reachcast::scenario::boundary::Boundary;
 use reachcast::scenario::growth::{Growth, grow};
@@ -39,6 +41,10 @@ fn violates(name: &str, count: u64) -> bool {
     count > limit
 }
 
+fn program<'a>(backend: &'a Backend, plant: &Plant) -> Program<'a> {
+    backend.prepare(plant).expect("a program")
+}
+
 /// No control.
 struct Idle;
 
@@ -56,6 +62,7 @@ impl<const NX: usize> Policy<NX, 1> for Idle {
 /// The distance at step t = 1, 2, 3 is 16 times the offset of state t but for a hundredth: three
 /// steps, three nearly independent directions, so a bound on all three has three support scenarios
 /// and the scenario theory holds with equality.
+#[derive(Clone, Copy)]
 struct Relay;
 
 impl System<4, 1> for Relay {
@@ -150,10 +157,7 @@ fn refutes(bound: &[f64], distances: &[Vec<f32>], limits: [u64; 2], judge: Judge
 
 /// Settings that the library accepts with their number of scenarios: a looser risk than the one
 /// that the bound is judged by.
-fn loosened<S: System<NX, 1>, const NX: usize>(
-    context: Context<'_, S, Idle>,
-    mut settings: Settings<NX>,
-) -> Settings<NX> {
+fn loosened(context: Context<'_>, mut settings: Settings) -> Settings {
     while let Err(error) = deviation::bound(context, &settings) {
         assert!(
             matches!(error, Error::TooFewScenarios { .. }) && settings.deviation.epsilon < 0.9,
@@ -165,17 +169,17 @@ fn loosened<S: System<NX, 1>, const NX: usize>(
 }
 
 /// Seeds whose deviation bound from `scenarios` pairs is false.
-fn false_bounds<S: System<NX, 1>, const NX: usize>(
-    system: &S,
+fn false_bounds<S: System<NX, 1> + Copy + Send + 'static, const NX: usize>(
+    system: S,
     horizon: u32,
     joint: Joint,
     scenarios: u64,
     judge: Judge,
 ) -> u64 {
     let backend = cpu(1);
-    let plant = Plant { system, policy: &Idle };
-    let context = Context { backend: &backend, plant, watch: &Unwatched };
-    let mut settings = settings(system, horizon);
+    let program = program(&backend, &Plant::of(system, Idle));
+    let context = Context { program: &program, watch: &Unwatched };
+    let mut settings = settings(&system, horizon);
     settings.deviation.epsilon = EPSILON;
     settings.deviation.beta = BETA;
     settings.deviation.joint = joint;
@@ -183,7 +187,7 @@ fn false_bounds<S: System<NX, 1>, const NX: usize>(
     settings.deviation.pilot = 20;
     settings = loosened(context, settings);
     let radius = literal(settings.deviation.radius);
-    let distances = offset_distances(system, radius, horizon as usize);
+    let distances = offset_distances(&system, radius, horizon as usize);
     // More offsets than this beyond the bound have probability FALSE_ALARM if its risk is EPSILON.
     let share = [EPSILON, EPSILON / f64::from(horizon)];
     let limits = share.map(|risk| binomial_limit(OFFSETS as u64, risk));
@@ -207,10 +211,10 @@ fn fixed_shape_bounds_are_false_at_most_as_often_as_claimed() {
     let scenarios = exact_count(1, 1);
     assert_eq!(scenarios, 29);
     let system = DoubleIntegrator::default();
-    let count = |n| false_bounds(&system, 8, Joint::FixedShape, n, Judge::Together);
+    let count = |n| false_bounds(system, 8, Joint::FixedShape, n, Judge::Together);
     assert!(!violates("fixed shape", count(scenarios)));
     assert!(violates("fixed shape, half", count(scenarios / 2)));
-    let count = |n| false_bounds(&Relay, 3, Joint::FixedShape, n, Judge::Together);
+    let count = |n| false_bounds(Relay, 3, Joint::FixedShape, n, Judge::Together);
     assert!(!violates("fixed shape, relay", count(scenarios)));
     assert!(violates("fixed shape, relay, half", count(scenarios / 2)));
 }
@@ -219,7 +223,7 @@ fn fixed_shape_bounds_are_false_at_most_as_often_as_claimed() {
 #[test]
 fn bounds_by_variables_are_false_at_most_as_often_as_claimed() {
     let scenarios = exact_count(1, 3);
-    let count = |n| false_bounds(&Relay, 3, Joint::Variables, n, Judge::Together);
+    let count = |n| false_bounds(Relay, 3, Joint::Variables, n, Judge::Together);
     assert!(!violates("variables", count(scenarios)));
     assert!(violates("variables, half", count(scenarios / 2)));
 }
@@ -229,7 +233,7 @@ fn bounds_by_variables_are_false_at_most_as_often_as_claimed() {
 #[test]
 fn bonferroni_bounds_are_false_at_most_as_often_as_claimed() {
     let scenarios = exact_count(3, 1);
-    let count = |n, judge| false_bounds(&Relay, 3, Joint::Bonferroni, n, judge);
+    let count = |n, judge| false_bounds(Relay, 3, Joint::Bonferroni, n, judge);
     assert!(!violates("Bonferroni", count(scenarios, Judge::Together)));
     let steps = count(scenarios, Judge::StepByStep);
     assert!(!violates("Bonferroni by step", steps));
@@ -241,7 +245,7 @@ fn bonferroni_bounds_are_false_at_most_as_often_as_claimed() {
 /// often than claimed.
 #[test]
 fn separate_bounds_make_no_joint_statement() {
-    let count = |judge| false_bounds(&Relay, 3, Joint::Separate, exact_count(1, 1), judge);
+    let count = |judge| false_bounds(Relay, 3, Joint::Separate, exact_count(1, 1), judge);
     assert!(violates("separate, jointly", count(Judge::Together)));
 }
 
@@ -292,12 +296,8 @@ fn conditional_failures(tightening: &Tightening) -> [u64; 2] {
 fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     let backend = cpu(1);
     let system = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
-    let context = Context {
-        backend: &backend,
-        plant: Plant { system: &system, policy: &policy },
-        watch: &Unwatched,
-    };
+    let program = program(&backend, &Plant::of(system, BangBang { acceleration: 1.0 }));
+    let context = Context { program: &program, watch: &Unwatched };
     let mut settings = settings(&system, STEPS as u32);
     settings.deviation.radius = PERTURBATION as f32;
     settings.global.beta = BETA;
@@ -335,6 +335,7 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
 ///
 /// The same share of every ball around the tip fails, so that every round of the growth is as
 /// likely as the first to come out clean by luck.
+#[derive(Clone, Copy)]
 struct Wedge {
     /// Share of the full angle.
     share: f64,
@@ -380,28 +381,24 @@ const EXCESS: f64 = 1.02;
 struct Trial {
     center: [f32; 2],
     radius: f32,
-    horizon: u32,
     scenarios: u64,
     spending: Spending,
 }
 
 /// Seeds of which the growth verifies a ball that is false by `failure`, the share of a ball of a
 /// given radius that fails.
-fn false_balls<S: System<2, 1>, P: Policy<2, 1>>(
-    plant: Plant<'_, S, P>,
-    trial: Trial,
-    failure: impl Fn(f64) -> f64,
-) -> u64 {
+fn false_balls(plant: &Plant, asked: &Settings, trial: Trial, failure: impl Fn(f64) -> f64) -> u64 {
     let backend = cpu(1);
-    let context = Context { backend: &backend, plant, watch: &Unwatched };
-    let mut settings = settings(plant.system, trial.horizon);
+    let program = program(&backend, plant);
+    let context = Context { program: &program, watch: &Unwatched };
+    let mut settings = asked.clone();
     settings.growth.radius = trial.radius;
     settings.growth.rounds = ROUNDS;
     settings.growth.scenarios = trial.scenarios;
     settings.growth.epsilon = EPSILON;
     settings.growth.beta = BETA;
     settings.growth.split_beta = trial.spending == Spending::Split;
-    let boundary = Boundary { point: trial.center, distance: 0.0 };
+    let boundary = Boundary { point: trial.center.to_vec(), distance: 0.0 };
     let mut false_balls = 0;
     for seed in 0..SEEDS {
         settings.seed = seed;
@@ -446,10 +443,10 @@ fn round_count(spending: Spending) -> u64 {
 #[test]
 fn grown_balls_are_false_at_most_as_often_as_claimed() {
     let system = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant { system: &system, policy: &policy };
+    let plant = Plant::of(system, BangBang { acceleration: 1.0 });
     let form = ClosedForm::of(&system);
     let horizon = 20;
+    let settings = settings(&system, horizon);
     let loss = vec![0.0; horizon as usize + 1];
     let center = [0.6_f32, 0.3];
     let failure = |radius: f64| disc_failure(&form, center.map(f64::from), radius, &loss);
@@ -463,15 +460,14 @@ fn grown_balls_are_false_at_most_as_often_as_claimed() {
     let trial = Trial {
         center,
         radius: high as f32,
-        horizon,
         scenarios: round_count(Spending::Split),
         spending: Spending::Split,
     };
     println!("radius {high}: {} fails", failure(f64::from(trial.radius)));
     assert!(failure(f64::from(trial.radius)) > EPSILON);
     let half = Trial { scenarios: trial.scenarios / 2, ..trial };
-    assert!(!violates("growth", false_balls(plant, trial, failure)));
-    assert!(violates("growth, half", false_balls(plant, half, failure)));
+    assert!(!violates("growth", false_balls(&plant, &settings, trial, failure)));
+    assert!(violates("growth, half", false_balls(&plant, &settings, half, failure)));
 }
 
 /// A wedge, where every round is at risk: the claim is tight over all rounds, and spending the whole
@@ -480,15 +476,10 @@ fn grown_balls_are_false_at_most_as_often_as_claimed() {
 fn every_round_of_growth_is_paid_for() {
     let share = EXCESS * EPSILON;
     let system = Wedge { share };
-    let plant = Plant { system: &system, policy: &Idle };
-    let trial = |scenarios, spending| Trial {
-        center: [0.0; 2],
-        radius: 0.5,
-        horizon: 1,
-        scenarios,
-        spending,
-    };
-    let count = |trial| false_balls(plant, trial, |_| share);
+    let plant = Plant::of(system, Idle);
+    let settings = settings(&system, 1);
+    let trial = |scenarios, spending| Trial { center: [0.0; 2], radius: 0.5, scenarios, spending };
+    let count = |trial| false_balls(&plant, &settings, trial, |_| share);
     let scenarios = round_count(Spending::Split);
     let split = trial(scenarios, Spending::Split);
     assert!(!violates("wedge", count(split)));

@@ -4,21 +4,21 @@ mod common;
 
 use common::{cpu, race_policy, race_settings, settings};
 use reachcast::Error;
-use reachcast::backend::Backend;
-use reachcast::policy::{Mlp, Policy};
-use reachcast::rollout::Plant;
+use reachcast::backend::{Backend, Program};
+use reachcast::model::Plant;
+use reachcast::rollout::States;
 use reachcast::scenario::record::{GrowthOutcome, Record, Timing};
 use reachcast::scenario::settings::Settings;
 use reachcast::scenario::{Unwatched, certify, check, query};
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
 
-fn certificate<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    settings: &Settings<NX>,
-) -> Record {
+fn program<'a>(backend: &'a Backend, plant: &Plant) -> Program<'a> {
+    backend.prepare(plant).expect("a program")
+}
+
+fn certificate(program: &Program<'_>, settings: &Settings) -> Record {
     let config = serde_json::json!({ "seed": settings.seed });
-    certify(backend, plant, settings, config, &Unwatched).expect("certificate")
+    certify(program, settings, config, &Unwatched).expect("certificate")
 }
 
 /// The certificate as JSON, but for its timing.
@@ -41,24 +41,27 @@ fn assert_same(a: &str, b: &str) {
     panic!("{}\nis not\n{}", around(a), around(b));
 }
 
-/// The race with the trained network; a plant borrows both.
-fn race() -> (DroneRace, Mlp, Settings<12>) {
+/// The race with the trained network.
+fn race() -> (Plant, Settings) {
     let system = DroneRace::default();
     let settings = race_settings(&system);
-    (system, race_policy(), settings)
+    (Plant::of(system, race_policy()), settings)
 }
 
 #[test]
 fn same_seed_same_certificate_with_one_and_two_threads() {
-    let (system, policy, mut settings) = race();
-    let plant = Plant { system: &system, policy: &policy };
-    let one = certificate(&cpu(1), plant, &settings);
-    let two = certificate(&cpu(2), plant, &settings);
+    let (plant, mut settings) = race();
+    let (single, both) = (cpu(1), cpu(2));
+    let program_of_both = program(&both, &plant);
+    let one = certificate(&program(&single, &plant), &settings);
+    let two = certificate(&program_of_both, &settings);
     assert_same(&text(&one), &text(&two));
-    let again = certificate(&cpu(2), plant, &settings);
-    assert_same(&text(&two), &text(&again));
+    // The program as it was left, and one made anew.
+    assert_same(&text(&two), &text(&certificate(&program_of_both, &settings)));
+    let another = cpu(2);
+    assert_same(&text(&two), &text(&certificate(&program(&another, &plant), &settings)));
     settings.seed += 1;
-    let other = certificate(&cpu(2), plant, &settings);
+    let other = certificate(&program_of_both, &settings);
     assert_ne!(two.deviation.bound, other.deviation.bound);
     assert_ne!(two.global.accepted, other.global.accepted);
     // It is a certificate of something: a part of the box, and a ball.
@@ -68,34 +71,34 @@ fn same_seed_same_certificate_with_one_and_two_threads() {
 
 #[test]
 fn a_certificate_survives_its_file_and_its_check() {
-    let (system, policy, settings) = race();
-    let plant = Plant { system: &system, policy: &policy };
+    let (plant, settings) = race();
     let backend = cpu(2);
-    let record = certificate(&backend, plant, &settings);
+    let program = program(&backend, &plant);
+    let record = certificate(&program, &settings);
     let stored = serde_json::to_string(&record).expect("JSON");
     let read: Record = serde_json::from_str(&stored).expect("record");
     assert_eq!(read, record);
-    let report = check(&backend, plant, &read, &settings, &Unwatched).expect("check");
+    let report = check(&program, &read, &settings, &Unwatched).expect("check");
     assert!(report.holds, "{:#?}", report.findings);
 }
 
 /// The double integrator with bang-bang control, of which a ball beyond the certified set is verified.
-fn integrator() -> (DoubleIntegrator, BangBang, Settings<2>) {
+fn integrator() -> (Plant, Settings) {
     let system = DoubleIntegrator::default();
     let mut settings = settings(&system, 30);
-    settings.state = [0.9, 0.6];
+    settings.state = vec![0.9, 0.6];
     settings.growth.radius = 0.2;
-    (system, BangBang { acceleration: 1.0 }, settings)
+    (Plant::of(system, BangBang { acceleration: 1.0 }), settings)
 }
 
 /// Whether a check of the record after `change` refuses it or finds a claim that does not hold.
 fn is_caught(change: impl Fn(&mut Record)) -> bool {
-    let (system, policy, settings) = integrator();
-    let plant = Plant { system: &system, policy: &policy };
+    let (plant, settings) = integrator();
     let backend = cpu(2);
-    let mut record = certificate(&backend, plant, &settings);
+    let program = program(&backend, &plant);
+    let mut record = certificate(&program, &settings);
     change(&mut record);
-    match check(&backend, plant, &record, &settings, &Unwatched) {
+    match check(&program, &record, &settings, &Unwatched) {
         Ok(report) => !report.holds,
         Err(Error::Refused(_)) => true,
         Err(error) => panic!("{error}"),
@@ -135,31 +138,30 @@ fn a_changed_certificate_is_caught() {
 /// A certificate of another system's parameters is refused, by `check` and by `query`.
 #[test]
 fn a_certificate_of_another_plant_is_refused() {
-    let (system, policy, settings) = integrator();
-    let plant = Plant { system: &system, policy: &policy };
+    let (plant, settings) = integrator();
     let backend = cpu(2);
-    let record = certificate(&backend, plant, &settings);
-    let wider = DoubleIntegrator { corridor: 2.0, ..system };
-    let other = Plant { system: &wider, policy: &policy };
-    let checked = check(&backend, other, &record, &settings, &Unwatched);
+    let record = certificate(&program(&backend, &plant), &settings);
+    let wider = DoubleIntegrator { corridor: 2.0, ..DoubleIntegrator::default() };
+    let other = program(&backend, &Plant::of(wider, BangBang { acceleration: 1.0 }));
+    let checked = check(&other, &record, &settings, &Unwatched);
     assert!(matches!(checked, Err(Error::Refused(_))), "{checked:?}");
-    let queried = query(&backend, other, &record, &settings, &[[0.0; 2]]);
+    let queried = query(&other, &record, &settings, (&[[0.0; 2]]).into());
     assert!(matches!(queried, Err(Error::Refused(_))), "{queried:?}");
 }
 
 /// Every tier occurs over the box, each where its definition says.
 #[test]
 fn tiers_are_those_of_their_definition() {
-    let (system, policy, settings) = integrator();
-    let plant = Plant { system: &system, policy: &policy };
+    let (plant, settings) = integrator();
     let backend = cpu(2);
-    let record = certificate(&backend, plant, &settings);
+    let program = program(&backend, &plant);
+    let record = certificate(&program, &settings);
     assert_eq!(record.growth.outcome, GrowthOutcome::Verified);
     let center = record.growth.center.clone().expect("centre");
     let node = |i: u16, half: f32| half * (f32::from(2 * i + 1) / 120.0 - 1.0);
     let states: Vec<[f32; 2]> =
         (0..120 * 120).map(|i| [node(i / 120, 1.2), node(i % 120, 1.5)]).collect();
-    let rows = query(&backend, plant, &record, &settings, &states).expect("tiers");
+    let rows = query(&program, &record, &settings, (&states).into()).expect("tiers");
     assert_eq!(rows.len(), states.len());
     let mut counts = [0; 4];
     for (x, row) in states.iter().zip(&rows) {
@@ -180,6 +182,6 @@ fn tiers_are_those_of_their_definition() {
     println!("states per tier: {counts:?}");
     assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
     // The state of the certificate has the tier that a query finds.
-    let own = query(&backend, plant, &record, &settings, &[settings.state]).expect("tier");
+    let own = query(&program, &record, &settings, States::one(&settings.state)).expect("tier");
     assert_eq!(own[0].tier, record.state.tier);
 }

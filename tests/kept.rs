@@ -256,7 +256,9 @@ fn a_second_interrupt_stops_at_once() {
             .unwrap();
         std::thread::sleep(Duration::from_millis(1000));
         // Both are there when it goes on.
-        ["-STOP", "-INT", "-TERM", "-CONT"].map(|signal| send(signal, child.id()));
+        for signal in ["-STOP", "-INT", "-TERM", "-CONT"] {
+            send(signal, child.id());
+        }
         let code = child.wait().unwrap().code();
         let mut message = String::new();
         child.stderr.take().unwrap().read_to_string(&mut message).unwrap();

@@ -10,6 +10,7 @@ use common::{backends, settings};
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::backend::{Backend, gpu::Choice};
 use reachcast::cost::Cost;
+use reachcast::model;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::report::html;
@@ -35,6 +36,10 @@ enum Motion {
     TargetOverflows,
     /// Stays; the constraint margin overflows downward above 1. The target lies above 0.5.
     ConstraintOverflows,
+    /// Stays; the target margin is NaN below 0.
+    TargetUnknown,
+    /// Stays; the constraint margin is NaN below 0. The target lies above -0.5.
+    ConstraintUnknown,
 }
 
 /// One state on a line.
@@ -55,7 +60,7 @@ impl System<1, 1> for Line {
             Motion::Driven => [x + R::lit(0.1) * u],
             Motion::Squared => [x * x + R::lit(0.0) * u],
             Motion::Shrinking => [x * R::lit(1e-10) + R::lit(0.0) * u],
-            Motion::TargetOverflows | Motion::ConstraintOverflows => [x + R::lit(0.0) * u],
+            _ => [x + R::lit(0.0) * u],
         }
     }
     fn target<R: Real>(&self, [x]: [R; 1]) -> R {
@@ -64,11 +69,14 @@ impl System<1, 1> for Line {
             Motion::Shrinking => x,
             Motion::TargetOverflows => x * R::lit(3.0e38),
             Motion::Driven | Motion::ConstraintOverflows => x - R::lit(0.5),
+            Motion::TargetUnknown => x.sqrt(),
+            Motion::ConstraintUnknown => x + R::lit(0.5),
         }
     }
     fn constraint<R: Real>(&self, [x]: [R; 1]) -> R {
         match self.0 {
             Motion::ConstraintOverflows => R::lit(1.0) - x * R::lit(3.0e38),
+            Motion::ConstraintUnknown => x.sqrt(),
             _ => R::lit(1e6) + R::lit(0.0) * x,
         }
     }
@@ -163,9 +171,11 @@ fn expected<P: Policy<1, 1>>(motion: Motion, policy: &P, start: f32, horizon: u3
     let (mut safe, mut best) = (f32::INFINITY, NON_FINITE);
     for t in 0..=horizon {
         let (r, c): (f32, f32) = (system.target(x), system.constraint(x));
-        if !(x[0].is_finite() && r.is_finite() && c.is_finite()) {
+        if !x[0].is_finite() || r.is_nan() || c.is_nan() {
             return if best > 0.0 { best } else { NON_FINITE };
         }
+        // An infinite margin is satisfied or violated.
+        let [r, c] = [r, c].map(|margin| margin.clamp(f32::MIN, f32::MAX));
         safe = safe.min(c);
         best = best.max(safe.min(r));
         if t < horizon {
@@ -175,7 +185,8 @@ fn expected<P: Policy<1, 1>>(motion: Motion, policy: &P, start: f32, horizon: u3
     best
 }
 
-/// Holds every backend against the definition; the number of starts that are not finite.
+/// Holds every backend against the definition; the number of starts with the least measure that there
+/// is, that of rollouts which are not finite.
 fn check<P: Policy<1, 1>>(motion: Motion, policy: &P, horizon: u32) -> usize {
     let tightening = none(horizon);
     let truth: Vec<f32> =
@@ -225,11 +236,21 @@ fn dynamics_that_overflow_fail() {
 }
 
 #[test]
-fn margins_that_overflow_fail() {
-    // Upward 87 starts overflow, beyond 3.4e38 / 3e38. Downward all 200 count, since a margin below
-    // -1e30 is not told from one that overflows.
-    assert_eq!(check(Motion::TargetOverflows, &Idle, 2), 87 + 200);
-    assert_eq!(check(Motion::ConstraintOverflows, &Idle, 2), 87 + 200);
+fn margins_that_overflow_are_satisfied_or_violated() {
+    // The 87 starts beyond 3.4e38 / 3e38 on the side where the margin is positive are as those
+    // before them. Downward all 200 count, since a margin below -1e30 is the least there is.
+    assert_eq!(check(Motion::TargetOverflows, &Idle, 2), 200);
+    assert_eq!(check(Motion::ConstraintOverflows, &Idle, 2), 200);
+    for start in [1.0, 2.0] {
+        assert!(expected(Motion::TargetOverflows, &Idle, start, 2) == 1e6, "from {start}");
+        assert!(expected(Motion::ConstraintOverflows, &Idle, -start, 2) == -start - 0.5);
+    }
+}
+
+#[test]
+fn margins_that_are_not_numbers_fail() {
+    assert_eq!(check(Motion::TargetUnknown, &Idle, 2), 200);
+    assert_eq!(check(Motion::ConstraintUnknown, &Idle, 2), 200);
 }
 
 /// The range of subnormal numbers may be lost, nothing else; within a band nothing is.
@@ -249,12 +270,12 @@ fn subnormal_numbers_are_zero_at_worst() {
         }
         println!("{}: {flushed} of {} subnormal measures are 0", backend.device(), found.len());
         // A certificate decides them in f64.
-        let system = Line(Motion::Shrinking);
-        let plant = Plant { system: &system, policy: &Idle };
-        let context = Context { backend: &backend, plant, watch: &Unwatched };
+        let plant = model::Plant::of(Line(Motion::Shrinking), Idle);
+        let program = backend.prepare(&plant).expect("a program");
+        let context = Context { program: &program, watch: &Unwatched };
         let spec = spec(&tightening);
         let (starts, query) = (starts(), Query::Measure);
-        let margins = check_margins(context, &spec, &tightening, &starts, query, 1e-5);
+        let margins = check_margins(context, &spec, &tightening, (&starts).into(), query, 1e-5);
         for ([start], margin) in starts.iter().zip(margins.expect("margins")) {
             assert_eq!(*start > 0.0, margin > 0.0, "{start} on {}", backend.device());
         }
@@ -304,12 +325,13 @@ impl Policy<2, 1> for Still {
 fn certificates(edge: f32) -> Vec<Record> {
     let system = Plane { edge };
     let mut settings = settings(&system, 2);
-    settings.state = [0.45, 0.0];
+    settings.state = vec![0.45, 0.0];
     settings.deviation.radius = 0.02;
     settings.growth.radius = 0.9;
-    let plant = Plant { system: &system, policy: &Still };
+    let plant = model::Plant::of(system, Still);
     let certify = |backend: &Backend| {
-        certify(backend, plant, &settings, serde_json::json!({}), &Unwatched).expect("a record")
+        let program = backend.prepare(&plant).expect("a program");
+        certify(&program, &settings, serde_json::json!({}), &Unwatched).expect("a record")
     };
     backends().iter().map(certify).collect()
 }

@@ -7,17 +7,19 @@ use common::{
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use reachcast::backend::Backend;
+use reachcast::backend::{Backend, Program};
+use reachcast::model;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::rollout::{
     DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Purpose, Query,
-    ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening, measure,
+    ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Stream, Tightening, measure,
 };
 use reachcast::scenario::settings::{Joint, Settings};
 use reachcast::scenario::{Context, Unwatched, certify, deviation, global};
 use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
 use statrs::distribution::{ContinuousCDF, Normal};
+use std::array::from_fn;
 
 /// Race, radius 0.1: step, exact supremum, scenario estimate with 159 pairs averaged over 400
 /// independent draws (`docs/method.md`, section 9).
@@ -36,8 +38,12 @@ const RACE_DEVIATION: [(usize, f64, f64); 10] = [
 /// Half a unit of the last digit of these numbers.
 const LAST_DIGIT: f64 = 5e-5;
 
-fn context<'a, S, P>(backend: &'a Backend, system: &'a S, policy: &'a P) -> Context<'a, S, P> {
-    Context { backend, plant: Plant { system, policy }, watch: &Unwatched }
+fn program<'a>(backend: &'a Backend, plant: &model::Plant) -> Program<'a> {
+    backend.prepare(plant).expect("a program")
+}
+
+fn context<'a>(program: &'a Program<'a>) -> Context<'a> {
+    Context { program, watch: &Unwatched }
 }
 
 /// A network of the race with random weights.
@@ -82,18 +88,13 @@ impl Policy<2, 1> for Damped {
 }
 
 /// The scenario estimate of 159 pairs, each step by itself.
-fn estimate<P: Policy<12, 3>>(
-    backend: &Backend,
-    system: &DroneRace,
-    policy: &P,
-    seed: u64,
-) -> Vec<f64> {
-    let mut settings = race_settings(system);
+fn estimate(program: &Program<'_>, seed: u64) -> Vec<f64> {
+    let mut settings = race_settings(&DroneRace::default());
     settings.seed = seed;
     settings.deviation.radius = 0.1;
     settings.deviation.joint = Joint::Separate;
     settings.deviation.scenarios = 159;
-    let record = deviation::bound(context(backend, system, policy), &settings).expect("bound");
+    let record = deviation::bound(context(program), &settings).expect("bound");
     record.largest
 }
 
@@ -107,11 +108,14 @@ fn race_deviation_stays_below_its_supremum_for_any_policy() {
         assert!(off <= LAST_DIGIT + 1e-6, "step {t}: {}", exact[t]);
     }
     for backend in &backends() {
-        let largest = [
-            estimate(backend, &system, &race_policy(), 3),
-            estimate(backend, &system, &random_policy(11), 4),
-            estimate(backend, &system, &Steer, 5),
+        let plants = [
+            model::Plant::of(DroneRace::default(), race_policy()),
+            model::Plant::of(DroneRace::default(), random_policy(11)),
+            model::Plant::of(DroneRace::default(), Steer),
         ];
+        let largest =
+            (3..).zip(&plants).map(|(seed, plant)| estimate(&program(backend, plant), seed));
+        let largest: Vec<Vec<f64>> = largest.collect();
         for (policy, largest) in largest.iter().enumerate() {
             for (t, (largest, exact)) in largest.iter().zip(&exact).enumerate() {
                 assert!(largest < exact, "policy {policy}, step {t}: {largest} of {exact}");
@@ -127,11 +131,12 @@ fn race_deviation_stays_below_its_supremum_for_any_policy() {
 #[test]
 fn race_deviation_averages_are_the_published_ones() {
     const DRAWS: usize = 400;
-    let system = DroneRace::default();
+    let plant = model::Plant::of(DroneRace::default(), Steer);
     let quantile = Normal::standard().inverse_cdf(1.0 - FALSE_ALARM / 2.0);
     for backend in &backends() {
+        let program = program(backend, &plant);
         let draws: Vec<Vec<f64>> =
-            (0..DRAWS).map(|seed| estimate(backend, &system, &Steer, 1000 + seed as u64)).collect();
+            (0..DRAWS).map(|seed| estimate(&program, 1000 + seed as u64)).collect();
         for (t, _, published) in RACE_DEVIATION {
             let values: Vec<f64> = draws.iter().map(|draw| draw[t]).collect();
             let mean = values.iter().sum::<f64>() / DRAWS as f64;
@@ -249,21 +254,23 @@ fn margins_within_the_band_are_decided_in_f64() {
     );
     let starts =
         Starts::Drawn { region: region.expect("box"), stream: Stream::new(5, Purpose::User, 3) };
-    let states: Vec<[f32; 12]> = (0..200).map(|index| starts.start(index)).collect();
+    let states = StateList::new(12).with((0..200).map(|index| starts.start(index)));
     let backend = cpu(2);
-    let context = context(&backend, &system, &policy);
+    let program = program(&backend, &model::Plant::of(DroneRace::default(), race_policy()));
     let margins = |band: f64| {
-        global::check_margins(context, &spec, &tightening, &states, Query::Measure, band)
+        let (states, query) = (states.view(), Query::Measure);
+        global::check_margins(context(&program), &spec, &tightening, states, query, band)
             .expect("margins")
     };
     let (plain, banded) = (margins(0.0), margins(1.0));
     let mut changed = 0;
-    for ((x, plain), banded) in states.iter().zip(plain).zip(banded) {
+    let plant = Plant { system: &system, policy: &policy };
+    for ((x, plain), banded) in states.arrays::<12>().into_iter().zip(plain).zip(banded) {
         if plain.abs() > 1.0 {
             assert_eq!(plain, banded);
             continue;
         }
-        let truth = measure(context.plant, *x, &spec, &tightening) as f32;
+        let truth = measure(plant, x, &spec, &tightening) as f32;
         assert_eq!(banded, truth);
         changed += u32::from(banded != plain);
     }
@@ -275,7 +282,7 @@ fn margins_within_the_band_are_decided_in_f64() {
 #[test]
 fn certified_starts_are_inside_the_true_set() {
     let system = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
+    let plant = model::Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
     let form = ClosedForm::of(&system);
     let spec = RolloutSpec::new(30, 0.95).expect("spec");
     let loss = [0.0; 31];
@@ -283,13 +290,14 @@ fn certified_starts_are_inside_the_true_set() {
     let inside = |[p, v]: [f32; 2]| form.contains([f64::from(p), f64::from(v)], &loss);
     let all = starts.iter().filter(|x| inside(**x)).count();
     for backend in &backends() {
-        let context = context(backend, &system, &policy);
+        let program = program(backend, &plant);
         let mut shares = Vec::new();
         for radius in [0.1, 0.03, 0.01, 0.001] {
             let bound = supremum(&system, radius, 30);
             let tightening = deviation::tightening(&bound, 1.0, 1.0, &spec);
+            let (context, query) = (context(&program), Query::Measure);
             let margins =
-                global::check_margins(context, &spec, &tightening, &starts, Query::Measure, 0.0)
+                global::check_margins(context, &spec, &tightening, (&starts).into(), query, 0.0)
                     .expect("margins");
             let certified = starts.iter().zip(margins).filter(|(_, m)| *m > 0.0);
             let mut count = 0;
@@ -316,17 +324,17 @@ fn certified_starts_are_inside_the_true_set() {
 #[test]
 fn certified_share_is_that_of_the_closed_form() {
     let system = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
+    let plant = model::Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
     let form = ClosedForm::of(&system);
-    let plant = Plant { system: &system, policy: &policy };
     let mut settings = settings(&system, 30);
     settings.deviation.radius = 0.03;
     settings.global.draws = 20_000;
     settings.global.beta = FALSE_ALARM;
     settings.growth.radius = 0.05;
     for backend in &backends() {
-        let record = certify(backend, plant, &settings, serde_json::Value::Null, &Unwatched)
-            .expect("certificate");
+        let record =
+            certify(&program(backend, &plant), &settings, serde_json::Value::Null, &Unwatched)
+                .expect("certificate");
         let bound = &record.deviation.bound;
         // No step leaps over the tightened target (see the closed form).
         assert!(bound.iter().all(|bound| 2.0 * (0.25 - bound) > 0.21));
@@ -423,7 +431,7 @@ fn allowance(name: &str, pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
 fn compare<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
     plant: Plant<'_, S, P>,
-    settings: &Settings<NX>,
+    settings: &Settings,
     control: PairControl,
 ) where
     S: System<NX, NU>,
@@ -436,7 +444,7 @@ fn compare<S, P, const NX: usize, const NU: usize>(
     let bound: Vec<f64> = (0..=spec.horizon).map(|t| radius * (1.0 + 0.1 * f64::from(t))).collect();
     let tightening = deviation::tightening(&bound, 0.5, 0.25, &spec);
     let starts = || Starts::Drawn {
-        region: Region::new_box(settings.low, settings.high).expect("box"),
+        region: Region::new_box(&*settings.low, &*settings.high).expect("box"),
         stream: Stream::new(9, Purpose::User, 0),
     };
     let pairs = Pairs {
@@ -444,7 +452,7 @@ fn compare<S, P, const NX: usize, const NU: usize>(
         radius: settings.deviation.radius,
         stream: Stream::new(9, Purpose::User, 1),
     };
-    let given = |i: u64| pairs.load::<1>(i).map(|x| x.map(|lane| lane.0[0]));
+    let given = |i: u64| pairs.pair(i).map(|x| from_fn(|k| x[k]));
     let oracle: Vec<ScalarPair> = (0..COUNT)
         .map(|i| scalar_pair::<f64, S, P, NX, NU>(plant, given(i), &spec, &tightening, control))
         .collect();
@@ -560,8 +568,9 @@ fn every_f32_path_is_near_its_f64_loop() {
             let mut settings_of_race = race_settings(&race);
             // Near the gate, so that both signs are common.
             settings_of_race.low =
-                [-0.5, -0.2, -1.5, 0.4, -0.3, -0.2, -1.0, -0.2, -3.2, 0.1, -1.0, -0.2];
-            settings_of_race.high = [0.5, 0.2, -0.5, 0.8, 0.3, 0.2, 1.0, 0.2, -1.0, 0.4, 1.0, 0.2];
+                vec![-0.5, -0.2, -1.5, 0.4, -0.3, -0.2, -1.0, -0.2, -3.2, 0.1, -1.0, -0.2];
+            settings_of_race.high =
+                vec![0.5, 0.2, -0.5, 0.8, 0.3, 0.2, 1.0, 0.2, -1.0, 0.4, 1.0, 0.2];
             let plant = Plant { system: &race, policy: &network };
             compare(backend, plant, &settings_of_race, control);
             let plant = Plant { system: &race, policy: &Steer };

@@ -183,14 +183,13 @@ fn every_output_lies_in_its_interval() {
 #[test]
 fn seen_ranges_are_those_of_the_states_drawn() {
     let network = race_policy();
-    let (low, high) = ([-1.0_f32; 12], std::array::from_fn(|i| 0.25 * i as f32));
+    let (low, high) = (vec![-1.0_f32; 12], (0..12).map(|i| 0.25 * i as f32).collect::<Vec<_>>());
     let stream = Stream::new(3, Purpose::User, 0);
     let batches = (0..640).step_by(16).map(|i| stream.in_box::<16>(&low, &high, i));
     let ranges = output_ranges(&network, batches);
     let region = Region::Box { low, high };
     for (control, [least, most]) in ranges.into_iter().enumerate() {
-        let single = |i| region.sample::<1>(stream, i).map(|coordinate| coordinate.0[0]);
-        let values = (0..640).map(|i| network.forward(&single(i))[control]);
+        let values = (0..640).map(|i| network.forward(&region.point(stream, i))[control]);
         let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| {
             (low.min(value), high.max(value))
         });

@@ -58,8 +58,9 @@ fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
         let mut problems = [MppiProblem { start: x, plan: shifted(&plan), context, stream }];
         let results = planner.improve(backend, &system, &mut problems).expect("a plan");
         plan.clone_from(&results[0].plan);
+        let starts = [x];
         let task = ReachAvoidTask {
-            starts: Starts::listed(&[x]),
+            starts: Starts::listed(&starts),
             range: 0..1,
             spec,
             tightening: &tightening,

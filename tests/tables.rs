@@ -15,8 +15,9 @@ fn read(name: &str, content: &[u8]) -> Result<Vec<[f32; 3]>, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, content).unwrap();
-    let reader = StateReader::<3>::open(&path, NAMES.map(str::to_owned));
-    reader.and_then(StateReader::rest).map_err(|error| error.to_string())
+    let reader = StateReader::open(&path, NAMES.map(str::to_owned).to_vec());
+    let states = reader.and_then(StateReader::rest).map_err(|error| error.to_string())?;
+    Ok(states.arrays())
 }
 
 fn csv(text: &str) -> Result<Vec<[f32; 3]>, String> {

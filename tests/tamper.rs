@@ -11,13 +11,12 @@ use std::fs;
 use command::{Folder, reachcast};
 use common::cpu;
 use reachcast::Error;
-use reachcast::config::{Config, Job, PolicySource};
+use reachcast::backend::Program;
+use reachcast::config::{Config, PolicySource};
 use reachcast::files::{Data, npz_bytes, read_npz};
-use reachcast::policy::Policy;
-use reachcast::rollout::Plant;
+use reachcast::rollout::States;
 use reachcast::scenario::record::Record;
 use reachcast::scenario::{Unwatched, check, query};
-use reachcast::system::System;
 use serde_json::{Value, json};
 
 /// Few draws and rounds of a small system: a check takes a few milliseconds.
@@ -208,36 +207,27 @@ fn edited_files_beside_the_certificate_are_noticed() {
     assert_eq!(reachcast(&["check", &out, "--backend=cpu"]).0, Some(0));
 }
 
-/// A record whose digests were made to fit an edit, as `check` and `query` find it.
-struct Forged(Value);
-
-impl Job for &Forged {
-    /// What `check` and `query` object to; none where they do not.
-    type Output = [Option<String>; 2];
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> reachcast::Result<Self::Output>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let record: Record = serde_json::from_value(self.0.clone()).unwrap();
-        let config = Config::from_json(&record.provenance.config)?;
-        let settings = config.settings(&plant.system.states())?;
-        let backend = cpu(1);
-        let checked = match check(&backend, plant, &record, &settings, &Unwatched) {
-            Ok(report) if report.holds => None,
-            Ok(report) => {
-                let failed = report.findings.iter().filter(|finding| !finding.holds);
-                Some(failed.map(|f| format!("{}: {}\n", f.name, f.found)).collect())
-            }
-            Err(error) => Some(error.to_string()),
-        };
-        let queried = query(&backend, plant, &record, &settings, &[[0.5; NX]]);
-        Ok([checked, queried.err().map(|error| error.to_string())])
-    }
+/// What `check` and `query` object to in a record whose digests were made to fit an edit; none where
+/// they do not.
+fn verdict(
+    config: &Config,
+    program: &Program<'_>,
+    record: &Value,
+) -> reachcast::Result<[Option<String>; 2]> {
+    let record: Record = serde_json::from_value(record.clone()).unwrap();
+    let states = &program.plant().model.states;
+    let settings = config.settings(states)?;
+    let checked = match check(program, &record, &settings, &Unwatched) {
+        Ok(report) if report.holds => None,
+        Ok(report) => {
+            let failed = report.findings.iter().filter(|finding| !finding.holds);
+            Some(failed.map(|f| format!("{}: {}\n", f.name, f.found)).collect())
+        }
+        Err(error) => Some(error.to_string()),
+    };
+    let state = vec![0.5; states.len()];
+    let queried = query(program, &record, &settings, States::one(&state));
+    Ok([checked, queried.err().map(|error| error.to_string())])
 }
 
 /// What only rollouts can tell, so that `query` takes it from the record as it is.
@@ -274,7 +264,9 @@ fn forged_digests_do_not_help() {
     let (_folder, _, record) = certified();
     let config = Config::from_json(&record["provenance"]["config"]).unwrap();
     let formula = PolicySource::Formula("bang-bang".to_owned());
-    let verdict = |document: &Value| config.with_plant(&formula, &Forged(document.clone()));
+    let backend = cpu(1);
+    let program = backend.prepare(&config.plant(&formula).unwrap()).unwrap();
+    let verdict = |document: &Value| verdict(&config, &program, document);
     assert_eq!(verdict(&record).unwrap(), [None, None]);
     let under = |name: &str, names: &[&str]| {
         names.iter().any(|outer| {

@@ -7,12 +7,10 @@ use std::sync::OnceLock;
 use libfuzzer_sys::fuzz_target;
 use reachcast::Result;
 use reachcast::backend::{Backend, cpu::Cpu};
-use reachcast::config::{Config, Job};
-use reachcast::policy::Policy;
-use reachcast::rollout::Plant;
-use reachcast::scenario::record::Record;
+use reachcast::config::Config;
+use reachcast::rollout::StateList;
 use reachcast::scenario::query;
-use reachcast::system::System;
+use reachcast::scenario::record::Record;
 use reachcast_fuzz::{policy, refused};
 
 fn backend() -> &'static Backend {
@@ -20,27 +18,14 @@ fn backend() -> &'static Backend {
     BACKEND.get_or_init(|| Backend::Cpu(Cpu::new(Some(1)).expect("a thread")))
 }
 
-struct Ask<'a> {
-    record: &'a Record,
-    config: &'a Config,
-}
-
-impl Job for Ask<'_> {
-    type Output = ();
-
-    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<()>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let settings = self.config.settings(&plant.system.states())?;
-        query(backend(), plant, self.record, &settings, &[[0.0; NX], [0.5; NX]]).map(drop)
-    }
-}
-
 fn read(record: &Record) -> Result<()> {
     let config = Config::from_json(&record.provenance.config)?;
-    config.with_plant(&policy(&config), Ask { record, config: &config })
+    let plant = config.plant(&policy(&config))?;
+    let axes = &plant.model.states;
+    let states = [0.0, 0.5].map(|value| vec![value; axes.len()]);
+    let states = StateList::new(axes.len()).with(states);
+    let program = backend().prepare(&plant)?;
+    query(&program, record, &config.settings(axes)?, states.view()).map(drop)
 }
 
 fuzz_target!(|bytes: &[u8]| {

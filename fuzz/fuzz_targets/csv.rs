@@ -7,7 +7,7 @@ use reachcast_fuzz::{read_states, with_file};
 
 fuzz_target!(|bytes: &[u8]| {
     with_file("fuzz.csv", bytes, |path| {
-        read_states::<2>(path);
-        read_states::<12>(path);
+        read_states(path, 2);
+        read_states(path, 12);
     });
 });

@@ -44,10 +44,10 @@ pub fn refused(error: &Error) {
     assert_eq!(error.exit_code(), 2, "{text}");
 }
 
-/// Reads all states of a file, seven at a time: finite numbers, or a refusal.
-pub fn read_states<const NX: usize>(path: &Path) {
-    let names = std::array::from_fn(|i| format!("x{i}"));
-    let mut reader = match StateReader::<NX>::open(path, names) {
+/// Reads all states of a file, `size` numbers each, seven at a time: finite numbers, or a refusal.
+pub fn read_states(path: &Path, size: usize) {
+    let names = (0..size).map(|i| format!("x{i}")).collect();
+    let mut reader = match StateReader::open(path, names) {
         Ok(reader) => reader,
         Err(error) => return refused(&error),
     };
