@@ -65,8 +65,8 @@ Examples:
     },
     /// Compute the reach-avoid measure of each start
     #[command(after_help = "\
-A start succeeds where its measure is positive. States are in the system's order; a header of a
-.csv file has to name them in that order.
+A start succeeds where its measure is positive. States are in the system's order, or in that of a
+header of a .csv file, which names all of them; commas, semicolons, tabs or blanks separate them.
 
 Example:
   reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures out.npy")]
@@ -87,7 +87,7 @@ Example:
     /// Tell the tier and the tightened measure V_check of states against a stored certificate
     #[command(after_help = "\
 Tiers: 0 in the target set, 1 in the certified set, 2 in the locally verified ball, 3 otherwise.
-Prints a line per state (tier, check_margin, target_margin); with --out DIR these go to
+Prints a line per state (index, tier, check_margin, target_margin); with --out DIR these go to
 DIR/query.csv instead and a summary is printed.
 
 Example:

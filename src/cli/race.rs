@@ -1,6 +1,7 @@
 //! The command `race`: whole races of many controllers, judged, compared and reported.
 
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -20,6 +21,10 @@ use crate::report::race_html;
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-race";
 
+/// Steps of samples from which on the work is told.
+const TOLD: f64 = 1e11;
+/// Steps of samples that a core does in a second, about: the README's plans without a network.
+const STEPS_PER_CORE: f64 = 2e8;
 /// What the columns of the table are.
 const LEGEND: &str = "\
 Judges say what a safe win is. study: the published code's distance in space and the gate at the crossing;
@@ -60,6 +65,7 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     if global.existing == Existing::Replaced {
         experiment.make_way()?;
     }
+    estimate(global, &experiment);
     let (record, controllers) = experiment.run(&progress)?;
     progress.finish();
     devices::note_events(global, &backend);
@@ -68,6 +74,17 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let files = write(&out, &record, &timing)?;
     report(global, &record, || text(&record, &timing, &files))?;
     Ok(Outcome::Done)
+}
+
+/// Says how much work it is where that takes more than minutes.
+fn estimate(global: &Global, experiment: &Experiment<'_>) {
+    let work = experiment.sample_steps(&experiment.names);
+    if work > TOLD && !global.common.quiet {
+        let text = format!("note: the plans roll out up to {work:.1e} steps of samples, about");
+        let hours = work / STEPS_PER_CORE / 3600.0;
+        // Nobody reads what a closed pipe does not take.
+        let _ = writeln!(std::io::stderr(), "{text} {hours:.1} hours of a core, if none is stored");
+    }
 }
 
 /// Writes the results.

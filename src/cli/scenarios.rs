@@ -67,7 +67,7 @@ fn text(counts: &Counts) -> String {
     if let (Some(failures), Some(count)) = (counts.failures, counts.with_failures) {
         text += &format!("at most {failures} failure(s) (Clopper-Pearson): {count}\n");
     }
-    text + "simple: (2 / epsilon) (ln(1 / beta) + d) with d decision variables, the numbers that the \
-            scenarios bound; exact: the smallest count whose binomial tail is at most beta; each \
-            counts scenarios none of which may fail\n"
+    text + "simple: (2 / epsilon) (ln(1 / beta) + d) with d decision variables, the numbers that the\n\
+            scenarios bound; exact: the smallest count whose binomial tail is at most beta; both count\n\
+            scenarios none of which may fail\n"
 }

@@ -16,6 +16,9 @@ pub(super) fn parse_assignment(text: &str) -> Result<Table> {
         return Err(malformed());
     }
     let first = keys.next().ok_or_else(malformed)?;
+    if parse_value(value.trim()).as_table().is_some_and(Table::is_empty) {
+        return Err(Error::invalid(format!("--set {text}"), "an empty table sets nothing"));
+    }
     let inner = keys.rfold(parse_value(value.trim()), |inner, key| {
         Value::Table(Table::from_iter([(key.to_owned(), inner)]))
     });

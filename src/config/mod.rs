@@ -144,7 +144,15 @@ fn stored(config: &Config) -> Result<serde_json::Value> {
 /// The defaults of the profile and the system that the table `given` names.
 fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
     let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
+    if let Some(section) = given.get("system").filter(|section| !section.is_table()) {
+        let problem = format!("{section} is no section; give a section [system] with a `name`");
+        return Err(refused("system", problem));
+    }
     let profile = match given.get("profile").cloned() {
+        Some(other) if !other.is_str() => {
+            let problem = format!("{other} is no text; expected \"paper\", \"study\" or \"rigorous\"");
+            return Err(refused("profile", problem));
+        }
         Some(name) => {
             Profile::deserialize(name).map_err(|e| refused("profile", e.message().to_owned()))?
         }

@@ -19,7 +19,7 @@ use super::record::{
 use super::roster::{absent, certifies, controller, settings, values};
 use super::settings::RaceSettings;
 use super::summary::Summary;
-use super::weights::note;
+use super::weights::{note, sample_steps};
 use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
@@ -35,6 +35,8 @@ use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 pub(super) const BATCH: usize = 512;
 /// Random streams of one purpose that a race has.
 const MOST_STREAMS: u64 = 1 << 24;
+/// Most steps of samples: a year of a few cores, or weeks of a GPU.
+const MOST_SAMPLE_STEPS: f64 = 1e16;
 /// Starts whose rollouts under the policy are looked at for what samples do not tell.
 const LOOKED_AT: usize = 16;
 /// Room for record, page and manifest, bytes.
@@ -132,11 +134,28 @@ impl Experiment<'_> {
             );
             return Err(Error::invalid("growth.rounds", problem));
         }
+        let work = self.sample_steps(names);
+        if work > MOST_SAMPLE_STEPS {
+            let problem = format!(
+                "the plans would roll out up to {work:.1e} steps of samples, at most \
+                 {MOST_SAMPLE_STEPS:.0e}; fewer `samples`, `iterations`, steps, starts or noise seeds \
+                 take less"
+            );
+            return Err(Error::invalid("race", problem));
+        }
         for &name in names {
             let race = settings(name, race);
             controller(name, World { race: &race, ..self.world }, 1, Paths::None)?;
         }
         Ok(())
+    }
+
+    /// Steps of samples that the plans of the controllers `names` roll out in all races, at most.
+    pub fn sample_steps(&self, names: &[Name]) -> f64 {
+        let race = self.world.race;
+        let races = self.starts.len() as f64 * self.noise_seeds.len() as f64;
+        let each = names.iter().map(|&name| sample_steps(name, &settings(name, race)));
+        races * f64::from(race.steps) * each.sum::<f64>()
     }
 
     /// Room that the races take which are still to be flown, with the results of all, bytes.

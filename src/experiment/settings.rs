@@ -253,6 +253,11 @@ fn check_obstacle(section: &str, cost: &RaceCost) -> Result<()> {
 }
 
 impl PlanSettings {
+    /// Steps of samples of all improvements at one control step.
+    pub(super) fn work(&self) -> f64 {
+        f64::from(self.samples) * f64::from(self.horizon) * f64::from(self.iterations)
+    }
+
     /// The checked settings, errors naming the key under `section`.
     ///
     /// # Errors

@@ -47,7 +47,12 @@ impl Weights {
     }
 }
 
-/// The plans of the controller `name`, those with the most samples if it has several kinds.
+/// Steps of samples that the plans of the controller `name` roll out at each control step, at most.
+pub(super) fn sample_steps(name: Name, race: &RaceSettings) -> f64 {
+    plans(name, race).map_or(0.0, PlanSettings::work)
+}
+
+/// The plans of the controller `name`, those with the most work if it has several kinds.
 pub(super) fn plans(name: Name, race: &RaceSettings) -> Option<&PlanSettings> {
     let of = |section: &&str| match *section {
         "race.mppi" => &race.mppi,
@@ -59,7 +64,7 @@ pub(super) fn plans(name: Name, race: &RaceSettings) -> Option<&PlanSettings> {
         "race.hybrid.recovery" => &race.hybrid.recovery,
         _ => &race.hybrid.fast,
     };
-    name.plan_sections().iter().map(|section| of(section)).max_by_key(|plan| plan.samples)
+    name.plan_sections().iter().map(|section| of(section)).max_by(|a, b| a.work().total_cmp(&b.work()))
 }
 
 /// The note on the controller `name` with `race` for its settings, whose plans came to these means.

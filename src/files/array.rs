@@ -59,7 +59,10 @@ impl NpyHeader {
     /// The header of the Python dictionary `text`, as NumPy writes it.
     fn parse(text: &str) -> Option<Self> {
         let value = |key: &str| {
-            let after = text.split_once(&format!("'{key}'"))?.1;
+            let key = format!("'{key}'");
+            let after = text.split_once(&key)?.1;
+            // Of two values, Python takes one and others the other.
+            let after = Some(after).filter(|after| !after.contains(&key))?;
             Some(after.trim_start().strip_prefix(':')?.trim_start())
         };
         let descr = value("descr")?;
@@ -68,11 +71,16 @@ impl NpyHeader {
             // A structured type, shown as it is.
             None => descr.split_once(']')?.0,
         };
+        let fortran_order = match value("fortran_order")? {
+            order if order.starts_with("True") => true,
+            order if order.starts_with("False") => false,
+            _ => return None,
+        };
         let (shape, _) = value("shape")?.strip_prefix('(')?.split_once(')')?;
         let lengths = shape.split(',').map(str::trim).filter(|length| !length.is_empty());
         Some(Self {
             descr: descr.to_owned(),
-            fortran_order: value("fortran_order")?.starts_with("True"),
+            fortran_order,
             shape: lengths.map(|length| length.parse().ok()).collect::<Option<_>>()?,
         })
     }
@@ -209,5 +217,8 @@ mod tests {
         assert!(one.fortran_order && one.shape == [7]);
         assert_eq!(parse("{'descr': '<f8', 'fortran_order': False, 'shape': (-3,)}"), None);
         assert_eq!(parse("{'descr': '<f8'}"), None);
+        assert_eq!(parse("{'descr': '<f8', 'fortran_order': 1, 'shape': (3,)}"), None);
+        let twice = "{'descr': '<f8', 'descr': '<f4', 'fortran_order': False, 'shape': (3,)}";
+        assert_eq!(parse(twice), None);
     }
 }

@@ -144,7 +144,10 @@ fn read_layer(tensors: &SafeTensors<'_>, i: usize) -> std::result::Result<Layer,
     let &[outputs, inputs] = shape.as_slice() else {
         return Err(format!("layers.{i}.weight has shape {shape:?}, expected [out, in]"));
     };
-    let (bias, _) = named("bias")?;
+    let (bias, shape) = named("bias")?;
+    if shape != [outputs] {
+        return Err(format!("layers.{i}.bias has shape {shape:?}, expected [{outputs}]"));
+    }
     Ok(Layer { weight, bias, inputs, outputs })
 }
 

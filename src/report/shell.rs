@@ -101,8 +101,8 @@ pub(super) fn notes(notes: &[String]) -> String {
         return String::new();
     }
     format!(
-        "<section class=\"card limits\" aria-labelledby=\"notes\"><h2 id=\"notes\">To be kept in \
-         mind</h2>\n<ul>\n{}</ul></section>\n",
+        "<div class=\"words\"><section class=\"card limits\" aria-labelledby=\"notes\">\
+         <h2 id=\"notes\">To be kept in mind</h2>\n<ul>\n{}</ul></section></div>\n",
         items(notes)
     )
 }

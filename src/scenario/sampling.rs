@@ -23,8 +23,7 @@ pub fn sampling(plant: &Plant, starts: States<'_>, horizon: u32) -> Vec<String> 
 /// That rollouts are looked at at their samples alone, beside what is known of steps and features.
 fn between(count: usize, moved: Option<Moved>, feature: Option<Feature>) -> String {
     let mut text =
-        "States are looked at at the samples alone, and nothing is said of what lies between two of \
-         them"
+        "States are looked at only at the samples, and nothing is said of what lies between two of them"
             .to_owned();
     if let Some(Moved { what, step }) = &moved {
         let step = short(*step);
@@ -143,7 +142,7 @@ mod tests {
         // From 1.5 m/s away from the origin the mass slows down: its first step, 0.15 m, is the longest.
         let text = said(&[[0.1, 1.5]], 0.25);
         assert_eq!(text.len(), 1, "{text:?}");
-        for words in ["samples alone", "position moves up to 0.150 m", "is 0.500 m wide."] {
+        for words in ["only at the samples", "position moves up to 0.150 m", "is 0.500 m wide."] {
             assert!(text[0].contains(words), "{words}: {}", text[0]);
         }
         assert!(!text[0].contains("leap over"), "{}", text[0]);

@@ -28,13 +28,13 @@ pub(super) fn text(record: &SweepRecord, files: &[PathBuf]) -> String {
 fn legend(record: &SweepRecord) -> &'static str {
     match record.starts {
         Some(_) => {
-            "effective: mean of 1 / sum w^2 over the plans, from 1 to K; best cost: mean of the smallest \
+            "effective: mean of 1 / sum w^2 over the plans, from 1 to K; best cost: mean of the smallest\n\
              of a plan's samples; median, p95, p99: ms of a control step of one race that flies alone\n"
         }
         None => {
-            "N: pairs of the deviation bound; certified share: interval of the certified set's share of \
-             the box; growth, radius: what came of the ball around a boundary point; holds: whether \
-             every claim that was asked for was obtained\n"
+            "N: pairs of the deviation bound; certified share: interval of the certified set's share of\n\
+             the box; growth, radius: what came of the ball around a boundary point; holds: whether every\n\
+             claim that was asked for was obtained\n"
         }
     }
 }
