@@ -6,9 +6,9 @@
 mod common;
 #[path = "oracle/drive.rs"]
 mod drive;
-mod models;
 #[path = "oracle/functions.rs"]
 mod functions;
+mod models;
 #[path = "oracle/mppi.rs"]
 mod oracle;
 

@@ -3,9 +3,9 @@
 mod expand;
 mod node;
 mod record;
-pub mod text;
 #[cfg(test)]
 mod tests;
+pub mod text;
 pub mod wgsl;
 
 pub use node::{Function, Node};

@@ -105,19 +105,19 @@ impl Function {
             Self::Sqrt => a.sqrt(),
             Self::Hypot => a.hypot(b),
             Self::Floor => a.floor(),
-            Self::Sign => stand_in::sign(a),
+            Self::Sign => a.sign(),
             Self::Sin => a.sin(),
             Self::Cos => a.cos(),
-            Self::Tan => stand_in::tan(a),
-            Self::Asin => stand_in::asin(a),
-            Self::Acos => stand_in::acos(a),
-            Self::Atan => stand_in::atan(a),
-            Self::Atan2 => stand_in::atan2(a, b),
-            Self::Exp => stand_in::exp(a),
-            Self::Log => stand_in::ln(a),
+            Self::Tan => a.tan(),
+            Self::Asin => a.asin(),
+            Self::Acos => a.acos(),
+            Self::Atan => a.atan(),
+            Self::Atan2 => a.atan2(b),
+            Self::Exp => a.exp(),
+            Self::Log => a.ln(),
             Self::Tanh => a.tanh(),
-            Self::Sigmoid => stand_in::sigmoid(a),
-            Self::Wrap => stand_in::wrap(a),
+            Self::Sigmoid => a.sigmoid(),
+            Self::Wrap => a.wrap(),
         }
     }
 
@@ -136,111 +136,8 @@ impl Function {
 pub(super) fn power<R: Real>(base: R, exponent: f32) -> R {
     // Beyond 2^24 an f32 no longer tells odd from even.
     if exponent.fract() == 0.0 && exponent.abs() <= 16_777_216.0 {
-        stand_in::powi(base, exponent as i32)
+        base.powi(exponent as i32)
     } else {
-        stand_in::powf(base, exponent)
-    }
-}
-
-/// Plain compositions of functions that the scalar trait does not have.
-mod stand_in {
-    use std::f32::consts::{FRAC_PI_2, PI, TAU};
-
-    use crate::real::Real;
-
-    pub(super) fn sign<R: Real>(x: R) -> R {
-        let zero = R::lit(0.0);
-        x.if_lt(zero, R::lit(-1.0), zero.if_lt(x, R::lit(1.0), x))
-    }
-
-    pub(super) fn tan<R: Real>(x: R) -> R {
-        x.sin() / x.cos()
-    }
-
-    pub(super) fn exp<R: Real>(x: R) -> R {
-        let small = (-x.abs()).exp_negative();
-        x.if_lt(R::lit(0.0), small, R::lit(1.0) / small)
-    }
-
-    pub(super) fn ln<R: Real>(x: R) -> R {
-        let (zero, one) = (R::lit(0.0), R::lit(1.0));
-        let above = -(one / x).ln_unit();
-        let positive = x.if_lt(one, x.ln_unit(), above);
-        zero.if_lt(x, positive, zero / zero)
-    }
-
-    pub(super) fn sigmoid<R: Real>(x: R) -> R {
-        let half = R::lit(0.5);
-        half + half * (half * x).tanh()
-    }
-
-    pub(super) fn wrap<R: Real>(x: R) -> R {
-        let turns = (x * R::lit(0.5 / PI) + R::lit(0.5)).floor();
-        x - turns * R::lit(TAU)
-    }
-
-    /// On `[0, 1]` a polynomial of Abramowitz and Stegun (4.4.49), absolute error below 2e-8.
-    fn atan_unit<R: Real>(x: R) -> R {
-        let square = x * x;
-        let coefficients = [
-            0.002_866_226,
-            -0.016_165_737,
-            0.042_909_614,
-            -0.075_289_64,
-            0.106_562_64,
-            -0.142_088_99,
-            0.199_935_51,
-            -0.333_331_45,
-            1.0,
-        ];
-        let sum = |sum: R, c: f32| sum * square + R::lit(c);
-        coefficients.into_iter().fold(R::lit(0.0), sum) * x
-    }
-
-    pub(super) fn atan<R: Real>(x: R) -> R {
-        let (zero, one) = (R::lit(0.0), R::lit(1.0));
-        let size = x.abs();
-        let large = R::lit(FRAC_PI_2) - atan_unit(one / size);
-        let angle = one.if_lt(size, large, atan_unit(size));
-        x.if_lt(zero, -angle, angle)
-    }
-
-    pub(super) fn atan2<R: Real>(y: R, x: R) -> R {
-        let zero = R::lit(0.0);
-        let half = R::lit(2.0) * atan(y / (x.hypot(y) + x.abs()));
-        let turned = y.if_lt(zero, R::lit(-PI) - half, R::lit(PI) - half);
-        x.if_lt(zero, turned, half)
-    }
-
-    pub(super) fn asin<R: Real>(x: R) -> R {
-        atan2(x, (R::lit(1.0) - x * x).sqrt())
-    }
-
-    pub(super) fn acos<R: Real>(x: R) -> R {
-        R::lit(FRAC_PI_2) - asin(x)
-    }
-
-    pub(super) fn powi<R: Real>(x: R, exponent: i32) -> R {
-        let mut result: Option<R> = None;
-        let mut square = x;
-        let mut left = exponent.unsigned_abs();
-        while left > 0 {
-            if left % 2 == 1 {
-                result = Some(result.map_or(square, |result| result * square));
-            }
-            left /= 2;
-            if left > 0 {
-                square = square * square;
-            }
-        }
-        match result {
-            None => R::lit(1.0),
-            Some(result) if exponent < 0 => R::lit(1.0) / result,
-            Some(result) => result,
-        }
-    }
-
-    pub(super) fn powf<R: Real>(x: R, exponent: f32) -> R {
-        exp(R::lit(exponent) * ln(x))
+        base.powf(exponent)
     }
 }

@@ -1,5 +1,6 @@
 //! The operations of a tape: what each computes of its operands, in any scalar.
 
+use crate::formula::Function;
 use crate::real::Real;
 
 /// Most operands of an operation.
@@ -51,7 +52,10 @@ impl<R: Real> Operation<R> {
             Kind::Unary(f) => f.of(a),
             Kind::Binary(f) => f.of(a, b),
             Kind::Pair(f) => f.of(a, b, c),
+            Kind::Whole(f) => f.of(a),
+            Kind::Clamp => a.clamp(b, c),
             Kind::Select => a.if_lt(b, c, d),
+            Kind::SelectLt => a.select_lt(b, c, d),
         }
     }
 }
@@ -67,18 +71,24 @@ pub(super) enum Kind {
     Binary(Binary),
     /// Two functions, one after the other, of three.
     Pair(Pair),
-    /// `if a < b { yes } else { no }`, in this order.
+    /// A function of one operand that is a formula of its own.
+    Whole(Whole),
+    /// A number within a lower and an upper bound, in this order.
+    Clamp,
+    /// `if a < b { yes } else { no }`, in this order; NaN where `a` or `b` is.
     Select,
+    /// The same, `no` where `a` or `b` is NaN.
+    SelectLt,
 }
 
 impl Kind {
     /// How many operands it takes.
     pub(super) fn operands(self) -> usize {
         match self {
-            Self::Copy | Self::Unary(_) => 1,
+            Self::Copy | Self::Unary(_) | Self::Whole(_) => 1,
             Self::Binary(_) => 2,
-            Self::Pair(_) => 3,
-            Self::Select => 4,
+            Self::Pair(_) | Self::Clamp => 3,
+            Self::Select | Self::SelectLt => 4,
         }
     }
 }
@@ -111,6 +121,36 @@ pub(super) enum Binary {
     Min,
     /// The larger.
     Max,
+    /// Euclidean length.
+    Hypot,
+    /// The angle of the point whose second coordinate comes first.
+    Atan2,
+}
+
+/// Functions of one number that are formulas of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Whole {
+    /// 1, -1 or 0.
+    Sign,
+    /// An elementary function.
+    Apply(Function),
+    /// A whole power.
+    Powi(i32),
+    /// A constant power, as the bits of its f32.
+    Powf(u32),
+}
+
+impl Whole {
+    /// Its value.
+    #[inline(always)]
+    pub(super) fn of<R: Real>(self, x: R) -> R {
+        match self {
+            Self::Sign => x.sign(),
+            Self::Apply(function) => function.apply(x),
+            Self::Powi(exponent) => x.powi(exponent),
+            Self::Powf(bits) => x.powf(f32::from_bits(bits)),
+        }
+    }
 }
 
 /// Functions of the first two of three numbers, then of that and the third, each rounded: pairs that
@@ -214,6 +254,8 @@ impl Binary {
             Self::Div => a / b,
             Self::Min => a.min(b),
             Self::Max => a.max(b),
+            Self::Hypot => a.hypot(b),
+            Self::Atan2 => a.atan2(b),
         }
     }
 }

@@ -2,8 +2,9 @@
 
 use std::cell::Cell;
 
-use super::operation::{Binary, Kind, Pair, Unary};
+use super::operation::{Binary, Kind, Pair, Unary, Whole};
 use super::{Place, Step};
+use crate::formula::Function;
 use crate::real::Vector;
 use crate::real::simd::Formulas;
 use crate::tile::{Frame, GRANULE};
@@ -36,7 +37,10 @@ impl Formulas for Run<'_> {
                 Kind::Unary(f) => unary::<V>(rows, to, f, a),
                 Kind::Binary(f) => binary::<V>(rows, to, f, [a, b]),
                 Kind::Pair(f) => pair::<V>(rows, to, f, [a, b, c]),
+                Kind::Whole(f) => whole::<V>(rows, to, f, a),
+                Kind::Clamp => clamp::<V>(rows, to, [a, b, c]),
                 Kind::Select => select::<V>(rows, to, [a, b, c, d]),
+                Kind::SelectLt => select_lt::<V>(rows, to, [a, b, c, d]),
             }
         }
     }
@@ -149,7 +153,7 @@ fn unary<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Unary, a: Place) {
 
 #[inline(always)]
 fn binary<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Binary, places: [Place; 2]) {
-    operands!(rows, places, [a, b] => one_of!(f, Binary: Add Sub Mul Div Min Max, f => {
+    operands!(rows, places, [a, b] => one_of!(f, Binary: Add Sub Mul Div Min Max Hypot Atan2, f => {
         each(to, |block, at| -> V { f.of(a.vector(block, at), b.vector(block, at)) });
     }));
 }
@@ -172,6 +176,53 @@ fn select<V: Vector>(rows: Rows<'_>, to: Row<'_>, [a, b, yes, no]: [Place; 4]) {
         each(to, |block, at| -> V {
             let (yes, no) = (yes.vector(block, at), no.vector(block, at));
             V::if_lt(a.vector(block, at), b.vector(block, at), yes, no)
+        });
+    })));
+}
+
+/// A function that is a formula of its own: which one, is asked outside of the loop.
+#[inline(always)]
+fn whole<V: Vector>(rows: Rows<'_>, to: Row<'_>, f: Whole, a: Place) {
+    let Place::Row(a) = a else { unreachable!("numbers are folded") };
+    let a = rows.row(a);
+    macro_rules! applied {
+        ($function:expr, $($name:ident)*) => {
+            match $function {
+                $(Function::$name => {
+                    each(to, |block, at| -> V { Function::$name.apply(a.vector(block, at)) });
+                })*
+            }
+        };
+    }
+    match f {
+        Whole::Sign => each(to, |block, at| -> V { a.vector::<V>(block, at).sign() }),
+        Whole::Powi(exponent) => {
+            each(to, |block, at| -> V { a.vector::<V>(block, at).powi(exponent) });
+        }
+        Whole::Powf(bits) => {
+            let exponent = f32::from_bits(bits);
+            each(to, |block, at| -> V { a.vector::<V>(block, at).powf(exponent) });
+        }
+        Whole::Apply(function) => applied!(function, Sin Cos Tan Asin Acos Atan Wrap Exp Ln Tanh
+            Sigmoid PrincipalSin PrincipalCos ExpNegative LnUnit),
+    }
+}
+
+#[inline(always)]
+fn clamp<V: Vector>(rows: Rows<'_>, to: Row<'_>, [a, low, high]: [Place; 3]) {
+    operand!(rows, a, a => operand!(rows, low, low => operand!(rows, high, high => {
+        each(to, |block, at| -> V {
+            a.vector::<V>(block, at).clamp(low.vector(block, at), high.vector(block, at))
+        });
+    })));
+}
+
+#[inline(always)]
+fn select_lt<V: Vector>(rows: Rows<'_>, to: Row<'_>, [a, b, yes, no]: [Place; 4]) {
+    operands!(rows, [a, b], [a, b] => operand!(rows, yes, yes => operand!(rows, no, no => {
+        each(to, |block, at| -> V {
+            let (yes, no) = (yes.vector(block, at), no.vector(block, at));
+            V::select_lt(a.vector(block, at), b.vector(block, at), yes, no)
         });
     })));
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Source;
-use super::operation::{Binary, Kind, Operation, Unary};
+use super::operation::{Binary, Kind, Operation, Unary, Whole};
 use crate::formula::{Graph, Node};
 
 /// Where an operand comes from.
@@ -118,7 +118,10 @@ fn known(operation: &Operation<Value>) -> Option<Value> {
         return Some(Value::Number(numbers.value().to_bits()));
     }
     match (operation.kind, numbers.operands(), operation.operands()) {
-        (Kind::Select, [Some(a), Some(b), ..], &[_, _, yes, no]) => {
+        (Kind::Select, [Some(a), Some(b), ..], _) if a.is_nan() || b.is_nan() => {
+            Some(Value::Number(f32::NAN.to_bits()))
+        }
+        (Kind::Select | Kind::SelectLt, [Some(a), Some(b), ..], &[_, _, yes, no]) => {
             Some(if a < b { yes } else { no })
         }
         _ => None,
@@ -152,6 +155,7 @@ fn is_power_of_two(number: f32) -> bool {
 fn operation(node: Node) -> Operation<u32> {
     let unary = |f, a| Operation::new(Kind::Unary(f), &[a]);
     let binary = |f, a, b| Operation::new(Kind::Binary(f), &[a, b]);
+    let whole = |f, a| Operation::new(Kind::Whole(f), &[a]);
     match node {
         Node::Input(_) | Node::Literal(_) => unreachable!("values, not operations"),
         Node::Add(a, b) => binary(Binary::Add, a, b),
@@ -166,5 +170,15 @@ fn operation(node: Node) -> Operation<u32> {
         Node::IfLt(a, b, yes, no) if (yes, no) == (a, b) => binary(Binary::Min, a, b),
         Node::IfLt(a, b, yes, no) if (yes, no) == (b, a) => binary(Binary::Max, b, a),
         Node::IfLt(a, b, yes, no) => Operation::new(Kind::Select, &[a, b, yes, no]),
+        Node::SelectLt(a, b, yes, no) => Operation::new(Kind::SelectLt, &[a, b, yes, no]),
+        Node::Min(a, b) => binary(Binary::Min, a, b),
+        Node::Max(a, b) => binary(Binary::Max, a, b),
+        Node::Clamp(a, low, high) => Operation::new(Kind::Clamp, &[a, low, high]),
+        Node::Hypot(a, b) => binary(Binary::Hypot, a, b),
+        Node::Atan2(a, b) => binary(Binary::Atan2, a, b),
+        Node::Sign(a) => whole(Whole::Sign, a),
+        Node::Apply(function, a) => whole(Whole::Apply(function), a),
+        Node::Powi(a, exponent) => whole(Whole::Powi(exponent), a),
+        Node::Powf(a, bits) => whole(Whole::Powf(bits), a),
     }
 }
