@@ -2,15 +2,11 @@
 
 mod compiled;
 mod frame;
-mod interpreted;
 mod native;
 mod tape;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use compiled::{CompiledPolicy, CompiledSystem};
 pub(crate) use frame::{Clock, Frame, Layout};
-pub(crate) use interpreted::{Held, Inputs, InterpretedFormula, InterpretedSystem};
 pub(crate) use native::{NativeFormula, NativeSystem};
 pub(crate) use tape::{Source, Tape};
 

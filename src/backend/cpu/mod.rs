@@ -3,6 +3,7 @@
 mod deviation;
 mod dispatch;
 mod early_exit;
+mod interpreted;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Cpu;
+use super::interpreted::{Held, Inputs, InterpretedFormula, InterpretedSystem};
 use super::mlp::Packed;
 use super::tile::{Around, Drive, Driven};
 use crate::backend::{MeasureSink, PairSink};
@@ -11,9 +12,7 @@ use crate::formula::Graph;
 use crate::model::{Law, Model, Plant};
 use crate::policy::Mlp;
 use crate::rollout::{DeviationTask, Farthest, ReachAvoidTask};
-use crate::tile::{
-    Clock, Held, Inputs, InterpretedFormula, InterpretedSystem, Layout, NativeFormula, NativeSystem,
-};
+use crate::tile::{Clock, Layout, NativeFormula, NativeSystem};
 
 /// A plant prepared for tiles.
 #[derive(Debug)]

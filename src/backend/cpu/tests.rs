@@ -5,4 +5,5 @@ mod fixture;
 mod kernels;
 mod oracle;
 mod same_bits;
+mod tapes;
 mod vectors;

@@ -1,21 +1,21 @@
 //! Plants and policies that are known at run time only: their formulas as tapes.
 
-use super::{Clock, Frame, Layout, NativeFormula, NativeSystem, Source, Tape};
 use crate::formula::Graph;
 use crate::model::Model;
 use crate::real::simd::Instructions;
+use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem, Source, Tape};
 
 /// Where the inputs of a model's formulas are in a frame: its states and controls in their rows,
 /// the parameters as numbers, the time as a multiple of the row of steps.
 #[derive(Clone, Debug)]
-pub(crate) struct Inputs {
+pub(super) struct Inputs {
     layout: Layout,
     sources: Vec<Source>,
 }
 
 /// What controls are for a formula that does not have any yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Held {
+pub(super) enum Held {
     /// Those in the rows.
     Rows,
     /// Zeros: margins and policies are of states alone.
@@ -24,7 +24,7 @@ pub(crate) enum Held {
 
 impl Inputs {
     /// For `model` with the values `parameters` of its parameters.
-    pub(crate) fn new(model: &Model, parameters: &[f32], controls: Held) -> Self {
+    pub(super) fn new(model: &Model, parameters: &[f32], controls: Held) -> Self {
         let (states, count) = (model.states.len(), model.controls.len());
         let layout = Layout { states, controls: count, own: 0 };
         let controls = (states..states + count).map(|row| match controls {
@@ -46,7 +46,7 @@ impl Inputs {
     }
 
     /// The same followed by the rows `rows`: what a network says.
-    pub(crate) fn followed_by(mut self, rows: std::ops::Range<usize>) -> Self {
+    pub(super) fn followed_by(mut self, rows: std::ops::Range<usize>) -> Self {
         self.sources.extend(rows.map(Source::Row));
         self
     }
@@ -54,7 +54,7 @@ impl Inputs {
 
 /// A model's formulas as tapes.
 #[derive(Debug)]
-pub(crate) struct InterpretedSystem {
+pub(super) struct InterpretedSystem {
     step: Tape,
     margins: Tape,
     layout: Layout,
@@ -62,7 +62,7 @@ pub(crate) struct InterpretedSystem {
 
 impl InterpretedSystem {
     /// The formulas of `model` with the values `parameters` of its parameters.
-    pub(crate) fn new(model: &Model, parameters: &[f32]) -> Self {
+    pub(super) fn new(model: &Model, parameters: &[f32]) -> Self {
         let held = Inputs::new(model, parameters, Held::Rows);
         let free = Inputs::new(model, parameters, Held::Zeros);
         let layout = held.layout;
@@ -76,12 +76,12 @@ impl InterpretedSystem {
     }
 
     /// How many rows of their own the formulas need, from the first one on.
-    pub(crate) fn own_rows(&self) -> usize {
+    pub(super) fn own_rows(&self) -> usize {
         self.step.own_rows().max(self.margins.own_rows())
     }
 
     /// Whether they read the row of steps.
-    pub(crate) fn clock(&self) -> Clock {
+    pub(super) fn clock(&self) -> Clock {
         clock(&[&self.step, &self.margins], self.layout)
     }
 }
@@ -98,7 +98,7 @@ impl NativeSystem for InterpretedSystem {
 
 /// A formula of a model's inputs as a tape.
 #[derive(Debug)]
-pub(crate) struct InterpretedFormula {
+pub(super) struct InterpretedFormula {
     tape: Tape,
     layout: Layout,
 }
@@ -106,19 +106,19 @@ pub(crate) struct InterpretedFormula {
 impl InterpretedFormula {
     /// `graph` of `inputs`, its outputs in the rows from `to` on; what lies between is in rows from
     /// `first_own` on.
-    pub(crate) fn new(graph: &Graph, inputs: &Inputs, to: usize, first_own: usize) -> Self {
+    pub(super) fn new(graph: &Graph, inputs: &Inputs, to: usize, first_own: usize) -> Self {
         let outputs: Vec<usize> = (to..to + graph.outputs.len()).collect();
         let tape = Tape::new(&[graph], &inputs.sources, &outputs, first_own);
         Self { tape, layout: inputs.layout }
     }
 
     /// How many rows of its own it needs, from the first one on.
-    pub(crate) fn own_rows(&self) -> usize {
+    pub(super) fn own_rows(&self) -> usize {
         self.tape.own_rows()
     }
 
     /// Whether it reads the row of steps.
-    pub(crate) fn clock(&self) -> Clock {
+    pub(super) fn clock(&self) -> Clock {
         clock(&[&self.tape], self.layout)
     }
 }

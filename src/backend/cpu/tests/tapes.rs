@@ -3,10 +3,11 @@
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-use super::{Clock, CompiledSystem, Frame, InterpretedSystem, Layout, NativeSystem};
+use crate::backend::cpu::interpreted::InterpretedSystem;
 use crate::model::Model;
 use crate::real::simd::Instructions;
 use crate::system::{DiffDrive, DoubleIntegrator, DroneRace, System};
+use crate::tile::{Clock, CompiledSystem, Frame, Layout, NativeSystem};
 
 /// A frame of random states and controls, some of which are not finite.
 fn frame(layout: Layout, lanes: usize, seed: u64) -> Frame {
