@@ -292,5 +292,6 @@ special! {
     special_logarithms: Case::Of(Function::Ln);
     special_powers: Case::Whole(3), Case::Whole(-2), Case::Whole(0), Case::Power(0.5), Case::Power(1.5), Case::Power(-0.3);
     special_signs: Case::Sign, Case::Floor, Case::Length;
-    special_choices: Case::Smaller, Case::Larger, Case::Held, Case::HeldBelow, Case::Less, Case::NotMore, Case::Equal;
+    special_choices: Case::Smaller, Case::SmallerBehind, Case::Larger, Case::LargerBehind, Case::Held, Case::HeldBelow;
+    special_comparisons: Case::Less, Case::LessBehind, Case::NotMore, Case::Equal;
 }
