@@ -20,6 +20,9 @@ use crate::{drawn, gpu, ramp, random_network, whole_box};
 const COUNT: u64 = 200;
 /// Problems of MPPI.
 const PROBLEMS: u32 = 5;
+/// A submission after some results: of measures, that of the third of the four chunks, after the two
+/// that cut the batch.
+const LATE: u64 = 4;
 /// Failures that a batch survives on the adapter.
 const SURVIVED: [Fault; 3] = [Fault::OutOfMemory, Fault::Timeout, Fault::Lost];
 
@@ -230,7 +233,7 @@ fn an_adapter_that_goes_on_failing_is_left() {
     for work in WORKS {
         for fault in [SURVIVED.as_slice(), &[Fault::Validation]].concat() {
             let Some((gpu, plain, host)) = prepared(work) else { return };
-            let asked = [small_chunks(), vec![onwards(fault, 8)]].concat();
+            let asked = [small_chunks(), vec![onwards(fault, LATE)]].concat();
             let (gpu, found, result, events) = failing(gpu, work, &asked);
             result.expect("the host goes on");
             let last = events.last().expect("an event");
@@ -256,7 +259,7 @@ fn without_a_fallback_the_error_names_the_remedy() {
     for fault in [SURVIVED.as_slice(), &[Fault::Validation]].concat() {
         let Some(gpu) = gpu() else { return };
         let gpu = gpu.with_networks(NetworkKernels::Layered);
-        let asked = [small_chunks(), vec![onwards(fault, 8)]].concat();
+        let asked = [small_chunks(), vec![onwards(fault, LATE)]].concat();
         let (_, found, result, events) = failing(gpu, work, &asked);
         let error = result.expect_err("nobody to go on");
         assert!(matches!(error, Error::DeviceFailed { fault: found, .. } if found == fault));

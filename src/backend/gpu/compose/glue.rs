@@ -28,26 +28,30 @@ pub(super) fn constants(states: usize, controls: usize) -> String {
     )
 }
 
+/// Trajectories in each row of the state.
+const ROW: &str = "params.stride * (1u + params.paired)";
+
 /// `load_state` and `store_state`, free of loops.
 pub(super) fn state_glue(states: usize) -> String {
-    let stride = "params.stride * (1u + params.paired)";
-    let quads = states.div_ceil(4);
-    let mut text = String::from("fn load_state(column: u32) -> State {\n");
-    text += &format!("    let stride = {stride};\n");
-    for quad in 0..quads {
-        text += &format!("    let v{quad} = state[{quad}u * stride + column];\n");
-    }
-    let all: Vec<String> = (0..states).map(component).collect();
-    text += &format!("    return State({});\n}}\n", all.join(", "));
-
+    let mut text = load_glue(states);
     text += "fn store_state(column: u32, x: State) {\n";
-    text += &format!("    let stride = {stride};\n");
-    for quad in 0..quads {
+    text += &format!("    let stride = {ROW};\n");
+    for quad in 0..states.div_ceil(4) {
         let entries = padded("x", quad, states);
         text += &format!("    state[{quad}u * stride + column] = {entries};\n");
     }
-    text += "}\n";
-    text
+    text + "}\n"
+}
+
+/// `load_state` alone, for kernels that may not write states.
+pub(super) fn load_glue(states: usize) -> String {
+    let mut text = String::from("fn load_state(column: u32) -> State {\n");
+    text += &format!("    let stride = {ROW};\n");
+    for quad in 0..states.div_ceil(4) {
+        text += &format!("    let v{quad} = state[{quad}u * stride + column];\n");
+    }
+    let all: Vec<String> = (0..states).map(component).collect();
+    text + &format!("    return State({});\n}}\n", all.join(", "))
 }
 
 /// `listed_start`: a start that the host lists, `[NX / 4, columns]` vectors of 4 coordinates.

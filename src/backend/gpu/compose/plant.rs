@@ -1,7 +1,7 @@
 //! The text of the kernels of measures, pairs and networks.
 
 use super::glue::{FINITE, PARAMS, RNG, component, constants, finite_glue, state_glue};
-use super::glue::{listed_glue, recorded_pair};
+use super::glue::{listed_glue, load_glue, recorded_pair};
 use super::kernels::{Access, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
 use super::physics_glue::{Driver, Outline, physics_glue};
@@ -163,7 +163,7 @@ impl PlantText {
             let entries = super::glue::padded("seen", quad, self.seen());
             store += &format!("    sink[{quad}u * params.stride + column] = {entries};\n");
         }
-        [state_glue(self.outline.states), self.functions(Kernel::Observe), store + "}\n"].join("\n")
+        [load_glue(self.outline.states), self.functions(Kernel::Observe), store + "}\n"].join("\n")
     }
 
     /// Numbers that the network sees.
