@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::Source;
 use super::operation::{Binary, Kind, Operation, Unary, Whole};
 use crate::formula::{Graph, Node};
+use crate::real::Real;
 
 /// Where an operand comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -118,13 +119,20 @@ fn known(operation: &Operation<Value>) -> Option<Value> {
         return Some(Value::Number(numbers.value().to_bits()));
     }
     match (operation.kind, numbers.operands(), operation.operands()) {
-        (Kind::Select, [Some(a), Some(b), ..], _) if a.is_nan() || b.is_nan() => {
-            Some(Value::Number(f32::NAN.to_bits()))
-        }
-        (Kind::Select | Kind::SelectLt, [Some(a), Some(b), ..], &[_, _, yes, no]) => {
+        (Kind::Select, &[Some(a), Some(b), ..], &[_, _, yes, no]) => Some(chosen(a, b, yes, no)),
+        (Kind::SelectLt, &[Some(a), Some(b), ..], &[_, _, yes, no]) => {
             Some(if a < b { yes } else { no })
         }
         _ => None,
+    }
+}
+
+/// What a choice between `yes` and `no` gives, as [`Real::if_lt`] would choose.
+fn chosen(a: f32, b: f32, yes: Value, no: Value) -> Value {
+    match a.if_lt(b, 1.0, 0.0) {
+        1.0 => yes,
+        0.0 => no,
+        neither => Value::Number(neither.to_bits()),
     }
 }
 
