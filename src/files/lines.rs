@@ -195,9 +195,10 @@ fn names_states(fields: &[String], names: &[String]) -> bool {
     whole || (known > 0 && fields.iter().all(word))
 }
 
-/// Whether the first line is one of names: none of its fields is a number.
+/// Whether the first line is one of names: none of its fields is a number, with a point or a comma.
 fn is_header(fields: &[String]) -> bool {
-    let numbers = fields.iter().filter(|field| field.parse::<f64>().is_ok()).count();
+    let is_number = |field: &&String| field.replace(',', ".").parse::<f64>().is_ok();
+    let numbers = fields.iter().filter(is_number).count();
     numbers == 0 || (fields[0].is_empty() && numbers + 1 == fields.len())
 }
 
