@@ -195,10 +195,9 @@ fn names_states(fields: &[String], names: &[String]) -> bool {
     whole || (known > 0 && fields.iter().all(word))
 }
 
-/// Whether the first line is one of names: none of its fields is a number, with a point or a comma.
+/// Whether the first line is one of names: none of its fields is a number.
 fn is_header(fields: &[String]) -> bool {
-    let is_number = |field: &&String| field.replace(',', ".").parse::<f64>().is_ok();
-    let numbers = fields.iter().filter(is_number).count();
+    let numbers = fields.iter().filter(|field| field.parse::<f64>().is_ok()).count();
     numbers == 0 || (fields[0].is_empty() && numbers + 1 == fields.len())
 }
 
