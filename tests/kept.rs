@@ -145,20 +145,20 @@ fn races_and_sweeps_make_way_when_they_are_told_to() {
     let out = folder.path("out");
     let root = Path::new(&out);
     let race = ["race", SMOKE, "--set", "race.steps=3", "--controllers", "policy", "--out", &out];
-    let race = |starts| [&race[..], &["--starts", starts], &CPU].concat();
-    done(&race("2"));
+    let race = |starts| [&race[..], &["--starts", starts]].concat();
+    done(&[&race("2")[..], &CPU].concat());
     assert!(root.join("races").is_dir());
     let sweep = ["sweep", SMOKE, "--set", "race.steps=3", "--starts", "2", "--samples", "8,16"];
-    let sweep = [&sweep[..], &["--out", &out], &CPU].concat();
+    let sweep = [&sweep[..], &["--out", &out]].concat();
     keeps(root, &race("3"), &["another experiment", "races", "--overwrite"]);
     keeps(root, &sweep, &["another experiment", "races", "--overwrite"]);
-    done(&[&race("3")[..], &["--overwrite"]].concat());
-    done(&[&sweep[..], &["--overwrite"]].concat());
+    done(&[&race("3")[..], &CPU, &["--overwrite"]].concat());
+    done(&[&sweep[..], &CPU, &["--overwrite"]].concat());
     assert!(root.join("points").is_dir() && !root.join("races").exists());
     assert!(!root.join("results.json").exists());
     // The same sweep goes on, asked to overwrite or not.
     let points = content(&root.join("points"));
-    done(&[&sweep[..], &["--overwrite"]].concat());
+    done(&[&sweep[..], &CPU, &["--overwrite"]].concat());
     assert_eq!(content(&root.join("points")), points);
     let certify = ["certify", SMOKE, "--out", &out, "--overwrite"];
     done(&[&certify[..], &CPU].concat());

@@ -416,15 +416,24 @@ fn links_out_of_the_folder_are_refused() {
     let elsewhere = folder.path("elsewhere");
     fs::create_dir(&elsewhere).unwrap();
     let (arguments, out) = raced(&folder);
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let races = format!("{out}/races");
     fs::create_dir(&out).unwrap();
-    std::os::unix::fs::symlink(&elsewhere, format!("{out}/races")).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, &races).unwrap();
+    refuses(&arguments, &["race/races", "something else is here"]);
+    fs::remove_file(&races).unwrap();
+    // In a folder that says it holds this work already.
+    command::done(&words);
+    fs::rename(&races, folder.path("moved")).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, &races).unwrap();
     refuses(&arguments, &["race/races", "a link", "remove it"]);
-    fs::remove_file(format!("{out}/races")).unwrap();
+    fs::remove_file(&races).unwrap();
     // A link in the place of a file is replaced, not followed.
     let mine = folder.path("elsewhere/mine.json");
     fs::write(&mine, "mine").unwrap();
+    fs::remove_file(format!("{out}/results.json")).unwrap();
     std::os::unix::fs::symlink(&mine, format!("{out}/results.json")).unwrap();
-    command::done(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    command::done(&words);
     assert_eq!(fs::read(&mine).unwrap(), b"mine");
     assert!(!fs::symlink_metadata(format!("{out}/results.json")).unwrap().is_symlink());
     assert_eq!(fs::read_dir(&elsewhere).unwrap().count(), 1);

@@ -38,7 +38,7 @@ pub struct QueryRow {
 
 /// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
 pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord, x: &[f32]) -> u8 {
-    let local = || verified_ball(growth).is_some_and(|ball| ball.contains(x));
+    let local = || verified_ball(growth, x.len()).is_some_and(|ball| ball.contains(x));
     match () {
         () if target_margin > 0.0 => 0,
         () if check_margin > 0.0 => 1,
@@ -47,9 +47,12 @@ pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord,
     }
 }
 
-/// The verified ball, where there is one.
-fn verified_ball(growth: &GrowthRecord) -> Option<Ball> {
-    let center = growth.center.as_ref().filter(|_| growth.outcome == GrowthOutcome::Verified)?;
+/// The verified ball of `states` coordinates, where there is one: a record that was edited may have
+/// any number of them.
+fn verified_ball(growth: &GrowthRecord, states: usize) -> Option<Ball> {
+    let whole = |center: &&Vec<f32>| center.len() == states && growth.varies.len() == states;
+    let verified = growth.outcome == GrowthOutcome::Verified;
+    let center = growth.center.as_ref().filter(whole).filter(|_| verified)?;
     Some(Ball {
         center: center.clone(),
         radius: growth.radius as f32,
@@ -183,7 +186,7 @@ pub fn check(
     ));
     let share = global::share_overlaps(&record.global, &fresh);
     findings.push(share);
-    if let Some(ball) = verified_ball(&record.growth) {
+    if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
         let failures = fresh_failures(context, settings, ball)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
         findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
