@@ -340,7 +340,8 @@ fn rollout_measures_every_start() {
     let folder = Folder::new();
     let run = |starts: &str, measures: &str| -> serde_json::Value {
         let arguments = ["rollout", RACE, "--starts", starts, "--measures", measures];
-        let output = done(&[&arguments[..], &["--backend", "cpu", "--json", "--overwrite"]].concat());
+        let output =
+            done(&[&arguments[..], &["--backend", "cpu", "--json", "--overwrite"]].concat());
         serde_json::from_str(&output).unwrap()
     };
     let npy_path = folder.path("measures.npy");

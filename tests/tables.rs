@@ -57,7 +57,10 @@ fn what_cannot_be_meant_is_refused_by_its_name() {
         ("0,1,2\n0.5,-1,2.25\n", "numbers of the columns, which pandas writes"),
         (",0,1,2\n0,0.5,-1,2.25\n", "a column has no name (pandas writes row numbers so"),
         (",x,y,heading\n0,0.5,-1,2.25\n", "a column has no name"),
-        ("0,0.5,-1,2.25\n", "line 1 has 4 numbers, a state has 3; if the first is the number of the row"),
+        (
+            "0,0.5,-1,2.25\n",
+            "line 1 has 4 numbers, a state has 3; if the first is the number of the row",
+        ),
         ("x,y,speed\n", "`speed` is no state; expected the states `x,y,heading`, in any order"),
         ("# x,y,speed\n1,2,3\n", "`speed` is no state"),
         ("x,y\n", "`heading` is missing"),
@@ -70,7 +73,10 @@ fn what_cannot_be_meant_is_refused_by_its_name() {
         ("0.5,,2.25\n", "line 1: y is empty"),
         ("0.5,-1,two\n", "line 1: `two` is not a number"),
         ("0.5,-1,2.25\nx,y,heading\n", "line 2: `x` is not a number"),
-        ("# x,y,heading\n1,2,3\n# heading,x,y\n1,2,3\n", "line 3: a second header, with the columns in another order"),
+        (
+            "# x,y,heading\n1,2,3\n# heading,x,y\n1,2,3\n",
+            "line 3: a second header, with the columns in another order",
+        ),
         ("0.5,-1,nan\n", "state 0 (from 0): heading is not a finite f32"),
         ("0.5,1e39,0\n", "y is not a finite f32"),
         ("\"0.5,-1,2.25\n", "line 1: a quote is not closed"),
@@ -83,10 +89,11 @@ fn what_cannot_be_meant_is_refused_by_its_name() {
         assert!(message.contains(words), "{text:?}: {message}");
         assert!(message.contains("states.csv"), "{message}");
     }
-    let utf16: Vec<u8> =
-        "\u{feff}x,y\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let utf16: Vec<u8> = "\u{feff}x,y\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
     assert!(read("states.csv", &utf16).unwrap_err().contains("UTF-16; save it as UTF-8"));
-    assert!(read("states.csv", b"0.5,\xb5,1\n").unwrap_err().contains("line 1 is no text in UTF-8"));
+    assert!(
+        read("states.csv", b"0.5,\xb5,1\n").unwrap_err().contains("line 1 is no text in UTF-8")
+    );
 }
 
 /// A .npy file with these numbers in the order that the file has them.

@@ -57,7 +57,12 @@ struct MppiNumbers {
 ///
 /// # Errors
 /// Those of the backend, [`crate::Error::Write`] and [`crate::Error::NoRoom`].
-pub fn export(backend: &Backend, seed: u64, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>> {
+pub fn export(
+    backend: &Backend,
+    seed: u64,
+    folder: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>> {
     let mut staged = Staged::new(folder)?;
     check_room(folder, EXPORT_BYTES)?;
     let data = Data::new(seed)?;

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::options::Global;
 use super::inputs::inputs;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
 use crate::config::{Config, Job, PolicySource};
@@ -13,8 +13,8 @@ use crate::files::{Existing, MANIFEST, Staged, check_room, is_free, json, make_w
 use crate::policy::Policy;
 use crate::rollout::Plant;
 use crate::scenario;
-use crate::scenario::record::{DeviationRecord, Record};
 use crate::scenario::check_settings;
+use crate::scenario::record::{DeviationRecord, Record};
 use crate::scenario::settings::Settings;
 use crate::system::System;
 

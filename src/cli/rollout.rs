@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::options::Global;
 use super::inputs::inputs;
+use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
 use crate::backend::{Backend, Event};
@@ -49,12 +49,7 @@ struct Summary {
 }
 
 /// Rolls the starts out and writes their measures.
-pub(super) fn run(
-    global: &Global,
-    path: &Path,
-    starts: &Path,
-    measures: &Path,
-) -> Result<Outcome> {
+pub(super) fn run(global: &Global, path: &Path, starts: &Path, measures: &Path) -> Result<Outcome> {
     let folder = folder_of(path);
     let config = Config::load(path, &global.overrides())?;
     let spec = config.spec()?;

@@ -141,7 +141,8 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
         format!("tier {tier} ({name}): {count}\n")
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();
-    let words = "V_check: the reach-avoid measure with its margins tightened, certified where positive";
+    let words =
+        "V_check: the reach-avoid measure with its margins tightened, certified where positive";
     format!("{lines}{words}\nrows: {}\n", path.display())
 }
 

@@ -135,7 +135,8 @@ fn defaults(given: &Table, origin: &str) -> Result<Table> {
     }
     let profile = match given.get("profile").cloned() {
         Some(other) if !other.is_str() => {
-            let problem = format!("{other} is no text; expected \"paper\", \"study\" or \"rigorous\"");
+            let problem =
+                format!("{other} is no text; expected \"paper\", \"study\" or \"rigorous\"");
             return Err(refused("profile", problem));
         }
         Some(name) => {

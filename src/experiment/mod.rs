@@ -18,6 +18,6 @@ pub mod settings;
 pub mod statistics;
 pub mod summary;
 pub mod sweep;
-mod weights;
 #[cfg(test)]
 mod tests;
+mod weights;

@@ -35,7 +35,8 @@ impl Weights {
                 100.0 * apart / temperature
             ));
         }
-        let effective = effective.filter(|effective| samples > 1 && *effective > ALL * samples as f64);
+        let effective =
+            effective.filter(|effective| samples > 1 && *effective > ALL * samples as f64);
         effective.map(|effective| {
             format!(
                 "{name}: {effective:.1} of {samples} samples are effective, so all weigh the same and \
@@ -63,7 +64,10 @@ pub(super) fn plans(name: Name, race: &RaceSettings) -> Option<&PlanSettings> {
         "race.hybrid.recovery" => &race.hybrid.recovery,
         _ => &race.hybrid.fast,
     };
-    name.plan_sections().iter().map(|section| of(section)).max_by(|a, b| a.work().total_cmp(&b.work()))
+    name.plan_sections()
+        .iter()
+        .map(|section| of(section))
+        .max_by(|a, b| a.work().total_cmp(&b.work()))
 }
 
 /// The note on the controller `name` with `race` for its settings, whose plans came to these means.

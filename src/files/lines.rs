@@ -212,9 +212,11 @@ fn order(fields: &[String], names: &[String]) -> Result<Vec<usize>, String> {
     for field in fields {
         let Some(place) = names.iter().position(|name| name == field) else {
             let problem = match field.as_str() {
-                "" => "a column has no name (pandas writes row numbers so; index=False leaves them \
+                "" => {
+                    "a column has no name (pandas writes row numbers so; index=False leaves them \
                        out)"
-                    .to_owned(),
+                        .to_owned()
+                }
                 _ => format!("`{field}` is no state"),
             };
             return Err(refused(problem));

@@ -40,9 +40,9 @@ impl<const NX: usize> StateReader<NX> {
         let file = BufReader::new(file);
         let rows = match format {
             Format::Csv => Rows::Csv(Lines::new(file)),
-            Format::Npy => Rows::Npy(
-                Elements::open(file, NX).map_err(|problem| Error::file(path, problem))?,
-            ),
+            Format::Npy => {
+                Rows::Npy(Elements::open(file, NX).map_err(|problem| Error::file(path, problem))?)
+            }
         };
         Ok(Self { path: path.to_owned(), rows, names, read: 0 })
     }

@@ -108,7 +108,8 @@ fn word<'a>(
 /// be another one.
 fn refuse_others(tensors: &SafeTensors<'_>, count: usize) -> std::result::Result<(), String> {
     let known = |name: &str| {
-        (0..count).any(|i| ["weight", "bias"].iter().any(|kind| name == format!("layers.{i}.{kind}")))
+        (0..count)
+            .any(|i| ["weight", "bias"].iter().any(|kind| name == format!("layers.{i}.{kind}")))
     };
     let mut others = tensors.names();
     others.retain(|name| !known(name));
@@ -116,7 +117,9 @@ fn refuse_others(tensors: &SafeTensors<'_>, count: usize) -> std::result::Result
     let Some(first) = others.first() else { return Ok(()) };
     let beyond = others.iter().any(|name| name.starts_with("layers."));
     let problem = match (beyond, others.len()) {
-        (true, _) => format!("there is no `layers.{count}.weight`: the layers have a gap before it"),
+        (true, _) => {
+            format!("there is no `layers.{count}.weight`: the layers have a gap before it")
+        }
         (false, 1) => "it is no layer, and the network would be used without it".to_owned(),
         (false, more) => format!(
             "it is no layer, nor are {} more tensors, and the network would be used without them",

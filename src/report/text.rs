@@ -82,7 +82,8 @@ pub(super) fn told_apart(texts: &[&str], limit: usize) -> Vec<String> {
 /// Characters that all of `texts` begin with.
 fn common_beginning(texts: &[&str]) -> usize {
     let Some((first, rest)) = texts.split_first() else { return 0 };
-    let shared = |other: &&str| first.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let shared =
+        |other: &&str| first.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
     rest.iter().map(shared).min().unwrap_or(0)
 }
 
@@ -215,9 +216,13 @@ mod tests {
     fn cut_texts_are_told_apart() {
         assert_eq!(told_apart(&["one", "two"], 18), ["one", "two"]);
         let files = ["policies/race_policy.safetensors", "policies/race_policy_box.safetensors"];
-        assert_eq!(told_apart(&files, 12), ["….safetensors", "…_box.safet…"].map(|t| shorten(t, 12)));
+        assert_eq!(
+            told_apart(&files, 12),
+            ["….safetensors", "…_box.safet…"].map(|t| shorten(t, 12))
+        );
         // Neither the beginning nor the rest tells these apart.
-        let long: Vec<String> = (0..500).map(|i| format!("{}{i}", "x".repeat(40 + i % 7))).collect();
+        let long: Vec<String> =
+            (0..500).map(|i| format!("{}{i}", "x".repeat(40 + i % 7))).collect();
         let long: Vec<&str> = long.iter().map(String::as_str).collect();
         let mut short = told_apart(&long, 12);
         assert!(short.iter().all(|text| text.chars().count() <= 12), "{short:?}");

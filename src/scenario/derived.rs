@@ -2,8 +2,8 @@
 
 use super::certify::{constants, hashes, ledger, spendings, system_record};
 use super::record::{
-    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record, RolloutRecord,
-    SliceAxisRecord, decimal,
+    DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record,
+    RolloutRecord, SliceAxisRecord, decimal,
 };
 use super::settings::Settings;
 use super::{deviation, global, growth, sampling, verify};

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::Context;
 use super::bound::{certified_risk, interval};
+use super::finding::{Figure, Finding};
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord};
 use super::settings::Settings;
-use super::finding::{Figure, Finding};
 use crate::error::Result;
 use crate::policy::Policy;
 use crate::rollout::{
