@@ -257,7 +257,7 @@ fn a_second_interrupt_stops_at_once() {
             .unwrap();
         std::thread::sleep(Duration::from_millis(1000));
         // Both are there when it goes on.
-        ["-STOP", "-INT", "-TERM", "-CONT"].map(|signal| send(signal, child.id()));
+        ["-STOP", "-INT", "-TERM", "-CONT"].iter().for_each(|signal| send(signal, child.id()));
         let code = child.wait().unwrap().code();
         let mut message = String::new();
         child.stderr.take().unwrap().read_to_string(&mut message).unwrap();
