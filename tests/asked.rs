@@ -165,10 +165,12 @@ fn a_point_that_does_not_hold_shows_in_the_exit_code() {
 
 #[test]
 fn improvements_without_end_are_refused() {
+    let folder = Folder::new();
+    let out = folder.path("out");
     let race = ["race", RACE, "--starts", "2", "--controllers", "mppi", "--backend", "cpu"];
     let with = |sets: &[&'static str]| {
         let sets = sets.iter().flat_map(|set| ["--set", *set]);
-        race.into_iter().chain(sets).collect::<Vec<_>>()
+        race.into_iter().chain(["--out", &out]).chain(sets).collect::<Vec<_>>()
     };
     let many = with(&["race.mppi.iterations=10000000"]);
     refused(&many, &["race.mppi.iterations", "10000000", "at most 1000"]);

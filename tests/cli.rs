@@ -214,7 +214,8 @@ fn too_few_scenarios_for_the_claim() {
     // One decision variable per step, 30 steps.
     let joint = ["deviation.joint=variables", "deviation.scenarios=300"];
     certify_refused(&joint, &["300 scenarios", "30 decision variable"]);
-    certify_refused(&["deviation.joint=bonferroni"], &["159 scenarios"]);
+    let split = ["deviation.joint=bonferroni", "deviation.scenarios=159"];
+    certify_refused(&split, &["159 scenarios"]);
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn words_say_what_the_file_does_not() {
     for word in ["18-8-8-8-8-1", "relu (the default", "--activation does", "identity", "not named"]
         .into_iter()
         // What stands beside it in the file is told.
-        .chain(["left out    ", "actor1_old", "no part of the policy"])
+        .chain(["left out    ", "actor1.", "and 42 more", "no part of the policy"])
     {
         assert!(words.contains(word), "no `{word}` in: {words}");
     }

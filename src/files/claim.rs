@@ -89,9 +89,12 @@ pub(crate) enum Claimed {
 /// Makes sure that `folder` holds the work that `manifest` describes, or none.
 ///
 /// # Errors
-/// [`Error::File`] naming what else is there, and what to do.
+/// [`Error::File`] naming what else is there, and what to do; [`Error::Write`] if nothing can be.
 pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
     let path = folder.join(MANIFEST);
+    if path.metadata().is_ok_and(|about| !about.is_file()) {
+        return Err(Error::file(&path, "it is no file, which it has to be; give another --out"));
+    }
     match std::fs::read_to_string(&path) {
         Ok(text) if text == manifest => return Ok(Claimed::Already),
         Ok(_) => {
@@ -103,7 +106,7 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
             return Err(Error::file(&path, problem));
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(Error::file(&path, error)),
+        Err(source) => return Err(Error::Write { path, source }),
     }
     match found(folder) {
         None => Ok(Claimed::NotYet),
@@ -187,7 +190,9 @@ pub(crate) fn spare_existing(path: &Path, existing: Existing) -> Result<()> {
 /// # Errors
 /// As [`spare_existing`].
 pub(super) fn spare_other(path: &Path, bytes: &[u8], existing: Existing) -> Result<()> {
-    match std::fs::read(path).is_ok_and(|found| found == bytes) {
+    // A pipe would be waited for.
+    let is_file = path.symlink_metadata().is_ok_and(|about| about.is_file());
+    match is_file && std::fs::read(path).is_ok_and(|found| found == bytes) {
         true => Ok(()),
         false => spare_existing(path, existing),
     }

@@ -50,7 +50,7 @@ impl Lines {
                     None => return Err(format!("line {}: a quote is not closed", self.number)),
                 }
             };
-            if comment.is_some() && !names_states(&fields, names) {
+            if comment.is_some() && !names_states(&fields, names, separator) {
                 continue;
             }
             self.separator = Some(separator);
@@ -187,12 +187,12 @@ fn split(line: &str, separator: char) -> Option<Vec<String>> {
 }
 
 /// Whether the fields of a comment are meant as names of columns.
-fn names_states(fields: &[String], names: &[String]) -> bool {
+fn names_states(fields: &[String], names: &[String], separator: char) -> bool {
     let word = |field: &String| !field.is_empty() && !field.contains(char::is_whitespace);
     let whole = fields.len() == names.len() && names.len() > 1 && fields.iter().all(word);
     let known = fields.iter().filter(|field| names.contains(field)).count();
-    // A sentence may have the name of a state between its commas.
-    whole || (known > 0 && fields.iter().all(word))
+    // A sentence may have the name of a state between its commas, and among its words.
+    whole || (separator != ' ' && known > 0 && fields.iter().all(word))
 }
 
 /// Whether the first line is one of names: none of its fields is a number, with whichever comma.
