@@ -11,6 +11,7 @@ use reachcast::scenario::{Unwatched, certify, record::Record, settings::Settings
 use reachcast::system::{Axis, Body, System};
 
 /// A car of unit speed that steers with up to 1 rad/s; the state is (x, y, heading).
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Dubins;
 
 impl System<3, 1> for Dubins {
@@ -44,6 +45,7 @@ impl System<3, 1> for Dubins {
 }
 
 /// Steers toward the target, pushed away from the obstacle where it is near.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Steer;
 
 impl Policy<3, 1> for Steer {

@@ -7,6 +7,7 @@ mod common;
 #[path = "oracle/drive.rs"]
 mod drive;
 #[path = "oracle/functions.rs"]
+#[allow(dead_code, reason = "the suite has more cases than mutants")]
 mod functions;
 mod models;
 #[path = "oracle/mppi.rs"]

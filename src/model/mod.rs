@@ -46,6 +46,23 @@ pub struct Model {
     pub(crate) native: Option<Arc<dyn NativeSystem>>,
 }
 
+/// Models are equal where all that is computed and drawn is; whether somebody compiled them, or said
+/// how wide things are, makes no difference.
+impl PartialEq for Model {
+    fn eq(&self, other: &Self) -> bool {
+        let same_axes = self.states == other.states && self.controls == other.controls;
+        let same_data = self.parameters == other.parameters && self.period == other.period;
+        let same_formulas = self.step == other.step
+            && self.target == other.target
+            && self.constraint == other.constraint;
+        self.name == other.name
+            && same_axes
+            && same_data
+            && same_formulas
+            && self.bodies == other.bodies
+    }
+}
+
 impl Model {
     /// Inputs of each formula: states, controls, parameters, time and step.
     pub fn inputs(&self) -> usize {
