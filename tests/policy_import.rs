@@ -119,7 +119,7 @@ fn the_same_weights_in_other_layouts_are_the_same_network() {
 #[test]
 fn what_a_file_does_not_say_is_said_to_be_a_default() {
     let found = |file: &str, request: Request| {
-        let Imported { network, layers, activation_from, output_from } =
+        let Imported { network, layers, activation_from, output_from, .. } =
             read(&path(file), &request).unwrap();
         ((network.activation(), activation_from), (network.output(), output_from), layers)
     };

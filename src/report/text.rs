@@ -210,7 +210,7 @@ fn trimmed(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{count, escape, interval, lower, number, shorten, upper};
+    use super::{count, escape, interval, lower, number, shorten, told_apart, upper};
 
     #[test]
     fn cut_texts_are_told_apart() {
