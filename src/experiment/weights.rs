@@ -64,10 +64,7 @@ pub(super) fn plans(name: Name, race: &RaceSettings) -> Option<&PlanSettings> {
         "race.hybrid.recovery" => &race.hybrid.recovery,
         _ => &race.hybrid.fast,
     };
-    name.plan_sections()
-        .iter()
-        .map(|section| of(section))
-        .max_by(|a, b| a.work().total_cmp(&b.work()))
+    name.plan_sections().iter().map(of).max_by(|a, b| a.work().total_cmp(&b.work()))
 }
 
 /// The note on the controller `name` with `race` for its settings, whose plans came to these means.
