@@ -68,8 +68,8 @@ impl Real for f64 {
         match Exponent::of(exponent) {
             Exponent::Whole(exponent) => Real::powi(self, exponent),
             Exponent::Root => f64::sqrt(self),
-            // The platform has 1 for 1 to any power.
-            Exponent::Other if exponent.is_nan() => f64::NAN,
+            // The platform has 1 for 1 to any power, and an infinity for powers of minus infinity.
+            Exponent::Other if exponent.is_nan() || self < 0.0 => f64::NAN,
             Exponent::Other => f64::powf(self, f64::from(exponent)),
         }
     }
