@@ -1,9 +1,9 @@
 //! Plants that are written in Rust: their formulas compiled for vectors.
 
+use std::cell::Cell;
 use std::fmt;
-use std::ops::Range;
 
-use super::{Frame, NativeFormula, NativeSystem};
+use super::{Block, Frame, GRANULE, NativeFormula, NativeSystem};
 use crate::policy::Policy;
 use crate::real::Vector;
 use crate::real::simd::{Formulas, Instructions};
@@ -49,29 +49,55 @@ where
     }
 }
 
-/// The vectors of the rows from `rows.start` on, from trajectory `at` on.
+/// The rows of a frame as far as a tile fills them, in blocks.
+struct Blocks<'a> {
+    cells: &'a [Cell<Block>],
+    /// Blocks of a row.
+    stride: usize,
+    /// Blocks of a row that trajectories are in.
+    length: usize,
+}
+
+impl<'a> Blocks<'a> {
+    #[inline(always)]
+    fn new(frame: &'a mut Frame, lanes: usize) -> Self {
+        let stride = frame.width() / GRANULE;
+        Self { cells: frame.blocks(), stride, length: lanes.div_ceil(GRANULE) }
+    }
+
+    /// `R` rows from `first` on. Cut once, so that the loop over the blocks checks no bounds.
+    #[inline(always)]
+    fn rows<const R: usize>(&self, first: usize) -> [&'a [Cell<Block>]; R] {
+        let mut rows = [&self.cells[..0]; R];
+        for (i, row) in rows.iter_mut().enumerate() {
+            *row = &self.cells[(first + i) * self.stride..][..self.length];
+        }
+        rows
+    }
+}
+
+/// The vectors of `rows` from number `at` of a block on.
 #[inline(always)]
-fn load<V: Vector, const R: usize>(frame: &Frame, rows: Range<usize>, at: usize) -> [V; R] {
-    let (numbers, width) = (&frame.rows()[rows.start * frame.width()..], frame.width());
+fn load<V: Vector, const R: usize>(rows: &[&[Cell<Block>]; R], block: usize, at: usize) -> [V; R] {
     let mut vectors = [V::lit(0.0); R];
-    for (row, vector) in vectors.iter_mut().enumerate() {
-        *vector = V::load(&numbers[row * width + at..]);
+    for (vector, row) in vectors.iter_mut().zip(rows) {
+        *vector = V::load(&row[block].get()[at..]);
     }
     vectors
 }
 
-/// Writes `vectors` to the rows from `rows.start` on, from trajectory `at` on.
+/// Writes `vectors` to `rows` from number `at` of a block on.
 #[inline(always)]
 fn store<V: Vector, const R: usize>(
     vectors: [V; R],
-    frame: &mut Frame,
-    rows: Range<usize>,
+    rows: &[&[Cell<Block>]; R],
+    block: usize,
     at: usize,
 ) {
-    let width = frame.width();
-    let numbers = &mut frame.rows_mut()[rows.start * width..];
-    for (row, vector) in vectors.into_iter().enumerate() {
-        vector.store(&mut numbers[row * width + at..]);
+    for (vector, row) in vectors.into_iter().zip(rows) {
+        let mut numbers = row[block].get();
+        vector.store(&mut numbers[at..]);
+        row[block].set(numbers);
     }
 }
 
@@ -85,10 +111,13 @@ struct Control<'a, P, const NX: usize, const NU: usize> {
 impl<P: Policy<NX, NU>, const NX: usize, const NU: usize> Formulas for Control<'_, P, NX, NU> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let (states, controls) = (self.frame.states(), self.frame.controls());
-        for at in (0..self.lanes).step_by(V::WIDTH) {
-            let x: [V; NX] = load(self.frame, states.clone(), at);
-            store(self.policy.control(x), self.frame, controls.clone(), at);
+        let blocks = Blocks::new(self.frame, self.lanes);
+        let (states, controls) = (blocks.rows::<NX>(0), blocks.rows::<NU>(NX));
+        for block in 0..blocks.length {
+            for at in (0..GRANULE).step_by(V::WIDTH) {
+                let x: [V; NX] = load(&states, block, at);
+                store(self.policy.control(x), &controls, block, at);
+            }
         }
     }
 }
@@ -103,11 +132,14 @@ struct Step<'a, S, const NX: usize, const NU: usize> {
 impl<S: System<NX, NU>, const NX: usize, const NU: usize> Formulas for Step<'_, S, NX, NU> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let (states, controls) = (self.frame.states(), self.frame.controls());
-        for at in (0..self.lanes).step_by(V::WIDTH) {
-            let x: [V; NX] = load(self.frame, states.clone(), at);
-            let u: [V; NU] = load(self.frame, controls.clone(), at);
-            store(self.system.step(x, u), self.frame, states.clone(), at);
+        let blocks = Blocks::new(self.frame, self.lanes);
+        let (states, controls) = (blocks.rows::<NX>(0), blocks.rows::<NU>(NX));
+        for block in 0..blocks.length {
+            for at in (0..GRANULE).step_by(V::WIDTH) {
+                let x: [V; NX] = load(&states, block, at);
+                let u: [V; NU] = load(&controls, block, at);
+                store(self.system.step(x, u), &states, block, at);
+            }
         }
     }
 }
@@ -122,11 +154,15 @@ struct Margins<'a, S, const NX: usize, const NU: usize> {
 impl<S: System<NX, NU>, const NX: usize, const NU: usize> Formulas for Margins<'_, S, NX, NU> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let (states, [target, _]) = (self.frame.states(), self.frame.margins());
-        for at in (0..self.lanes).step_by(V::WIDTH) {
-            let x: [V; NX] = load(self.frame, states.clone(), at);
-            let margins = [self.system.target(x), self.system.constraint(x)];
-            store(margins, self.frame, target..target + 2, at);
+        let [target, _] = self.frame.margins();
+        let blocks = Blocks::new(self.frame, self.lanes);
+        let (states, margins) = (blocks.rows::<NX>(0), blocks.rows::<2>(target));
+        for block in 0..blocks.length {
+            for at in (0..GRANULE).step_by(V::WIDTH) {
+                let x: [V; NX] = load(&states, block, at);
+                let both = [self.system.target(x), self.system.constraint(x)];
+                store(both, &margins, block, at);
+            }
         }
     }
 }

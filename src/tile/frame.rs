@@ -1,9 +1,10 @@
 //! A tile of trajectories as rows of numbers: states, controls, margins, and whatever a plant's
 //! formulas need besides.
 
+use std::cell::Cell;
 use std::ops::Range;
 
-use super::GRANULE;
+use super::{Block, GRANULE};
 
 /// Bytes of a cache line: rows begin at one, so that no vector crosses two.
 const LINE: usize = 64;
@@ -22,11 +23,13 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// Number of the row of the steps taken.
+    #[inline(always)]
     pub(crate) fn step(&self) -> usize {
         self.states + self.controls
     }
 
     /// Numbers of the rows of the target and the constraint margin.
+    #[inline(always)]
     pub(crate) fn margins(&self) -> [usize; 2] {
         [self.step() + 1, self.step() + 2]
     }
@@ -72,26 +75,31 @@ impl Frame {
     }
 
     /// Numbers of a row.
+    #[inline(always)]
     pub(crate) fn width(&self) -> usize {
         self.width
     }
 
     /// Numbers of the rows of the states.
+    #[inline(always)]
     pub(crate) fn states(&self) -> Range<usize> {
         0..self.layout.states
     }
 
     /// Numbers of the rows of the controls.
+    #[inline(always)]
     pub(crate) fn controls(&self) -> Range<usize> {
         self.layout.states..self.layout.step()
     }
 
     /// Number of the row of the steps taken.
+    #[inline(always)]
     pub(crate) fn step(&self) -> usize {
         self.layout.step()
     }
 
     /// Numbers of the rows of the target and the constraint margin.
+    #[inline(always)]
     pub(crate) fn margins(&self) -> [usize; 2] {
         self.layout.margins()
     }
@@ -106,6 +114,13 @@ impl Frame {
     #[inline(always)]
     pub(crate) fn rows_mut(&mut self) -> &mut [f32] {
         &mut self.numbers[self.begin..]
+    }
+
+    /// The rows in blocks, `[rows, width / GRANULE]`: cells, as formulas write rows that they read.
+    #[inline(always)]
+    pub(crate) fn blocks(&mut self) -> &[Cell<Block>] {
+        let (blocks, _) = self.rows_mut().as_chunks_mut::<GRANULE>();
+        Cell::from_mut(blocks).as_slice_of_cells()
     }
 
     /// The row number `row`.

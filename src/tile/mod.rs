@@ -12,3 +12,7 @@ pub(crate) use tape::{Source, Tape};
 
 /// Smallest number of trajectories of a tile; widths are multiples of it.
 pub(crate) const GRANULE: usize = 16;
+
+/// Numbers of a row that loops take at a time: whole vectors of every instruction set, and a bound
+/// that is checked once.
+pub(crate) type Block = [f32; GRANULE];

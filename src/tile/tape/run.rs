@@ -7,11 +7,7 @@ use super::{Place, Step};
 use crate::formula::Function;
 use crate::real::Vector;
 use crate::real::simd::Formulas;
-use crate::tile::{Frame, GRANULE};
-
-/// The numbers of a row that a loop takes at a time: whole vectors of every instruction set, and
-/// a bound checked once.
-type Block = [f32; GRANULE];
+use crate::tile::{Block, Frame, GRANULE};
 
 /// The operations of a tape over the first `lanes` trajectories of a frame.
 pub(super) struct Run<'a> {
@@ -27,9 +23,7 @@ impl Formulas for Run<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let (stride, length) = (self.frame.width() / GRANULE, self.lanes.div_ceil(GRANULE));
-        let (blocks, _) = self.frame.rows_mut().as_chunks_mut::<GRANULE>();
-        // Cells: an operation may write the row that it reads.
-        let rows = Rows { blocks: Cell::from_mut(blocks).as_slice_of_cells(), stride, length };
+        let rows = Rows { blocks: self.frame.blocks(), stride, length };
         for step in self.steps {
             let (to, [a, b, c, d]) = (rows.row(step.to), step.operation.places());
             match step.operation.kind {
