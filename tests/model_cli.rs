@@ -117,7 +117,7 @@ fn parameters_are_set_from_outside() {
             "--set",
             "model.parameters.targe.value=1",
         ],
-        &["model.parameters.targe.value", "model.parameters.target.value"],
+        &["unknown key `model.parameters.targe`", "`model.parameters.target`"],
     );
 }
 

@@ -36,6 +36,9 @@ fn parse_value(text: &str) -> Value {
     .unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
+/// Edits that a slip of the fingers may make.
+const SLIPS: usize = 2;
+
 /// Keys that say which other keys a table has, and the keys that one of their values brings.
 const TAGS: [(&str, &[&str]); 2] = [
     (
@@ -108,8 +111,12 @@ fn check_level(
         let refused = |problem: String| Err(Error::invalid(origin, problem));
         match (valid.get(key), value) {
             (None, _) => {
+                let siblings: Vec<String> = valid.keys().cloned().collect();
                 let all = paths(root, "");
-                let nearest = nearest(&path, &all);
+                let nearest = match close(key, &siblings) {
+                    Some(sibling) => format!("{prefix}{sibling}"),
+                    None => nearest(&path, &all).to_owned(),
+                };
                 return refused(format!(
                     "unknown key `{path}`; the nearest valid key is `{nearest}`"
                 ));
@@ -162,6 +169,13 @@ fn paths(table: &Table, prefix: &str) -> Vec<String> {
         }
     };
     table.iter().flat_map(path).collect()
+}
+
+/// The candidate that is a slip or two away from `key`, if there is one.
+fn close<'a>(key: &str, candidates: &'a [String]) -> Option<&'a str> {
+    let edits = |candidate: &&String| strsim::damerau_levenshtein(key, candidate);
+    let nearest = candidates.iter().min_by_key(edits)?;
+    (edits(&nearest) <= SLIPS.min(key.chars().count() / 2)).then_some(nearest)
 }
 
 /// The candidate that takes the fewest edits to get to; a key in the wrong section counts by its

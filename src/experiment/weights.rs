@@ -77,6 +77,7 @@ pub(super) fn note(name: Name, race: &RaceSettings, means: [Option<f64>; 2]) -> 
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::Course;
     use super::*;
 
     fn said(effective: f64, best_cost: f64) -> Option<String> {
@@ -100,11 +101,7 @@ mod tests {
 
     #[test]
     fn every_section_of_plans_is_found() {
-        let config = crate::config::Config::load(
-            &std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/race.toml"),
-            &Default::default(),
-        );
-        let mut race = config.unwrap().race.unwrap();
+        let mut race = Course::new().race;
         race.hybrid.fast.samples = 7000;
         race.no_policy.recovery.samples = 6000;
         race.cbf.samples = 5000;

@@ -9,6 +9,7 @@ use super::lipschitz::{self, MarginBox};
 use super::record::{
     ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
     Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing, decimal,
+    finite_margin,
 };
 use super::settings::Settings;
 use super::{Context, Watch, derived, deviation, global, growth};
@@ -275,9 +276,9 @@ fn state(
     let states = States::one(x);
     let margins = global::check_margins(context, &settings.spec, tightening, states, query, band)?;
     let check_margin = decimal(margins[0]);
-    let target_margin = decimal(context.model().target_at(x, 0));
+    let target_margin = decimal(finite_margin(context.model().target_at(x, 0)));
     let tier = super::verify::tier(target_margin, check_margin, growth, x);
-    let constraint_margin = decimal(context.model().constraint_at(x, 0));
+    let constraint_margin = decimal(finite_margin(context.model().constraint_at(x, 0)));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }
 

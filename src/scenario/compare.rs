@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::finding::{Figure, Finding};
-use super::record::Record;
+use super::record::{Record, SCHEMA};
 
 /// Difference, relative to the larger number or to one, that another device's rounding may make.
 const TOLERANCE: f64 = 1e-3;
@@ -33,7 +33,7 @@ const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
 /// On the device that made it the record must be the same to the last digit; on another one
 /// numbers may differ by rounding.
 pub(super) fn fields(stored: &Record, again: &Record) -> Finding {
-    let same_version = stored.schema == again.schema;
+    let same_version = stored.schema == SCHEMA;
     let same_device = same_version
         && stored.provenance.backend == again.provenance.backend
         && stored.provenance.device == again.provenance.device

@@ -3,7 +3,7 @@
 use super::certify::{constants, hashes, ledger, spendings, system_record};
 use super::record::{
     DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record, SliceRecord,
-    decimal,
+    decimal, finite_margin,
 };
 use super::settings::Settings;
 use super::{deviation, global, growth, sampling, verify};
@@ -45,8 +45,8 @@ fn margins(record: &mut Record, model: &Model, settings: &Settings) {
     let x = &*settings.state;
     let state = &mut record.state;
     state.x = x.to_vec();
-    state.target_margin = decimal(model.target_at(x, 0));
-    state.constraint_margin = decimal(model.constraint_at(x, 0));
+    state.target_margin = decimal(finite_margin(model.target_at(x, 0)));
+    state.constraint_margin = decimal(finite_margin(model.constraint_at(x, 0)));
     state.tier = verify::tier(state.target_margin, state.check_margin, &record.growth, x);
     let cells = global::slice_through(settings, x);
     let check_margin = std::mem::take(&mut record.slice.check_margin);

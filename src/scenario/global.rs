@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Context;
 use super::bound::{certified_risk, interval};
 use super::finding::{Figure, Finding};
-use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord};
+use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord, finite_margin};
 use super::settings::Settings;
 use crate::error::Result;
 use crate::model::{Model, Plant};
@@ -84,8 +84,11 @@ pub(super) fn slice_record(model: &Model, settings: &Settings, states: States<'_
         x: axis(0),
         y: axis(1),
         check_margin: Vec::new(),
-        target_margin: states.iter().map(|x| model.target_at(x, 0)).collect(),
-        constraint_margin: states.iter().map(|x| model.constraint_at(x, 0)).collect(),
+        target_margin: states.iter().map(|x| finite_margin(model.target_at(x, 0))).collect(),
+        constraint_margin: states
+            .iter()
+            .map(|x| finite_margin(model.constraint_at(x, 0)))
+            .collect(),
     }
 }
 

@@ -15,6 +15,16 @@ pub const SCHEMA: u32 = 2;
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
 
+/// A margin as a record has it: JSON knows no infinity, so the largest number stands for it.
+pub(crate) fn finite_margin(margin: f32) -> f32 {
+    margin.clamp(f32::MIN, f32::MAX)
+}
+
+/// An f64 of a record that may be infinite, which JSON writes as null.
+fn or_infinite<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Option::<f64>::deserialize(from).map(|value| value.unwrap_or(f64::INFINITY))
+}
+
 /// The shortest decimal that is this f32, so that a record says 0.4 and not 0.4000000059604645; as an
 /// f32 it is `value` again.
 pub(crate) fn decimal(value: f32) -> f64 {
@@ -124,7 +134,8 @@ pub struct ConstantRecord {
     pub used: f64,
     /// Where it comes from: `computed` (gradient bound over the box) or `given`.
     pub source: String,
-    /// The computed bound, also where a given constant is used.
+    /// The computed bound, also where a given constant is used; infinite where none could be shown.
+    #[serde(deserialize_with = "or_infinite")]
     pub computed: f64,
     /// Largest gradient among random points: a lower estimate.
     pub sampled: f64,

@@ -6,7 +6,7 @@ use super::bound::lower_bound;
 use super::certify::{certify, hashes, provenance, tightening};
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
-use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA};
+use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
@@ -148,7 +148,7 @@ pub fn query(
         record.global.band,
     )?;
     let row = |(x, check_margin): (&[f32], f32)| {
-        let target_margin: f32 = plant.model.target_at(x, 0);
+        let target_margin = finite_margin(plant.model.target_at(x, 0));
         let check = f64::from(check_margin);
         let tier = tier(f64::from(target_margin), check, &record.growth, x);
         QueryRow { tier, check_margin, target_margin }

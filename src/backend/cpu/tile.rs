@@ -146,10 +146,8 @@ impl<'a, K: Kernel> Driver<'a, K> {
         scores: impl Iterator<Item = (&'s mut Score<N>, Loss<N>)>,
     ) {
         self.plant.system.margins(self.plant.with, frame, lanes);
-        for (group, (score, loss)) in scores.take(lanes.div_ceil(N)).enumerate() {
-            let at = group * N;
-            self.kernel.call(Judge { frame, at, score, loss, gamma });
-        }
+        let scores = scores.take(lanes.div_ceil(N));
+        self.kernel.call(Judge { frame, scores, gamma });
     }
 
     /// The kernel, for other bodies.
@@ -162,47 +160,49 @@ impl<'a, K: Kernel> Driver<'a, K> {
 #[inline(always)]
 pub(super) fn lanes<const N: usize>(frame: &Frame, row: usize, at: usize) -> Lanes<N> {
     let mut lanes = [0.0; N];
-    lanes.copy_from_slice(&frame.row(row)[at..][..N]);
+    lanes.copy_from_slice(&frame.rows()[row * frame.width() + at..][..N]);
     Lanes(lanes)
 }
 
-/// The margins of a group, folded.
-struct Judge<'a, const N: usize> {
+/// The margins of the groups of a tile, folded: one body for all of them.
+struct Judge<'a, I> {
     frame: &'a Frame,
-    at: usize,
-    score: &'a mut Score<N>,
-    loss: Loss<N>,
+    /// The score of each group, and what its margins lose.
+    scores: I,
     gamma: f32,
 }
 
-impl<const N: usize> Body for Judge<'_, N> {
+impl<'s, I, const N: usize> Body for Judge<'_, I>
+where
+    I: Iterator<Item = (&'s mut Score<N>, Loss<N>)>,
+{
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Loss([target_loss, constraint_loss]) = self.loss;
-        let [target, constraint] = self.frame.margins();
-        let target = lanes(self.frame, target, self.at) - target_loss;
-        let constraint = lanes(self.frame, constraint, self.at) - constraint_loss;
-        let mut largest = [0; N];
-        for row in self.frame.states() {
-            largest = with_largest(largest, lanes(self.frame, row, self.at));
-        }
-        let margins = [target, constraint].map(|margin| {
+        let Self { frame, scores, gamma } = self;
+        let (states, [target_row, constraint_row]) = (frame.states().len(), frame.margins());
+        for (group, (score, Loss([target_loss, constraint_loss]))) in scores.enumerate() {
+            let at = group * N;
             // Infinite margins are satisfied or violated, only a NaN fails the rollout.
-            let numbers = per_lane!(N, i => bounded(margin.0[i]));
-            largest = with_largest(largest, Lanes(numbers));
-            Lanes(numbers)
-        });
-        let [target, constraint] = margins;
-        self.score.add(target, constraint, largest, self.gamma);
+            let target = bounded(lanes(frame, target_row, at) - target_loss);
+            let constraint = bounded(lanes(frame, constraint_row, at) - constraint_loss);
+            let mut largest = with_largest(with_largest([0; N], target), constraint);
+            for row in 0..states {
+                largest = with_largest(largest, lanes(frame, row, at));
+            }
+            score.add(target, constraint, largest, gamma);
+        }
     }
 }
 
-/// An infinite margin as the largest number; NaN stays.
+/// Infinite margins as the largest number; NaN stays.
 #[inline(always)]
-fn bounded(margin: f32) -> f32 {
-    if margin.abs().to_bits() == EXPONENT { f32::MAX.copysign(margin) } else { margin }
+fn bounded<const N: usize>(margin: Lanes<N>) -> Lanes<N> {
+    Lanes(per_lane!(N, i => {
+        let infinite = margin.0[i].abs().to_bits() == EXPONENT;
+        if infinite { f32::MAX.copysign(margin.0[i]) } else { margin.0[i] }
+    }))
 }
 
 /// The larger of `largest` and the bits of `values` without their sign.
