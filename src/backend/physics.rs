@@ -158,9 +158,9 @@ impl Function {
 
 /// `graph` with its inputs at other places, `count` in all.
 fn moved(graph: &Graph, place: &[u32], count: u32) -> Graph {
-    let node = |node: &Node| match node {
-        Node::Input(input) => Node::Input(place[*input as usize]),
-        other => other.clone(),
+    let node = |node: &Node| match *node {
+        Node::Input(input) => Node::Input(place[input as usize]),
+        other => other,
     };
     Graph {
         inputs: count as usize,

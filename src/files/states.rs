@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::Format;
 use super::elements::Elements;
 use super::lines::Lines;
+use super::list::StateList;
 use crate::error::{Error, Result};
-use crate::rollout::StateList;
 
 /// States one after the other, as many finite numbers each as there are names.
 ///

@@ -32,9 +32,8 @@ impl Model {
     where
         S: System<NX, NU>,
     {
-        let record = |formula: &dyn Fn([Expr; NX], [Expr; NU]) -> Vec<Expr>| {
-            recorded(system, |x, u| formula(x, u))
-        };
+        let record =
+            |formula: &dyn Fn([Expr; NX], [Expr; NU]) -> Vec<Expr>| recorded(system, formula);
         Self {
             name: system.name().to_owned(),
             states: system.states().to_vec(),

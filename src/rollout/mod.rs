@@ -8,8 +8,8 @@ mod reference;
 pub mod replay;
 mod sample;
 mod spec;
-mod states;
 
+pub use crate::files::{StateList, States};
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
 pub use mppi::{
     CostQuery, Disturbance, MAX_PLAN, MAX_SAMPLES, MppiProblem, MppiResult, MppiSettings, MppiSpec,
@@ -25,4 +25,3 @@ pub use spec::{
     DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Plant, Query, ReachAvoidTask,
     RolloutSpec, Tightening,
 };
-pub use states::{StateList, States};

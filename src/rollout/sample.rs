@@ -1,8 +1,8 @@
 //! Random starts: every sample is a function of seed, stream and index, on every backend.
 
 use super::philox::philox;
-use super::states::States;
 use crate::error::{Error, Result};
+use crate::files::States;
 use crate::real::{Lanes, Real, per_lane};
 
 /// Name of the generator, as certificates state it.

@@ -175,7 +175,7 @@ impl Settings {
         let (axes, state) = (&model.states, state.into());
         assert_eq!(state.len(), axes.len(), "numbers of the state");
         let (epsilon, beta, scenarios) = (0.1, 1e-3, 159);
-        let slice = (axes.len() > 1).then(|| [0, 1]).map(|both| {
+        let slice = (axes.len() > 1).then_some([0, 1]).map(|both| {
             both.map(|state| {
                 let step = (axes[state].high - axes[state].low) / f32::from(SLICE_CELLS - 1);
                 let value = |i| axes[state].low + f32::from(i) * step;

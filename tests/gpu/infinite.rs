@@ -36,6 +36,7 @@ impl Late {
             Self::Same => early,
             Self::Infinite => infinite,
             Self::MinusInfinite => -infinite,
+            #[expect(clippy::eq_op, reason = "infinity less infinity is what makes a NaN")]
             Self::NotANumber => infinite - infinite,
         };
         R::lit(3.0).if_lt(n, late, early)

@@ -13,7 +13,7 @@ impl<'a> States<'a> {
     /// # Panics
     /// If `size` is 0, or the numbers are no whole number of states.
     pub fn new(numbers: &'a [f32], size: usize) -> Self {
-        assert!(numbers.len().is_multiple_of(size), "states of {size} numbers");
+        assert!(size > 0 && numbers.len().is_multiple_of(size), "states of {size} numbers");
         Self { size, numbers }
     }
 
