@@ -56,6 +56,22 @@ fn text_and_rust_come_to_the_same_numbers() {
     }
 }
 
+/// The race under its network, text beside Rust; every carried text certifies a share of its box.
+#[test]
+fn carried_texts_certify() {
+    let folder = Folder::new();
+    let set = ["global.draws=3000", "deviation.pilot=200"];
+    let text = certificate("configs/models/drone_race.toml", "cpu", &set, &folder.path("t"));
+    let rust = certificate("configs/race.toml", "cpu", &set, &folder.path("r"));
+    assert_same_numbers(&text, &rust);
+    for name in ["double_integrator", "dubins"] {
+        let config = format!("configs/models/{name}.toml");
+        let record = certificate(&config, "cpu", &set, &folder.path(name));
+        assert!(record["global"]["accepted"].as_u64().unwrap() > 1000, "{name}");
+        assert_eq!(record["holds"], true, "{name}: {}", record["statements"]);
+    }
+}
+
 /// On an adapter the kernels of both are the same text, so the numbers are the same bits there too.
 #[test]
 fn text_and_rust_come_to_the_same_numbers_on_an_adapter() {
