@@ -5,9 +5,11 @@ mod mppi;
 mod noise;
 mod philox;
 mod reference;
+mod region;
 pub mod replay;
 mod sample;
 mod spec;
+mod starts;
 
 pub use crate::files::{StateList, States};
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
@@ -18,10 +20,10 @@ pub use mppi::{
 pub use noise::{Noise, NoiseShape, SPLINE_SUPPORT, SplineRow};
 pub use philox::philox;
 pub use reference::{measure, pair_measures, trajectory};
-pub use sample::{
-    Ball, GENERATOR, Pairs, Purpose, Region, Starts, Stream, normal_pair, sample_ball,
-};
+pub use region::{Ball, Region, sample_ball};
+pub use sample::{GENERATOR, Purpose, Stream, normal_pair};
 pub use spec::{
     DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Plant, Query, ReachAvoidTask,
     RolloutSpec, Tightening,
 };
+pub use starts::{Pairs, Starts};

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::sample::{Pairs, Starts};
+use super::starts::{Pairs, Starts};
 use crate::error::{Error, Result};
 
 /// Longest horizon, steps.
