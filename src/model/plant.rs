@@ -42,6 +42,16 @@ impl Plant {
         Self::new(Model::of(system), controller)
     }
 
+    /// The same of a system and a policy that are borrowed, without their compiled forms.
+    #[cfg(feature = "train")]
+    pub(crate) fn recorded<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Self
+    where
+        S: System<NX, NU>,
+        P: Policy<NX, NU>,
+    {
+        Self::new(Model::recorded(system), Controller::recorded(system, policy))
+    }
+
     /// The controls at `x`, `[controls]`, at a step.
     pub fn control<R: Real>(&self, x: &[R], step: u32) -> Vec<R> {
         let zeros = || vec![R::lit(0.0); self.model.controls.len()];

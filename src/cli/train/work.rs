@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::backend::Backend;
+use crate::backend::{Backend, Program};
 use crate::cli::options::{BackendName, Global};
 use crate::cli::progress::Progress;
 use crate::cli::train::DEFAULT_OUT;
@@ -14,6 +14,7 @@ use crate::cli::{Outcome, devices, report};
 use crate::config::{Config, Job, SystemJob};
 use crate::error::Result;
 use crate::files::{Existing, Staged, json};
+use crate::model;
 use crate::policy::{Activation, OutputActivation, Policy};
 use crate::report::train_html;
 use crate::rollout::{Plant, Purpose, Stream};
@@ -98,19 +99,15 @@ impl Training<'_> {
         Network::random(shape, Stream::new(self.config.seed, Purpose::TrainWeight, 0), last)
     }
 
-    /// Trains `learner`, on `plant` or from its policy on, for `total` iterations.
-    fn train<S, P, const NX: usize, const NU: usize>(
+    /// Trains `learner`, on the plant of `program` or from its policy on, for `total` iterations.
+    fn train(
         &self,
         learner: &mut dyn Learner,
         total: u64,
-        plant: Plant<'_, S, P>,
-    ) -> Result<Trained>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+        program: &Program<'_>,
+    ) -> Result<Trained> {
         let config = self.config.to_train_json()?;
-        let provenance = provenance(self.backend, plant, self.config.seed, config);
+        let provenance = provenance(program, self.config.seed, config);
         let origin = Origin { method: self.settings.method, provenance };
         let TrainSettings { interval, patience, .. } = *self.settings;
         let run = Run { folder: self.out, origin, total, interval, patience };
@@ -141,8 +138,8 @@ impl SystemJob for Training<'_> {
         // On a plant that is linear in the state, replayed controls deviate by the same under any
         // policy; on others this is the deviation under the untrained one.
         let policy = &network.export(axes.each_ref().map(|axis| axis.name.clone()).to_vec())?;
-        let plant = Plant { system, policy };
-        let context = Context { backend, plant, watch };
+        let program = backend.prepare(&model::Plant::recorded(system, policy))?;
+        let context = Context { program: &program, watch };
         let losses = match settings.analytic.certified > 0.0 {
             true => Some(tightened(context, &checked)?.losses),
             false => None,
@@ -158,7 +155,7 @@ impl SystemJob for Training<'_> {
             seed: config.seed,
         };
         let mut learner = Analytic::new(task, network, settings.analytic);
-        self.train(&mut learner, settings.analytic.iterations, plant)
+        self.train(&mut learner, settings.analytic.iterations, &program)
     }
 }
 
@@ -202,7 +199,8 @@ impl Job for Training<'_> {
         };
         let network = self.network(inputs, 1, OutputActivation::Identity, 1.0);
         let mut learner = Value::new(lesson, network, settings.value)?;
-        self.train(&mut learner, settings.value.iterations, plant)
+        let program = backend.prepare(&model::Plant::recorded(plant.system, plant.policy))?;
+        self.train(&mut learner, settings.value.iterations, &program)
     }
 }
 

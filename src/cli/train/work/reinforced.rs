@@ -2,7 +2,7 @@
 
 use super::Training;
 use crate::error::Result;
-use crate::rollout::Plant;
+use crate::model::Plant;
 use crate::system::System;
 use crate::train::analytic::Task;
 use crate::train::ddpg::{Ddpg, Game};
@@ -24,7 +24,8 @@ impl Training<'_> {
         let settings = &self.settings.ddpg;
         let mut learner = Ddpg::new(self.task(system)?, game, settings.clone());
         let [policy, ..] = &learner.exported()?;
-        self.train(&mut learner, settings.iterations, Plant { system, policy })
+        let program = self.backend.prepare(&Plant::recorded(system, policy))?;
+        self.train(&mut learner, settings.iterations, &program)
     }
 
     /// A policy of `system` on its ordinary reward.
@@ -41,7 +42,8 @@ impl Training<'_> {
         };
         let mut learner = Ppo::new(self.task(system)?, lesson, settings.clone());
         let policy = &learner.exported()?;
-        self.train(&mut learner, settings.iterations, Plant { system, policy })
+        let program = self.backend.prepare(&Plant::recorded(system, policy))?;
+        self.train(&mut learner, settings.iterations, &program)
     }
 
     /// What is trained on `system`, on what.
