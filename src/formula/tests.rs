@@ -3,6 +3,7 @@
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::{Expr, Function, Graph, Node, record, wgsl};
+use crate::real::bound::{Bound, Domain, enclose};
 use crate::real::{Lanes, Real};
 
 /// Numbers that functions treat differently: zeros, ends of domains, numbers next to those, overflow.
@@ -158,4 +159,33 @@ fn printed_functions_are_valid() {
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
     validator.validate(&module).unwrap_or_else(|error| panic!("{error:?}"));
     assert_eq!(outputs, 5);
+}
+
+/// What is known of no end: no panic, and ends that are numbers or infinite.
+#[test]
+fn functions_of_unbounded_intervals_have_ends() {
+    let ends = [f64::NEG_INFINITY, -1e300, -2.0, -0.0, 0.0, 0.5, 1.0, 1e300, f64::INFINITY];
+    let pairs = ends.iter().flat_map(|low| ends.iter().map(move |high| (*low, *high)));
+    for (low, high) in pairs.filter(|(low, high)| low <= high && *low < 1e301 && *high > -1e301) {
+        let domain = Domain { low: &[low, low], high: &[high, high], varies: &[true, true] };
+        let outputs = enclose(domain, |x| {
+            let mut all: Vec<Bound> = Function::ALL.map(|function| function.apply(x[0])).to_vec();
+            let powers = [-3, -2, -1, 0, 1, 2, 3, i32::MAX, i32::MIN];
+            all.extend(powers.map(|exponent| x[0].powi(exponent)));
+            let powers = [-1.5, -1e-30, 0.5, 0.3, 1.7, 1e30, f32::NAN, f32::INFINITY];
+            all.extend(powers.map(|exponent| x[0].powf(exponent)));
+            all.extend([x[0].sign(), x[0].atan2(x[1]), x[0].hypot(x[1]), x[0].abs().sqrt()]);
+            all
+        });
+        for (number, output) in outputs.iter().enumerate() {
+            for piece in &output.pieces {
+                let sides = piece.gradient.iter().chain([&piece.value]);
+                for side in sides {
+                    let sound = side.low <= side.high && side.low < f64::INFINITY;
+                    let sound = sound && side.high > f64::NEG_INFINITY;
+                    assert!(sound, "{number} over {low}..{high}: {output:?}");
+                }
+            }
+        }
+    }
 }
