@@ -95,7 +95,7 @@ impl Stream {
     }
 
     /// The samples `first..first + N` of the uniform distribution in a box: those of
-    /// [`Region::Box`].
+    /// [`crate::rollout::Region::Box`].
     ///
     /// # Panics
     /// If the corners have not the same number of coordinates.
