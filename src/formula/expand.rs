@@ -1,9 +1,7 @@
 //! Graphs in the primitives: functions as the polynomials that every scalar computes.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
-
 use super::node::Node;
-use super::record::{Graph, push, recorded};
+use super::record::{Graph, operators, primitives, push, recorded};
 use crate::real::Real;
 
 impl Graph {
@@ -40,61 +38,8 @@ impl Primitive {
     }
 }
 
-macro_rules! operators {
-    ($($trait:ident, $method:ident;)*) => {
-        $(
-            impl $trait for Primitive {
-                type Output = Self;
-                fn $method(self, rhs: Self) -> Self {
-                    Self::new(Node::$trait(self.0, rhs.0))
-                }
-            }
-        )*
-    };
-}
-operators! {
-    Add, add;
-    Sub, sub;
-    Mul, mul;
-    Div, div;
-}
-
-impl Neg for Primitive {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self::new(Node::Neg(self.0))
-    }
-}
+operators!(Primitive);
 
 impl Real for Primitive {
-    fn lit(value: f32) -> Self {
-        Self::new(Node::Literal(value.to_bits()))
-    }
-    fn abs(self) -> Self {
-        Self::new(Node::Abs(self.0))
-    }
-    fn sqrt(self) -> Self {
-        Self::new(Node::Sqrt(self.0))
-    }
-    fn floor(self) -> Self {
-        Self::new(Node::Floor(self.0))
-    }
-    fn sign(self) -> Self {
-        Self::new(Node::Sign(self.0))
-    }
-    fn min(self, rhs: Self) -> Self {
-        Self::new(Node::Min(self.0, rhs.0))
-    }
-    fn max(self, rhs: Self) -> Self {
-        Self::new(Node::Max(self.0, rhs.0))
-    }
-    fn clamp(self, low: Self, high: Self) -> Self {
-        Self::new(Node::Clamp(self.0, low.0, high.0))
-    }
-    fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self::new(Node::IfLt(self.0, rhs.0, yes.0, no.0))
-    }
-    fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self::new(Node::SelectLt(self.0, rhs.0, yes.0, no.0))
-    }
+    primitives!();
 }

@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::node::{Function, Node};
 use crate::real::Real;
@@ -150,75 +149,76 @@ impl Graph {
     }
 }
 
-impl Add for Expr {
-    type Output = Self;
-    fn add(self, rhs: Self) -> Self {
-        Self::new(Node::Add(self.0, rhs.0))
-    }
-}
+/// The operators of a recorded number, and in its `impl Real` the operations that the expanded graph
+/// keeps: the same nodes whatever becomes of the functions.
+macro_rules! operators {
+    ($number:ident) => {
+        $crate::formula::record::operators! { $number: Add add, Sub sub, Mul mul, Div div }
 
-impl Sub for Expr {
-    type Output = Self;
-    fn sub(self, rhs: Self) -> Self {
-        Self::new(Node::Sub(self.0, rhs.0))
-    }
+        impl std::ops::Neg for $number {
+            type Output = Self;
+            fn neg(self) -> Self {
+                Self::new(Node::Neg(self.0))
+            }
+        }
+    };
+    ($number:ident: $($trait:ident $method:ident),*) => {
+        $(
+            impl std::ops::$trait for $number {
+                type Output = Self;
+                fn $method(self, rhs: Self) -> Self {
+                    Self::new(Node::$trait(self.0, rhs.0))
+                }
+            }
+        )*
+    };
 }
+pub(super) use operators;
 
-impl Mul for Expr {
-    type Output = Self;
-    fn mul(self, rhs: Self) -> Self {
-        Self::new(Node::Mul(self.0, rhs.0))
-    }
+/// See [`operators`].
+macro_rules! primitives {
+    () => {
+        fn lit(value: f32) -> Self {
+            Self::new(Node::Literal(value.to_bits()))
+        }
+        fn abs(self) -> Self {
+            Self::new(Node::Abs(self.0))
+        }
+        fn sqrt(self) -> Self {
+            Self::new(Node::Sqrt(self.0))
+        }
+        fn floor(self) -> Self {
+            Self::new(Node::Floor(self.0))
+        }
+        fn sign(self) -> Self {
+            Self::new(Node::Sign(self.0))
+        }
+        fn min(self, rhs: Self) -> Self {
+            Self::new(Node::Min(self.0, rhs.0))
+        }
+        fn max(self, rhs: Self) -> Self {
+            Self::new(Node::Max(self.0, rhs.0))
+        }
+        fn clamp(self, low: Self, high: Self) -> Self {
+            Self::new(Node::Clamp(self.0, low.0, high.0))
+        }
+        fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
+            Self::new(Node::IfLt(self.0, rhs.0, yes.0, no.0))
+        }
+        fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
+            Self::new(Node::SelectLt(self.0, rhs.0, yes.0, no.0))
+        }
+    };
 }
+pub(super) use primitives;
 
-impl Div for Expr {
-    type Output = Self;
-    fn div(self, rhs: Self) -> Self {
-        Self::new(Node::Div(self.0, rhs.0))
-    }
-}
-
-impl Neg for Expr {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self::new(Node::Neg(self.0))
-    }
-}
+operators!(Expr);
 
 impl Real for Expr {
-    fn lit(value: f32) -> Self {
-        Self::new(Node::Literal(value.to_bits()))
-    }
+    primitives!();
     fn parameter(name: &str, value: f32) -> Self {
         let named = ARENA.with_borrow(|arena| arena.parameters.get(name).copied());
         named.unwrap_or_else(|| Self::lit(value))
-    }
-    fn abs(self) -> Self {
-        Self::new(Node::Abs(self.0))
-    }
-    fn sqrt(self) -> Self {
-        Self::new(Node::Sqrt(self.0))
-    }
-    fn floor(self) -> Self {
-        Self::new(Node::Floor(self.0))
-    }
-    fn if_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self::new(Node::IfLt(self.0, rhs.0, yes.0, no.0))
-    }
-    fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self {
-        Self::new(Node::SelectLt(self.0, rhs.0, yes.0, no.0))
-    }
-    fn min(self, rhs: Self) -> Self {
-        Self::new(Node::Min(self.0, rhs.0))
-    }
-    fn max(self, rhs: Self) -> Self {
-        Self::new(Node::Max(self.0, rhs.0))
-    }
-    fn clamp(self, low: Self, high: Self) -> Self {
-        Self::new(Node::Clamp(self.0, low.0, high.0))
-    }
-    fn sign(self) -> Self {
-        Self::new(Node::Sign(self.0))
     }
     fn hypot(self, rhs: Self) -> Self {
         Self::new(Node::Hypot(self.0, rhs.0))
