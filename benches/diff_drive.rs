@@ -7,6 +7,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::control::DriveBenchmark;
+use reachcast::rollout::{CostQuery, MppiTask};
 
 fn diff_drive(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("diff_drive");
@@ -14,13 +15,14 @@ fn diff_drive(criterion: &mut Criterion) {
         let backend = Backend::Cpu(Cpu::new(threads).expect("threads"));
         for samples in [2048, 16_384] {
             let benchmark = DriveBenchmark::new(samples).expect("settings");
-            let task = benchmark.planner.task(from_ref(&benchmark.problem), 0);
-            let (system, cost) = (&benchmark.system, &benchmark.planner.cost);
+            let problems = from_ref(&benchmark.problem);
+            let task = MppiTask { problems, iteration: 0, costs: CostQuery::Summary };
+            let program = backend.prepare_plans(&benchmark.planning).expect("a program");
             let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
-            let steps = u64::from(samples) * benchmark.problem.plan.len() as u64;
+            let steps = u64::from(samples) * benchmark.planning.spec.horizon() as u64;
             group.throughput(Throughput::Elements(steps));
             group.bench_with_input(BenchmarkId::new(name, samples), &task, |bencher, task| {
-                bencher.iter(|| black_box(backend.mppi(system, cost, task).expect("a plan")));
+                bencher.iter(|| black_box(program.improve(task).expect("a plan")));
             });
         }
     }

@@ -18,7 +18,7 @@ use reachcast::bench::data::{self, Data};
 use reachcast::bench::measure::{Protocol, measure};
 use reachcast::policy::Policy;
 use reachcast::rollout::{
-    CostQuery, MppiTask, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
+    CostQuery, MppiTask, Planning, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };
 use reachcast::system::DroneRace;
 
@@ -108,13 +108,14 @@ fn rollouts<P: Policy<12, 3>>(backend: &Backend, policy: &P, data: &Data) -> f64
 /// Plans in lanes over plans in a loop.
 fn plans(backend: &Backend) -> f64 {
     let (system, cost) = (DroneRace::default(), data::lane());
-    let spec = data::mppi_spec(SAMPLES).expect("settings");
-    let problems = &[data::mppi_problem(1, 0)];
-    let (value, disturbance, costs) = (None, None, CostQuery::Summary);
-    let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
-    let lanes = || backend.mppi(&system, &cost, &task).map(|plans| drop(black_box(plans)));
+    let planning = Planning::of(&system, cost, data::mppi_spec(SAMPLES).expect("settings"));
+    let program = backend.prepare_plans(&planning).expect("a program");
+    let problem = data::mppi_problem(1, 0);
+    let problems = std::slice::from_ref(&problem);
+    let task = MppiTask { problems, iteration: 0, costs: CostQuery::Summary };
+    let lanes = || program.improve(&task).map(|plans| drop(black_box(plans)));
     let plain = || {
-        black_box(scalar::plan(&system, &cost, black_box(&task)));
+        black_box(scalar::plan(&system, &cost, &planning, black_box(&problem)));
         Ok(())
     };
     ratio(plain, lanes)

@@ -5,27 +5,37 @@ mod scalar;
 
 use std::hint::black_box;
 use std::path::Path;
+use std::sync::Arc;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::bench::data::{self, PLAN};
 use reachcast::config::{Config, Overrides, Profile};
-use reachcast::cost::{Fence, RACE_CONTEXT, RaceCost, RecoveryCost, Safety};
+use reachcast::cost::{Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::model::Plant;
 use reachcast::policy::Mlp;
-use reachcast::rollout::{CostQuery, MppiProblem, MppiSpec, MppiTask, Query, ValueTerm};
+use reachcast::rollout::{CostQuery, MppiProblem, MppiTask, Planning, Query, ValueTerm};
 use reachcast::scenario::global::{check_margins, slice_through};
 use reachcast::scenario::growth_batch::{Request, grow_each};
 use reachcast::scenario::{Context, Unwatched, tightened};
 use reachcast::system::{DroneRace, System};
 
-fn problems(count: u32) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
+fn problems(count: u32) -> Vec<MppiProblem> {
     (0..count).map(|number| data::mppi_problem(1, number)).collect()
 }
 
-fn spec(samples: u32) -> MppiSpec<3> {
-    data::mppi_spec(samples).expect("settings")
+fn planning(samples: u32, cost: RaceCost, value: Option<ValueTerm>) -> Planning {
+    let spec = data::mppi_spec(samples).expect("settings");
+    Planning { value, ..Planning::of(&DroneRace::default(), cost, spec) }
+}
+
+fn task(problems: &[MppiProblem]) -> MppiTask<'_> {
+    MppiTask { problems, iteration: 0, costs: CostQuery::Summary }
+}
+
+fn value_term(network: &Mlp) -> ValueTerm {
+    ValueTerm { network: Arc::new(network.clone()), weight: 1e6, threshold: -0.02 }
 }
 
 fn recovery() -> RaceCost {
@@ -44,26 +54,18 @@ fn plain(criterion: &mut Criterion) {
     for threads in [Some(1), None] {
         let backend = Backend::Cpu(Cpu::new(threads).expect("threads"));
         for samples in [500, 1024, 16_384] {
-            let (spec, problems) = (spec(samples), problems(1));
-            let (value, disturbance, costs) = (None, None, CostQuery::Summary);
-            let task = MppiTask {
-                spec: &spec,
-                problems: &problems,
-                iteration: 0,
-                value,
-                disturbance,
-                costs,
-            };
+            let (planning, problems) = (planning(samples, data::lane(), None), problems(1));
+            let program = backend.prepare_plans(&planning).expect("a program");
+            let task = task(&problems);
             let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
             group.throughput(Throughput::Elements(u64::from(samples * PLAN)));
             group.bench_with_input(BenchmarkId::new(name, samples), &task, |bencher, task| {
-                bencher.iter(|| {
-                    black_box(backend.mppi(&system, &data::lane(), task).expect("a plan"))
-                });
+                bencher.iter(|| black_box(program.improve(task).expect("a plan")));
             });
             if samples == 1024 && threads.is_some() {
-                group.bench_with_input("scalar loop/1024", &task, |bencher, task| {
-                    bencher.iter(|| black_box(scalar::plan(&system, &data::lane(), task)));
+                group.bench_with_input("scalar loop/1024", &problems[0], |bencher, problem| {
+                    let plan = || scalar::plan(&system, &data::lane(), &planning, problem);
+                    bencher.iter(|| black_box(plan()));
                 });
             }
         }
@@ -76,18 +78,16 @@ fn with_value(criterion: &mut Criterion) {
     let network =
         Mlp::load(&root.join("configs/policies/race_value.safetensors")).expect("network");
     let mut group = criterion.benchmark_group("mppi with value");
-    let system = DroneRace::default();
     for (threads, count) in [(Some(1), 1), (None, 1), (None, 64)] {
         let backend = Backend::Cpu(Cpu::new(threads).expect("threads"));
-        let (spec, problems) = (spec(500), problems(count));
-        let value = Some(ValueTerm { network: &network, weight: 1e6, threshold: -0.02 });
-        let (disturbance, costs) = (None, CostQuery::Summary);
-        let task =
-            MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
+        let planning = planning(500, recovery(), Some(value_term(&network)));
+        let program = backend.prepare_plans(&planning).expect("a program");
+        let problems = problems(count);
+        let task = task(&problems);
         let name = threads.map_or("all threads".to_owned(), |count| format!("{count} thread"));
         group.throughput(Throughput::Elements(u64::from(500 * PLAN * count)));
         group.bench_with_input(BenchmarkId::new(name, count), &task, |bencher, task| {
-            bencher.iter(|| black_box(backend.mppi(&system, &recovery(), task).expect("plans")));
+            bencher.iter(|| black_box(program.improve(task).expect("plans")));
         });
     }
     group.finish();
@@ -111,11 +111,9 @@ fn hybrid_step(criterion: &mut Criterion) {
     let mut center = settings.state.clone();
     (center[0], center[2], center[6], center[8]) = (0.0, -1.0, 0.1, -0.9);
     let request = [Request { center, seed: 1, call: 0 }];
-    let (spec, problems) = (spec(500), problems(1));
-    let value = Some(ValueTerm { network: &network, weight: 1e6, threshold: -0.02 });
-    let (disturbance, costs) = (None, CostQuery::Summary);
-    let task =
-        MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
+    let planning = planning(500, recovery(), Some(value_term(&network)));
+    let plans = backend.prepare_plans(&planning).expect("a program");
+    let problems = problems(1);
     let cells = slice_through(&settings, &settings.state);
     let slice = || {
         check_margins(context, &settings.spec, &losses, cells.view(), Query::Sign, 0.0)
@@ -128,7 +126,7 @@ fn hybrid_step(criterion: &mut Criterion) {
     group.bench_function("growth", |bencher| bencher.iter(|| black_box(grow())));
     group.bench_function("all", |bencher| {
         bencher.iter(|| {
-            let plan = backend.mppi(&system, &recovery(), &task).expect("a plan");
+            let plan = plans.improve(&task(&problems)).expect("a plan");
             black_box((slice(), grow(), plan))
         });
     });

@@ -1,8 +1,6 @@
-// A stage charged with its own cost and that of the map's cell at its state; the cells lie in front
-// of the contexts, CELLS of them. Twin: `map_cost` in backend/cpu/mppi_rollout.rs.
+// The cost of the map's cell at a state; there are CELLS of them. Twin: `cell_cost` in tile/stages.rs.
 
-fn charge(total: f32, x: State, u: Control, context: Context, nominal: Control) -> f32 {
+fn map_cost(x: State, t: u32) -> f32 {
     // Whatever number a state that is not finite becomes, it is a cell.
-    let cell = min(u32(cell_at(x)), CELLS - 1u);
-    return charge_stage(total, x, u, context, nominal) + contexts[cell];
+    return cells[min(u32(cell_at(x, t)), CELLS - 1u)];
 }

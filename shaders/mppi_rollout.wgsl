@@ -7,8 +7,6 @@
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
 // [problems, H, NU]
 @group(0) @binding(18) var<storage, read> plans: array<f32>;
-// The cells of the map where there is one, then [problems, H, NC]
-@group(0) @binding(19) var<storage, read> contexts: array<f32>;
 @group(0) @binding(21) var<storage, read_write> totals: array<f32>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -21,14 +19,15 @@ fn mppi_rollout(@builtin(global_invocation_id) id: vec3<u32>) {
     let problem = column / params.width;
     open_source(problem, params.first_low + place);
     resume_noise(column);
+    let first_step = streams[problem].w;
     var x = load_state(column);
     var total = totals[column];
     for (var t = params.step; t < params.step + params.steps; t += 1u) {
         let stage = problem * params.horizon + t;
         let nominal = plan_at(stage);
         let u = control_at(nominal, noise_at(t));
-        total = charge(total, x, u, context_at(stage), nominal);
-        x = advance(x, u);
+        total = charge(total, x, u, stage, nominal, first_step + t);
+        x = advance(x, u, first_step + t);
         total = charge_value(column, total);
         x = disturb(column, x);
     }

@@ -13,7 +13,7 @@ struct Source {
     normals: vec4<f32>,
 }
 
-// Per problem: key low, key high, stream id, 0.
+// Per problem: key low, key high, stream id, number of the first step.
 @group(0) @binding(17) var<storage, read> streams: array<vec4<u32>>;
 
 var<private> source: Source;

@@ -9,7 +9,7 @@ use command::{Folder, document, done, reachcast, refused};
 use reachcast::config::Config;
 use reachcast::policy::Mlp;
 use reachcast::rollout::{MppiSettings, MppiSpec, Sigma};
-use reachcast::system::DroneRace;
+use reachcast::system::{DroneRace, System};
 use safetensors::tensor::{Dtype, TensorView};
 
 const RACE: &str = "configs/race.toml";
@@ -186,8 +186,8 @@ fn improvements_without_end_are_refused() {
 #[test]
 fn a_control_without_width_is_fixed_and_an_infinite_one_is_named() {
     let spec = |bounds: [f32; 2]| {
-        let mut settings = MppiSettings::new(&DroneRace::default(), 8, 4);
-        settings.sigma = Sigma::PerControl([0.1; 3]);
+        let mut settings = MppiSettings::new(&DroneRace::default().controls(), 8, 4);
+        settings.sigma = Sigma::PerControl(vec![0.1; 3]);
         settings.bounds[1] = bounds;
         MppiSpec::new(settings).map(drop).map_err(|error| error.to_string())
     };

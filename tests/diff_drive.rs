@@ -14,11 +14,11 @@ use common::{backends, cpu, literal};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::control::DriveBenchmark;
-use reachcast::control::mppi::shifted;
+use reachcast::control::mppi::{Planner, shifted};
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, MAX_CELLS};
 use reachcast::real::Real;
 use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NoiseKind, Purpose, Stream,
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NoiseKind, Planning, Purpose, Stream,
 };
 use reachcast::system::{Axis, DiffDrive, Disc, System};
 
@@ -198,6 +198,7 @@ fn plans_across_the_map_agree_with_f64() {
 }
 
 /// A system whose second state is not a number.
+#[derive(Clone)]
 struct Lost;
 
 impl System<2, 1> for Lost {
@@ -222,6 +223,7 @@ impl System<2, 1> for Lost {
 }
 
 /// Nothing but the map.
+#[derive(Clone)]
 struct Charged(CostMap);
 
 impl Cost<2, 1, 1> for Charged {
@@ -236,23 +238,13 @@ impl Cost<2, 1, 1> for Charged {
 /// A place that is not a number costs what some cell does, on the host the outside.
 #[test]
 fn a_lost_state_is_charged_a_cell() {
-    let spec = MppiSpec::new(MppiSettings::new(&Lost, 130, 3)).unwrap();
-    let problems = [MppiProblem {
-        start: [1.2, -1.7],
-        plan: vec![[0.0]; 3],
-        context: vec![[0.0]; 3],
-        stream: Stream::new(1, Purpose::ControlNoise, 0),
-    }];
-    let task = MppiTask {
-        spec: &spec,
-        problems: &problems,
-        iteration: 0,
-        value: None,
-        disturbance: None,
-        costs: CostQuery::Each,
-    };
+    let spec = MppiSpec::new(MppiSettings::new(&Lost.controls(), 130, 3)).unwrap();
+    let planning = Planning::of(&Lost, Charged(small_map()), spec);
+    let stream = Stream::new(1, Purpose::ControlNoise, 0);
+    let problems = [MppiProblem::new([1.2, -1.7], &[[0.0]; 3], &[[0.0]; 3], stream)];
+    let task = MppiTask { problems: &problems, iteration: 0, costs: CostQuery::Each };
     for backend in backends() {
-        let result = backend.mppi(&Lost, &Charged(small_map()), &task).unwrap().remove(0);
+        let result = backend.prepare_plans(&planning).unwrap().improve(&task).unwrap().remove(0);
         let in_bounds = |cost: &f32| (1.0 + 2.0..=1.0 + 18.0).contains(cost);
         assert!(result.costs.iter().all(in_bounds), "{}", backend.name());
         if backend.name() == "cpu" {
@@ -264,9 +256,10 @@ fn a_lost_state_is_charged_a_cell() {
 #[test]
 fn the_same_bits_on_any_number_of_threads() {
     let benchmark = DriveBenchmark::new(3000).unwrap();
-    let task = benchmark.planner.task(std::slice::from_ref(&benchmark.problem), 0);
+    let problems = std::slice::from_ref(&benchmark.problem);
+    let task = MppiTask { problems, iteration: 0, costs: CostQuery::Summary };
     let run =
-        |threads| cpu(threads).mppi(&benchmark.system, &benchmark.planner.cost, &task).unwrap();
+        |threads| cpu(threads).prepare_plans(&benchmark.planning).unwrap().improve(&task).unwrap();
     let one = run(1);
     assert!(one == run(2) && one == run(5));
 }
@@ -275,22 +268,26 @@ fn the_same_bits_on_any_number_of_threads() {
 /// goal. The yaw to keep is the direction to the goal, as a route would give it.
 fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> (f32, bool) {
     let (backend, system) = (cpu(2), &benchmark.system);
-    let mut problems = [MppiProblem { start, ..benchmark.problem.clone() }];
+    let planner = Planner::new(&backend, &benchmark.planning, 1).unwrap();
+    let mut problems = [MppiProblem { start: start.to_vec(), ..benchmark.problem.clone() }];
     let [goal_x, goal_y] = system.goal.center;
     let mut least = f32::INFINITY;
     for step in 0..1500 {
         let [problem] = &mut problems;
-        let [x, y, _] = problem.start;
-        problem.context.fill([goal_x, goal_y, (goal_y - y).atan2(goal_x - x)]);
+        let (x, y) = (problem.start[0], problem.start[1]);
+        let goal = [goal_x, goal_y, (goal_y - y).atan2(goal_x - x)];
+        problem.context.chunks_mut(3).for_each(|context| context.copy_from_slice(&goal));
         problem.stream = Stream::new(seed, Purpose::ControlNoise, step);
-        benchmark.planner.improve(&backend, system, &mut problems).unwrap();
+        planner.improve(&mut problems).unwrap();
         let [problem] = &mut problems;
-        problem.start = system.step(problem.start, problem.plan[0]);
-        problem.plan = shifted(&problem.plan);
-        let [x, y, _] = problem.start;
+        let before = [problem.start[0], problem.start[1], problem.start[2]];
+        let after = system.step(before, [problem.plan[0], problem.plan[1]]);
+        problem.start = after.to_vec();
+        problem.plan = shifted(&problem.plan, 2);
+        let [x, y, _] = after;
         let clearances = system.obstacles.iter().map(|obstacle| obstacle.clearance(x, y));
         least = clearances.fold(least, f32::min);
-        if system.target(problem.start) > 0.0 {
+        if system.target(after) > 0.0 {
             return (least, true);
         }
     }
@@ -302,9 +299,10 @@ fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> (f32
 fn agile() -> DriveBenchmark {
     let mut benchmark = DriveBenchmark::new(512).unwrap();
     let noise = NoiseKind::Colored { time: 10.0 };
-    let settings = MppiSettings { noise, ..*benchmark.planner.spec.settings() };
-    benchmark.planner.spec = MppiSpec::new(settings).unwrap();
-    benchmark.planner.cost.angle = 1.0;
+    let settings = MppiSettings { noise, ..benchmark.planning.spec.settings().clone() };
+    benchmark.cost.angle = 1.0;
+    let spec = MppiSpec::new(settings).unwrap();
+    benchmark.planning = Planning::of(&benchmark.system, benchmark.cost.clone(), spec);
     benchmark
 }
 
@@ -317,7 +315,9 @@ fn the_drive_goes_around_an_obstacle_to_its_goal() {
     }
     let mut blind = agile();
     let free = Grid { origin: [0.0; 2], resolution: 11.0, size: [1; 2] };
-    blind.planner.cost.map = CostMap::new(free, &[0.0], 0.0).unwrap();
+    blind.cost.map = CostMap::new(free, &[0.0], 0.0).unwrap();
+    let spec = MppiSpec::clone(&blind.planning.spec);
+    blind.planning = Planning::of(&blind.system, blind.cost.clone(), spec);
     let (clearance, arrived) = drive_to_goal(&blind, [1.0, 2.0, 0.0], 1);
     assert!(arrived && clearance < 0.0, "the obstacle is not on the way: {clearance} m");
 }

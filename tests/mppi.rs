@@ -8,23 +8,26 @@ mod common;
 #[allow(dead_code, reason = "each test file uses a part of it")]
 mod oracle;
 
+use std::sync::Arc;
+
 use common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
 use reachcast::cost::{
-    Cost, Fence, LaneCost, Obstacle, Quadratic, QuadraticCost, RACE_CONTEXT, RaceCost,
-    RaceReference, RecoveryCost, Safety, SafetyCone,
+    Cost, Fence, LaneCost, Obstacle, Quadratic, QuadraticCost, RaceCost, RaceReference,
+    RecoveryCost, Safety, SafetyCone,
 };
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
-    Purpose, Sigma, Stream, ValueTerm,
+    Planning, Purpose, Sigma, Stream, ValueTerm,
 };
 use reachcast::system::{Axis, DoubleIntegrator, DroneRace, System};
 
 /// A chain of two integrators without any bound that matters: linear, so that the optimum of a
 /// quadratic cost is known.
+#[derive(Clone)]
 struct Linear;
 
 impl System<2, 1> for Linear {
@@ -51,42 +54,46 @@ impl System<2, 1> for Linear {
 const STEPS: usize = 8;
 const LAMBDA: f32 = 2.0;
 const SIGMA: f32 = 0.75;
+/// Of three controls.
+const COVARIANCE: [[f32; 3]; 3] = [[0.16, 0.05, 0.0], [0.05, 0.2, -0.02], [0.0, -0.02, 0.1]];
+
+fn covariance(rows: [[f32; 3]; 3]) -> Sigma {
+    Sigma::Covariance(rows.map(|row| row.to_vec()).to_vec())
+}
 
 fn linear_cost() -> Quadratic<2, 1> {
     Quadratic { state: [1.0, 0.25], control: [0.125], last: [2.0, 1.0], obstacle: None }
 }
 
-fn linear_problem(plan: Vec<[f32; 1]>, seed: u64) -> MppiProblem<2, 1, 3> {
+fn linear_problem(plan: &[f32], seed: u64) -> MppiProblem {
     let context = (0..STEPS).map(|t| [0.0, 0.0, f32::from(u8::from(t + 1 == STEPS))]);
-    MppiProblem {
-        start: [1.0, -0.5],
-        plan,
-        context: context.collect(),
-        stream: Stream::new(seed, Purpose::ControlNoise, 0),
+    let (stages, context): (Vec<[f32; 1]>, Vec<_>) =
+        (plan.iter().map(|u| [*u]).collect(), context.collect());
+    MppiProblem::new([1.0, -0.5], &stages, &context, Stream::new(seed, Purpose::ControlNoise, 0))
+}
+
+fn linear_settings(samples: u32) -> MppiSettings {
+    MppiSettings {
+        temperature: LAMBDA,
+        sigma: Sigma::PerControl(vec![SIGMA]),
+        ..MppiSettings::new(&Linear.controls(), samples, STEPS as u32)
     }
 }
 
-fn linear_spec(samples: u32) -> MppiSpec<1> {
-    let settings = MppiSettings {
-        temperature: LAMBDA,
-        sigma: Sigma::PerControl([SIGMA]),
-        ..MppiSettings::new(&Linear, samples, STEPS as u32)
-    };
-    MppiSpec::new(settings).unwrap()
+fn linear(settings: MppiSettings) -> Planning {
+    Planning::of::<_, _, 2, 1, 3>(&Linear, linear_cost(), MppiSpec::new(settings).unwrap())
 }
 
-fn improve(backend: &Backend, samples: u32, plan: Vec<[f32; 1]>, seed: u64) -> MppiResult<1> {
-    let spec = linear_spec(samples);
-    let problems = [linear_problem(plan, seed)];
-    backend.mppi(&Linear, &linear_cost(), &task(&spec, &problems)).unwrap().remove(0)
+fn improve(backend: &Backend, samples: u32, plan: &[f32], seed: u64) -> MppiResult {
+    plans(backend, &linear(linear_settings(samples)), &[linear_problem(plan, seed)]).remove(0)
 }
 
-fn task<'a, const NX: usize, const NU: usize, const NC: usize>(
-    spec: &'a MppiSpec<NU>,
-    problems: &'a [MppiProblem<NX, NU, NC>],
-) -> MppiTask<'a, NX, NU, NC> {
-    let (value, disturbance) = (None, None);
-    MppiTask { spec, problems, iteration: 0, value, disturbance, costs: CostQuery::Each }
+fn task(problems: &[MppiProblem]) -> MppiTask<'_> {
+    MppiTask { problems, iteration: 0, costs: CostQuery::Each }
+}
+
+fn plans(backend: &Backend, planning: &Planning, problems: &[MppiProblem]) -> Vec<MppiResult> {
+    backend.prepare_plans(planning).unwrap().improve(&task(problems)).unwrap()
 }
 
 /// `S(v) = v' M v + 2 b' v + c` of the linear problem, by evaluating it in f64.
@@ -122,8 +129,8 @@ fn limit(plan: &DVector<f64>) -> DVector<f64> {
     left.lu().solve(&right).unwrap()
 }
 
-fn distance(plan: &[[f32; 1]], truth: &DVector<f64>) -> f64 {
-    plan.iter().zip(truth.iter()).map(|(u, v)| (f64::from(u[0]) - v).powi(2)).sum::<f64>().sqrt()
+fn distance(plan: &[f32], truth: &DVector<f64>) -> f64 {
+    plan.iter().zip(truth.iter()).map(|(u, v)| (f64::from(*u) - v).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The error of one update against its closed-form limit falls as one over the root of K.
@@ -133,7 +140,7 @@ fn one_update_converges_to_its_closed_form_at_the_rate_of_monte_carlo() {
         let truth = limit(&DVector::zeros(STEPS));
         let error = |samples: u32| {
             let square = |seed| {
-                distance(&improve(&backend, samples, vec![[0.0]; STEPS], seed).plan, &truth).powi(2)
+                distance(&improve(&backend, samples, &[0.0; STEPS], seed).plan, &truth).powi(2)
             };
             ((0..24).map(square).sum::<f64>() / 24.0).sqrt()
         };
@@ -155,10 +162,10 @@ fn iterated_updates_approach_the_optimum_of_the_regulator() {
     let optimum = matrix.lu().solve(&(-linear)).unwrap();
     let backend = cpu(2);
     let reach = |samples: u32| {
-        let mut plan = vec![[0.0]; STEPS];
+        let mut plan = vec![0.0; STEPS];
         let mut far = Vec::new();
         for seed in 0..60 {
-            plan = improve(&backend, samples, plan, seed).plan;
+            plan = improve(&backend, samples, &plan, seed).plan;
             if seed >= 50 {
                 far.push(distance(&plan, &optimum));
             }
@@ -175,13 +182,11 @@ fn iterated_updates_approach_the_optimum_of_the_regulator() {
 fn weights_sum_to_one_and_follow_the_temperature() {
     for backend in backends() {
         let run = |temperature: f32| {
-            let settings =
-                MppiSettings { temperature, bounds: [[-1.0, 1.5]], ..*linear_spec(500).settings() };
-            let spec = MppiSpec::new(settings).unwrap();
-            let problems = [linear_problem(vec![[0.25]; STEPS], 3)];
-            let asked = task(&spec, &problems);
-            let result = backend.mppi(&Linear, &linear_cost(), &asked).unwrap().remove(0);
-            let samples: Vec<_> = (0..500).map(|k| asked.controls(0, k)).collect();
+            let bounds = vec![[-1.0, 1.5]];
+            let planning = linear(MppiSettings { temperature, bounds, ..linear_settings(500) });
+            let problem = linear_problem(&[0.25; STEPS], 3);
+            let result = plans(&backend, &planning, std::slice::from_ref(&problem)).remove(0);
+            let samples: Vec<_> = (0..500).map(|k| planning.controls(&problem, 0, k)).collect();
             (result, samples)
         };
         let (middle, samples) = run(2.0);
@@ -190,8 +195,8 @@ fn weights_sum_to_one_and_follow_the_temperature() {
         let squares: f64 = weights.iter().map(|w| w * w).sum();
         assert!((middle.effective_samples * squares - 1.0).abs() < 1e-4);
         for t in 0..STEPS {
-            let terms = samples.iter().zip(&weights).map(|(v, w)| f64::from(v[t][0]) * w);
-            assert!((terms.sum::<f64>() - f64::from(middle.plan[t][0])).abs() < 1e-5);
+            let terms = samples.iter().zip(&weights).map(|(v, w)| f64::from(v[t]) * w);
+            assert!((terms.sum::<f64>() - f64::from(middle.plan[t])).abs() < 1e-5);
         }
         let least = middle.costs.iter().copied().fold(f32::INFINITY, f32::min);
         assert_eq!((middle.least_cost, middle.costs[middle.best as usize]), (least, least));
@@ -201,13 +206,13 @@ fn weights_sum_to_one_and_follow_the_temperature() {
         let (cold, samples) = run(1e-9);
         assert_eq!(cold.effective_samples, 1.0);
         for (u, v) in cold.plan.iter().zip(&samples[cold.best as usize]) {
-            assert!((u[0] - v[0]).abs() < 1e-6, "the best sample");
+            assert!((u - v).abs() < 1e-6, "the best sample");
         }
         let (hot, samples) = run(1e12);
         assert!((hot.effective_samples - 500.0).abs() < 1e-3);
         for t in 0..STEPS {
-            let mean = samples.iter().map(|v| f64::from(v[t][0])).sum::<f64>() / 500.0;
-            assert!((mean - f64::from(hot.plan[t][0])).abs() < 1e-5, "the mean");
+            let mean = samples.iter().map(|v| f64::from(v[t])).sum::<f64>() / 500.0;
+            assert!((mean - f64::from(hot.plan[t])).abs() < 1e-5, "the mean");
         }
     }
 }
@@ -230,16 +235,18 @@ fn network(inputs: usize, outputs: usize, scale: f32) -> Mlp {
 fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
     system: &S,
     cost: &C,
-    task: &MppiTask<'_, NX, NU, NC>,
+    planning: &Planning,
+    task: &MppiTask<'_>,
 ) where
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
     for backend in backends() {
-        let results = backend.mppi(system, cost, task).unwrap();
+        let results = backend.prepare_plans(planning).unwrap().improve(task).unwrap();
         assert_eq!(results.len(), task.problems.len());
         for (problem, result) in results.iter().enumerate() {
-            let truth = oracle::truth((system, cost), task, problem);
+            let asked = (&task.problems[problem], task.iteration);
+            let truth = oracle::truth((system, cost), planning, asked);
             // Terms of either sign cancel, so rounding is relative to the largest cost.
             let scale = truth.costs.iter().fold(1.0_f64, |largest, cost| largest.max(cost.abs()));
             let error = |(cost, truth): (&f32, &f64)| (f64::from(*cost) - truth).abs() / scale;
@@ -249,14 +256,14 @@ fn compare<S, C, const NX: usize, const NU: usize, const NC: usize>(
             let worst = errors[errors.len().saturating_sub(2)];
             assert!(worst < 2e-5, "{}, problem {problem}: costs off by {worst}", backend.name());
             assert!(errors[errors.len() - 1] < 1e-2, "{}: {errors:?}", backend.name());
-            for (u, mean) in result.plan.iter().flatten().zip(truth.plan.iter().flatten()) {
+            for (u, mean) in result.plan.iter().zip(&truth.plan) {
                 assert!((f64::from(*u) - mean).abs() < 2e-3, "{}: {u} {mean}", backend.name());
             }
         }
     }
 }
 
-fn race_problems(horizon: usize) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
+fn race_problems(horizon: usize) -> Vec<MppiProblem> {
     let start = |i: f32| {
         [
             0.3117 - 0.2 * i,
@@ -284,14 +291,13 @@ fn race_problems(horizon: usize) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
     };
     let plan = |i: usize| {
         let step = |t: usize| [0.3 * i as f32 - 0.02 * t as f32, 0.2, -0.1];
-        (0..horizon).map(step).collect()
+        (0..horizon).map(step).collect::<Vec<_>>()
     };
     (0..3)
-        .map(|i| MppiProblem {
-            start: start(i as f32),
-            plan: plan(i),
-            context: (0..horizon).map(|t| context(i, t)).collect(),
-            stream: Stream::new(40 + i as u64, Purpose::ControlNoise, 7 * i as u32),
+        .map(|i| {
+            let contexts: Vec<_> = (0..horizon).map(|t| context(i, t)).collect();
+            let stream = Stream::new(40 + i as u64, Purpose::ControlNoise, 7 * i as u32);
+            MppiProblem::new(start(i as f32), &plan(i), &contexts, stream)
         })
         .collect()
 }
@@ -322,11 +328,11 @@ fn race_costs() -> [RaceCost; 3] {
     [RaceCost::Recovery(recovery), RaceCost::Lane(lane), RaceCost::Quadratic(quadratic)]
 }
 
-fn race_settings(samples: u32, horizon: u32) -> MppiSettings<3> {
+fn race_settings(samples: u32, horizon: u32) -> MppiSettings {
     MppiSettings {
         temperature: 10.0,
-        sigma: Sigma::PerControl([0.4; 3]),
-        ..MppiSettings::new(&DroneRace::default(), samples, horizon)
+        sigma: Sigma::PerControl(vec![0.4; 3]),
+        ..MppiSettings::new(&DroneRace::default().controls(), samples, horizon)
     }
 }
 
@@ -340,11 +346,11 @@ fn costs_and_plans_agree_with_an_f64_loop() {
             noise,
             antithetic: noise != NoiseKind::Independent,
             noise_cost: noise == NoiseKind::Independent,
-            sigma: Sigma::Covariance([[0.16, 0.05, 0.0], [0.05, 0.2, -0.02], [0.0, -0.02, 0.1]]),
+            sigma: covariance(COVARIANCE),
             ..race_settings(333, 20)
         };
-        let spec = MppiSpec::new(settings).unwrap();
-        compare(&system, &cost, &task(&spec, &race_problems(20)));
+        let planning = Planning::of(&system, cost, MppiSpec::new(settings).unwrap());
+        compare(&system, &cost, &planning, &task(&race_problems(20)));
     }
 }
 
@@ -354,16 +360,17 @@ fn networks_along_the_rollout_agree_with_an_f64_loop() {
     let (value, push) = (network(12, 1, 0.3), network(12, 3, 0.3));
     let spec = MppiSpec::new(race_settings(300, 12)).unwrap();
     let problems = race_problems(12);
-    let entries = [(7, 0.05), (9, 0.04), (11, -0.03)];
-    let both = MppiTask {
-        value: Some(ValueTerm { network: &value, weight: 30.0, threshold: 0.4 }),
-        disturbance: Some(Disturbance { network: &push, entries: &entries }),
-        iteration: 3,
-        ..task(&spec, &problems)
-    };
-    for asked in [both, MppiTask { value: None, ..both }, MppiTask { disturbance: None, ..both }] {
-        for cost in race_costs() {
-            compare(&system, &cost, &asked);
+    let entries = vec![(7, 0.05), (9, 0.04), (11, -0.03)];
+    let value = Some(ValueTerm { network: Arc::new(value), weight: 30.0, threshold: 0.4 });
+    let disturbance = Some(Disturbance { network: Arc::new(push), entries });
+    let asked = MppiTask { iteration: 3, ..task(&problems) };
+    for cost in race_costs() {
+        let none = Planning::of(&system, cost, spec.clone());
+        let valued = Planning { value: value.clone(), ..none.clone() };
+        let pushed = Planning { disturbance: disturbance.clone(), ..none };
+        let both = Planning { value: value.clone(), ..pushed.clone() };
+        for planning in [both, valued, pushed] {
+            compare(&system, &cost, &planning, &asked);
         }
     }
 }
@@ -379,35 +386,31 @@ fn small_and_long_problems() {
         obstacle: Some(obstacle),
     };
     for (samples, horizon) in [(1, 1), (1, 5), (7, 1), (65, 512), (257, 33)] {
-        let settings =
-            MppiSettings { temperature: 20.0, ..MppiSettings::new(&system, samples, horizon) };
-        let spec = MppiSpec::new(settings).unwrap();
+        let settings = MppiSettings::new(&system.controls(), samples, horizon);
+        let spec = MppiSpec::new(MppiSettings { temperature: 20.0, ..settings }).unwrap();
         let context = (0..horizon).map(|t| [0.1, 0.0, f32::from(u8::from(t + 1 == horizon))]);
-        let problem = MppiProblem {
-            start: [0.6, -0.1],
-            plan: vec![[0.1]; horizon as usize],
-            context: context.collect(),
-            stream: Stream::new(5, Purpose::ControlNoise, 1),
-        };
-        compare(&system, &cost, &task(&spec, &[problem]));
+        let (plan, context) = (vec![[0.1]; horizon as usize], context.collect::<Vec<_>>());
+        let stream = Stream::new(5, Purpose::ControlNoise, 1);
+        let problem = MppiProblem::new([0.6, -0.1], &plan, &context, stream);
+        let planning = Planning::of::<_, _, 2, 1, 3>(&system, cost.clone(), spec);
+        compare::<_, _, 2, 1, 3>(&system, &cost, &planning, &task(&[problem]));
     }
 }
 
 #[test]
 fn the_same_bits_on_any_number_of_threads() {
     let system = DroneRace::default();
-    let value = network(12, 1, 0.3);
+    let value = Arc::new(network(12, 1, 0.3));
     let spec = MppiSpec::new(race_settings(2000, 20)).unwrap();
     let problems = race_problems(20);
-    let value = Some(ValueTerm { network: &value, weight: 30.0, threshold: 0.4 });
-    for asked in [task(&spec, &problems), MppiTask { value, ..task(&spec, &problems) }] {
-        let [one, two, five] =
-            [1, 2, 5].map(|threads| cpu(threads).mppi(&system, &race_costs()[0], &asked).unwrap());
+    let plain = Planning::of(&system, race_costs()[0], spec);
+    let value = Some(ValueTerm { network: value, weight: 30.0, threshold: 0.4 });
+    for planning in [plain.clone(), Planning { value, ..plain }] {
+        let [one, two, five] = [1, 2, 5].map(|threads| plans(&cpu(threads), &planning, &problems));
         assert!(one == two && one == five);
         // And each problem by itself.
         for (i, result) in one.iter().enumerate() {
-            let alone = MppiTask { problems: &problems[i..=i], ..asked };
-            assert_eq!(cpu(2).mppi(&system, &race_costs()[0], &alone).unwrap()[0], *result);
+            assert_eq!(plans(&cpu(2), &planning, &problems[i..=i])[0], *result);
         }
     }
 }
@@ -417,46 +420,43 @@ fn the_same_bits_on_any_number_of_threads() {
 fn costs_that_are_not_finite_weigh_nothing() {
     let cost =
         Quadratic::<2, 1> { state: [1e30; 2], control: [0.0], last: [1e30; 2], obstacle: None };
-    let spec = linear_spec(100);
-    let mut problems = [linear_problem(vec![[150.0]; STEPS], 1)];
-    problems[0].start = [1e12, 0.0];
+    let spec = MppiSpec::new(linear_settings(100)).unwrap();
+    let planning = Planning::of::<_, _, 2, 1, 3>(&Linear, cost, spec);
+    let mut problems = [linear_problem(&[150.0; STEPS], 1)];
+    problems[0].start = vec![1e12, 0.0];
     for backend in backends() {
-        let result = backend.mppi(&Linear, &cost, &task(&spec, &problems)).unwrap().remove(0);
+        let result = plans(&backend, &planning, &problems).remove(0);
         assert_eq!((result.non_finite, result.effective_samples), (100, 0.0));
         assert!(
             result.least_cost == f32::INFINITY && result.costs.iter().all(|c| *c == f32::INFINITY)
         );
-        assert_eq!(result.plan, vec![[100.0]; STEPS], "the nominal plan, clipped");
+        assert_eq!(result.plan, [100.0; STEPS], "the nominal plan, clipped");
     }
 }
 
 /// Mean, covariance and correlation of the noise, within 5 standard errors.
 #[test]
 fn the_noise_has_the_moments_that_were_asked_for() {
-    let covariance = [[0.16, 0.05, 0.0], [0.05, 0.2, -0.02], [0.0, -0.02, 0.1]];
     let count = 20_000_u32;
     for kind in
         [NoiseKind::Independent, NoiseKind::Colored { time: 4.0 }, NoiseKind::Spline { knots: 6 }]
     {
-        let settings = MppiSettings {
-            noise: kind,
-            sigma: Sigma::Covariance(covariance),
-            ..race_settings(count, 12)
-        };
+        let settings =
+            MppiSettings { noise: kind, sigma: covariance(COVARIANCE), ..race_settings(count, 12) };
         let spec = MppiSpec::new(settings).unwrap();
         let stream = Stream::new(9, Purpose::ControlNoise, 0);
         let samples: Vec<_> = (0..count).map(|k| spec.noise().sample(stream, 0, k)).collect();
         let moment = |s: usize, t: usize, i: usize, j: usize| {
-            let terms = samples.iter().map(|e| f64::from(e[s][i]) * f64::from(e[t][j]));
+            let terms = samples.iter().map(|e| f64::from(e[3 * s + i]) * f64::from(e[3 * t + j]));
             terms.sum::<f64>() / f64::from(count)
         };
         let slack = 5.0 * 0.2 * 2.0_f64.sqrt() / f64::from(count).sqrt();
         for t in 0..12 {
             for i in 0..3 {
                 let mean =
-                    samples.iter().map(|e| f64::from(e[t][i])).sum::<f64>() / f64::from(count);
+                    samples.iter().map(|e| f64::from(e[3 * t + i])).sum::<f64>() / f64::from(count);
                 assert!(mean.abs() < 5.0 * 0.45 / f64::from(count).sqrt(), "{kind:?} {mean}");
-                for (j, truth) in covariance[i].into_iter().enumerate() {
+                for (j, truth) in COVARIANCE[i].into_iter().enumerate() {
                     let truth = f64::from(truth);
                     assert!((moment(t, t, i, j) - truth).abs() < slack, "{kind:?} {t} {i} {j}");
                 }
@@ -484,7 +484,7 @@ fn antithetic_samples_mirror_each_other() {
     let stream = Stream::new(9, Purpose::ControlNoise, 0);
     for pair in 0..5 {
         let [a, b] = [0, 1].map(|i| spec.noise().sample(stream, 0, 2 * pair + i));
-        assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| *a == -*b && *a != 0.0));
+        assert!(a.iter().zip(&b).all(|(a, b)| *a == -*b && *a != 0.0));
     }
     assert_ne!(spec.noise().sample(stream, 0, 0), spec.noise().sample(stream, 1, 0), "iteration");
 }
@@ -492,47 +492,59 @@ fn antithetic_samples_mirror_each_other() {
 #[test]
 fn what_cannot_be_is_refused_by_name() {
     let good = race_settings(10, 5);
-    let sigma = |sigma| MppiSettings { sigma, ..good };
-    let noise = |noise| MppiSettings { noise, ..good };
+    let good = || good.clone();
+    let sigma = |sigma| MppiSettings { sigma, ..good() };
+    let noise = |noise| MppiSettings { noise, ..good() };
     let cases = [
-        ("samples", MppiSettings { samples: 0, ..good }),
-        ("samples", MppiSettings { samples: 1_000_001, ..good }),
-        ("horizon", MppiSettings { horizon: 0, ..good }),
-        ("horizon", MppiSettings { horizon: 513, ..good }),
-        ("temperature", MppiSettings { temperature: 0.0, ..good }),
-        ("temperature", MppiSettings { temperature: f32::NAN, ..good }),
-        ("sigma", sigma(Sigma::PerControl([0.4, -0.1, 0.4]))),
-        ("sigma", sigma(Sigma::Covariance([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))),
-        ("sigma", sigma(Sigma::Covariance([[1.0, 0.5, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]]))),
-        ("bounds", MppiSettings { bounds: [[-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]], ..good }),
+        ("samples", MppiSettings { samples: 0, ..good() }),
+        ("samples", MppiSettings { samples: 1_000_001, ..good() }),
+        ("horizon", MppiSettings { horizon: 0, ..good() }),
+        ("horizon", MppiSettings { horizon: 513, ..good() }),
+        ("temperature", MppiSettings { temperature: 0.0, ..good() }),
+        ("temperature", MppiSettings { temperature: f32::NAN, ..good() }),
+        ("sigma", sigma(Sigma::PerControl(vec![0.4, -0.1, 0.4]))),
+        ("sigma", sigma(Sigma::PerControl(vec![0.4; 2]))),
+        ("sigma", sigma(Sigma::Covariance(vec![vec![1.0, 0.0, 0.0]]))),
+        ("sigma", sigma(covariance([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))),
+        ("sigma", sigma(covariance([[1.0, 0.5, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]]))),
+        ("bounds", MppiSettings { bounds: vec![[-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]], ..good() }),
         ("noise.time", noise(NoiseKind::Colored { time: 0.0 })),
         ("noise.knots", noise(NoiseKind::Spline { knots: 6 })),
         ("noise.knots", noise(NoiseKind::Spline { knots: 0 })),
         ("noise_cost", MppiSettings { noise_cost: true, ..noise(NoiseKind::Spline { knots: 3 }) }),
         (
             "noise_cost",
-            MppiSettings { noise_cost: true, ..sigma(Sigma::PerControl([0.4, 0.0, 0.4])) },
+            MppiSettings { noise_cost: true, ..sigma(Sigma::PerControl(vec![0.4, 0.0, 0.4])) },
         ),
     ];
     for (name, settings) in cases {
         let text = MppiSpec::new(settings).expect_err(name).to_string();
         assert!(text.contains(name), "{name}: {text}");
     }
-    let spec = MppiSpec::new(good).unwrap();
-    let refused = |change: &dyn Fn(&mut MppiProblem<12, 3, RACE_CONTEXT>)| {
+    let spec = MppiSpec::new(good()).unwrap();
+    let planning = Planning::of(&DroneRace::default(), race_costs()[0], spec);
+    let host = cpu(1);
+    let refused = |change: &dyn Fn(&mut MppiProblem)| {
         let mut problems = race_problems(5);
         change(&mut problems[1]);
-        let result = cpu(1).mppi(&DroneRace::default(), &race_costs()[0], &task(&spec, &problems));
+        let result = host.prepare_plans(&planning).unwrap().improve(&task(&problems));
         result.expect_err("refused").to_string()
     };
-    assert!(refused(&|problem| problem.plan.truncate(4)).contains("problem 1 has 4 steps"));
-    assert!(refused(&|problem| problem.context.clear()).contains("problem 1 has 0 steps"));
+    assert!(refused(&|problem| problem.plan.truncate(4)).contains("problem 1 has 4 numbers"));
+    assert!(refused(&|problem| problem.context.clear()).contains("problem 1 has 0 numbers"));
+    assert!(refused(&|problem| problem.start.truncate(3)).contains("a state has 12"));
     assert!(refused(&|problem| problem.start[3] = f32::NAN).contains("not finite"));
-    let wrong = network(12, 2, 0.1);
-    let problems = race_problems(5);
-    let value = Some(ValueTerm { network: &wrong, weight: 1.0, threshold: 0.0 });
-    let asked = MppiTask { value, ..task(&spec, &problems) };
-    let text =
-        cpu(1).mppi(&DroneRace::default(), &race_costs()[0], &asked).expect_err("two outputs");
-    assert!(text.to_string().contains("value network"), "{text}");
+    let refused = |planning: Planning| {
+        host.prepare_plans(&planning).map(drop).expect_err("refused").to_string()
+    };
+    let wrong = Arc::new(network(12, 2, 0.1));
+    let value = Some(ValueTerm { network: wrong, weight: 1.0, threshold: 0.0 });
+    assert!(refused(Planning { value, ..planning.clone() }).contains("value network"));
+    let other = Planning::of::<_, _, 2, 1, 3>(
+        &Linear,
+        linear_cost(),
+        MppiSpec::new(linear_settings(5)).unwrap(),
+    );
+    assert!(refused(Planning { cost: other.cost, ..planning.clone() }).contains("cost"));
+    assert!(refused(Planning { spec: other.spec, ..planning }).contains("bounds of 1 controls"));
 }

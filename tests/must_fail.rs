@@ -14,6 +14,7 @@ mod models;
 mod oracle;
 
 use std::array::from_fn;
+use std::sync::Arc;
 
 use common::{adapter, race_policy};
 use functions::{Case, disagreement};
@@ -25,8 +26,9 @@ use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::rollout::{
     Ball, CostQuery, DeviationTask, Disturbance, MppiProblem, MppiSettings, MppiSpec, MppiTask,
-    NON_FINITE, NoiseKind, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, measure, pair_measures,
+    NON_FINITE, NoiseKind, PairControl, Pairs, Planning, Plant, Purpose, Query, ReachAvoidTask,
+    Region, RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, measure,
+    pair_measures,
 };
 use reachcast::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
 
@@ -275,15 +277,13 @@ impl Policy<2, 1> for Still {
 }
 
 /// A problem of the double integrator that differs from the others and from step to step.
-fn mppi_problem(number: u32) -> MppiProblem<2, 1, 3> {
+fn mppi_problem(number: u32) -> MppiProblem {
     let shift = 0.1 * number as f32;
     let step = |t: u32| 0.7 * (t as f32 + shift).sin();
-    MppiProblem {
-        start: [0.8 - shift, shift - 0.3],
-        plan: (0..MPPI_HORIZON).map(|t| [step(t)]).collect(),
-        context: (0..MPPI_HORIZON).map(|t| [0.1 * step(t), shift, t as f32 / 9.0]).collect(),
-        stream: Stream::new(3, Purpose::ControlNoise, number),
-    }
+    let plan: Vec<_> = (0..MPPI_HORIZON).map(|t| [step(t)]).collect();
+    let context = (0..MPPI_HORIZON).map(|t| [0.1 * step(t), shift, t as f32 / 9.0]);
+    let stream = Stream::new(3, Purpose::ControlNoise, number);
+    MppiProblem::new([0.8 - shift, shift - 0.3], &plan, &context.collect::<Vec<_>>(), stream)
 }
 
 /// Steps of a plan: not a whole number of tiles of the update.
@@ -299,50 +299,52 @@ fn mppi_network() -> Mlp {
 /// with and without networks, clipped and antithetic.
 fn mppi_parity(gpu: Gpu) -> bool {
     let backend = Backend::Gpu(gpu);
-    let network = mppi_network();
-    let value = ValueTerm { network: &network, weight: 3.0, threshold: 0.4 };
-    let disturbance = Disturbance { network: &network, entries: &[(1, 0.1)] };
+    let network = Arc::new(mppi_network());
+    let value = ValueTerm { network: Arc::clone(&network), weight: 3.0, threshold: 0.4 };
+    let disturbance = Disturbance { network, entries: vec![(1, 0.1)] };
     let kinds =
         [NoiseKind::Independent, NoiseKind::Colored { time: 3.0 }, NoiseKind::Spline { knots: 9 }];
     let problems: Vec<_> = (0..2).map(mppi_problem).collect();
     kinds.into_iter().enumerate().all(|(number, noise)| {
         let networked = number > 0;
-        let spec = mppi_spec(noise, number == 0);
-        let task = MppiTask {
-            spec: &spec,
-            problems: &problems,
-            iteration: 5,
-            value: networked.then_some(value),
-            disturbance: networked.then_some(disturbance),
-            costs: CostQuery::Each,
+        let planning = Planning {
+            value: networked.then(|| value.clone()),
+            disturbance: networked.then(|| disturbance.clone()),
+            ..Planning::of::<_, _, 2, 1, 3>(
+                &DoubleIntegrator::default(),
+                mppi_cost(),
+                mppi_spec(noise, number == 0),
+            )
         };
-        plans_agree(&backend, &task)
+        plans_agree(&backend, &planning, &problems)
     })
 }
 
 /// Three workgroups of samples and some; the noise reaches far beyond the bounds.
-fn mppi_spec(noise: NoiseKind, antithetic: bool) -> MppiSpec<1> {
+fn mppi_spec(noise: NoiseKind, antithetic: bool) -> MppiSpec {
     let settings = MppiSettings {
         noise,
         antithetic,
-        sigma: Sigma::PerControl([1.0]),
+        sigma: Sigma::PerControl(vec![1.0]),
         temperature: 20.0,
-        ..MppiSettings::new(&DoubleIntegrator::default(), 150, MPPI_HORIZON)
+        ..MppiSettings::new(&DoubleIntegrator::default().controls(), 150, MPPI_HORIZON)
     };
     MppiSpec::new(settings).expect("settings")
 }
 
-fn plans_agree(backend: &Backend, task: &MppiTask<'_, 2, 1, 3>) -> bool {
-    let system = DoubleIntegrator::default();
-    let cost =
-        Quadratic::<2, 1> { state: [2.0, 0.5], control: [0.3], last: [9.0, 4.0], obstacle: None };
-    let host = common::cpu(1).mppi(&system, &cost, task).expect("the host runs");
-    let Ok(results) = backend.mppi(&system, &cost, task) else { return false };
-    let settings = task.spec.settings();
-    let scales = (settings.temperature, settings.bounds);
-    results.iter().zip(&host).enumerate().all(|(number, (result, host))| {
-        let truth = oracle::truth((&system, &cost), task, number);
-        oracle::differences(&truth, result, host, scales).is_ok()
+fn mppi_cost() -> Quadratic<2, 1> {
+    Quadratic { state: [2.0, 0.5], control: [0.3], last: [9.0, 4.0], obstacle: None }
+}
+
+fn plans_agree(backend: &Backend, planning: &Planning, problems: &[MppiProblem]) -> bool {
+    let task = MppiTask { problems, iteration: 5, costs: CostQuery::Each };
+    let run = |backend: &Backend| backend.prepare_plans(planning)?.improve(&task);
+    let host = run(&common::cpu(1)).expect("the host runs");
+    let Ok(results) = run(backend) else { return false };
+    let plant = (&DoubleIntegrator::default(), &mppi_cost());
+    results.iter().zip(&host).zip(problems).all(|((result, host), problem)| {
+        let truth = oracle::truth::<_, _, 2, 1, 3>(plant, planning, (problem, 5));
+        oracle::differences(&truth, result, host, planning.spec.settings()).is_ok()
     })
 }
 
@@ -489,7 +491,7 @@ mutants! {
     one_cell_off: "min(u32(cell_at(x)), CELLS - 1u)" => "min(u32(cell_at(x)) + 1u, CELLS - 1u)";
     columns_not_clamped: "= 14.0f;" => "= 1000.0f;";
     beyond_the_last_row_as_in_it: "= 10.0f;" => "= 9.0f;";
-    map_of_the_next_state: "total = charge(total, x, u, context_at(stage), nominal);" => "total = charge(total, advance(x, u), u, context_at(stage), nominal);";
+    map_of_the_next_state: "total = charge(total, x, u, stage, nominal, first_step + t);" => "total = charge(total, advance(x, u, first_step + t), u, stage, nominal, first_step + t);";
     contexts_read_from_the_map: "let at = 165u + row" => "let at = row";
 }
 

@@ -15,8 +15,8 @@ use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::report::html;
 use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NON_FINITE, Plant, Purpose, Query,
-    ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NON_FINITE, Planning, Plant, Purpose,
+    Query, ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::scenario::global::check_margins;
 use reachcast::scenario::record::Record;
@@ -372,6 +372,7 @@ fn certificates_count_what_is_not_finite() {
 }
 
 /// Squares of state and control.
+#[derive(Clone)]
 struct Squares;
 
 impl Cost<1, 1, 1> for Squares {
@@ -381,6 +382,7 @@ impl Cost<1, 1, 1> for Squares {
 }
 
 /// State and control squared: beyond 1 that overflows after a few steps.
+#[derive(Clone)]
 struct Kicked;
 
 impl System<1, 1> for Kicked {
@@ -406,19 +408,19 @@ impl System<1, 1> for Kicked {
 
 #[test]
 fn samples_that_overflow_have_no_weight() {
-    let spec = MppiSpec::new(MppiSettings::new(&Kicked, 300, 12)).expect("settings");
-    let problem = |start: f32, number| MppiProblem {
-        start: [start],
-        plan: vec![[0.25]; 12],
-        context: vec![[0.0]; 12],
-        stream: Stream::new(71, Purpose::ControlNoise, number),
+    let spec = MppiSpec::new(MppiSettings::new(&Kicked.controls(), 300, 12)).expect("settings");
+    let planning = Planning::of(&Kicked, Squares, spec);
+    let problem = |start: f32, number| {
+        let stream = Stream::new(71, Purpose::ControlNoise, number);
+        MppiProblem::new([start], &[[0.25]; 12], &[[0.0]; 12], stream)
     };
     // Some samples overflow, then all of them.
     let problems = [problem(0.3, 0), problem(100.0, 1)];
-    let (value, disturbance, costs) = (None, None, CostQuery::Each);
-    let task =
-        MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
-    let run = |backend: &Backend| backend.mppi(&Kicked, &Squares, &task).expect("plans");
+    let task = MppiTask { problems: &problems, iteration: 0, costs: CostQuery::Each };
+    let run = |backend: &Backend| {
+        let program = backend.prepare_plans(&planning).expect("a program");
+        program.improve(&task).expect("plans")
+    };
     let results: Vec<_> = backends().iter().map(run).collect();
     for result in &results {
         let [some, all] = &result[..] else { panic!("two problems") };
@@ -427,7 +429,7 @@ fn samples_that_overflow_have_no_weight() {
         let weights = some.weights(1.0);
         let lost = |(cost, weight): (&f32, &f64)| cost.is_finite() || *weight == 0.0;
         assert!(some.costs.iter().zip(&weights).all(lost));
-        let near = |(a, b): (&[f32; 1], &[f32; 1])| (a[0] - b[0]).abs() < 1e-5;
+        let near = |(a, b): (&f32, &f32)| (a - b).abs() < 1e-5;
         assert!(some.plan.iter().zip(&results[0][0].plan).all(near), "{:?}", some.plan);
         // Nothing to weigh: the plan stays, and the result says so.
         assert_eq!((all.non_finite, all.effective_samples), (300, 0.0));

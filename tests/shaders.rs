@@ -4,6 +4,7 @@ mod models;
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use bytemuck::Zeroable;
 use models::{DRIVERS, VALUES};
@@ -19,12 +20,11 @@ use reachcast::cost::{
 use reachcast::model::{Controller, Law, Model};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
-use reachcast::rollout::{
-    CostQuery, Disturbance, MppiSettings, MppiSpec, MppiTask, NoiseKind, ValueTerm,
-};
+use reachcast::rollout::{Disturbance, MppiSettings, MppiSpec, NoiseKind, Planning, ValueTerm};
 use reachcast::system::{Axis, BangBang, Cone, DiffDrive, DoubleIntegrator, DroneRace, System};
 
 /// One state, one control: the recorded functions take and return plain numbers.
+#[derive(Clone)]
 struct Scalar;
 
 impl System<1, 1> for Scalar {
@@ -158,30 +158,29 @@ fn mppi_texts_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
     cost: &C,
     out: &mut Vec<(String, MppiText)>,
 ) where
-    S: System<NX, NU>,
-    C: Cost<NX, NU, NC>,
+    S: System<NX, NU> + Clone + Send + 'static,
+    C: Cost<NX, NU, NC> + Clone + Send + 'static,
 {
     let value = network(NX, 1, Activation::Tanh);
     let push = network(NX, 1, Activation::Relu);
-    let term = ValueTerm { network: &value, weight: 1.0, threshold: 0.5 };
-    let pushed = Disturbance { network: &push, entries: &[(NX - 1, 0.5)] };
+    let term = ValueTerm { network: Arc::new(value), weight: 1.0, threshold: 0.5 };
+    let pushed = Disturbance { network: Arc::new(push), entries: vec![(NX - 1, 0.5)] };
     let kinds =
         [NoiseKind::Independent, NoiseKind::Colored { time: 3.0 }, NoiseKind::Spline { knots: 5 }];
     for (number, noise) in kinds.into_iter().enumerate() {
-        for (value, disturbance) in [(None, None), (Some(term), Some(pushed)), (Some(term), None)] {
+        let (term, pushed) = (|| Some(term.clone()), Some(pushed.clone()));
+        for (value, disturbance) in [(None, None), (term(), pushed), (term(), None)] {
             let independent = noise == NoiseKind::Independent;
             let settings = MppiSettings {
                 noise,
                 antithetic: number == 1,
                 noise_cost: independent && value.is_none(),
-                ..MppiSettings::new(system, 100, 9)
+                ..MppiSettings::new(&system.controls(), 100, 9)
             };
             let spec = MppiSpec::new(settings).expect("settings");
-            let costs = CostQuery::Summary;
-            let problems = &[];
-            let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
             let name = format!("{} {noise:?}, value network: {}", system.name(), value.is_some());
-            out.push((name, MppiText::new(system, cost, &task)));
+            let planning = Planning::of(system, cost.clone(), spec);
+            out.push((name, MppiText::new(&Planning { value, disturbance, ..planning })));
         }
     }
 }
@@ -278,6 +277,7 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
         Slot::Push => &["push"],
         Slot::Partials => &["partials"],
         Slot::Values => &["values"],
+        Slot::Cells => &["cells"],
     }
 }
 

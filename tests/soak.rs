@@ -6,9 +6,10 @@ use common::{adapter, cpu};
 use reachcast::backend::Backend;
 use reachcast::control::mppi::{Planner, shifted};
 use reachcast::cost::Quadratic;
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::rollout::{
-    MppiProblem, MppiSettings, MppiSpec, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec,
+    MppiProblem, MppiSettings, MppiSpec, Planning, Purpose, Query, ReachAvoidTask, RolloutSpec,
     Starts, Stream, Tightening,
 };
 use reachcast::system::{DoubleIntegrator, System};
@@ -41,22 +42,22 @@ fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
     let policy =
         Mlp::new(vec![layer(2, 16), layer(16, 1)], Activation::Tanh, OutputActivation::Tanh);
     let policy = policy.expect("a network");
-    let planner = Planner {
-        spec: MppiSpec::new(MppiSettings::new(&system, samples, HORIZON as u32)).expect("settings"),
-        cost: Quadratic { state: [2.0, 0.5], control: [0.1], last: [20.0, 5.0], obstacle: None },
-        iterations: 1,
-        value: None,
-        disturbance: None,
-    };
+    let settings = MppiSettings::new(&system.controls(), samples, HORIZON as u32);
+    let cost = Quadratic { state: [2.0, 0.5], control: [0.1], last: [20.0, 5.0], obstacle: None };
+    let planning =
+        Planning::of::<_, _, 2, 1, 3>(&system, cost, MppiSpec::new(settings).expect("settings"));
+    let planner = Planner::new(backend, &planning, 1).expect("a program");
+    let plant = Plant::of(system, policy);
+    let program = backend.prepare(&plant).expect("a program");
     let spec = RolloutSpec::new(HORIZON as u32, 0.95).expect("a horizon");
     let tightening = Tightening::none(&spec);
-    let (mut x, mut plan) = ([0.8, 0.0], vec![[0.0]; HORIZON]);
+    let (mut x, mut plan) = ([0.8, 0.0], vec![0.0; HORIZON]);
     let mut warm = None;
     for step in 0..steps {
         let stream = Stream::new(81, Purpose::ControlNoise, step);
-        let context = vec![[0.0; 3]; HORIZON];
-        let mut problems = [MppiProblem { start: x, plan: shifted(&plan), context, stream }];
-        let results = planner.improve(backend, &system, &mut problems).expect("a plan");
+        let problem = MppiProblem::new(x, &[[0.0]; HORIZON], &[[0.0; 3]; HORIZON], stream);
+        let mut problems = [MppiProblem { plan: shifted(&plan, 1), ..problem }];
+        let results = planner.improve(&mut problems).expect("a plan");
         plan.clone_from(&results[0].plan);
         let starts = [x];
         let task = ReachAvoidTask {
@@ -66,9 +67,8 @@ fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
             tightening: &tightening,
             query: Query::Measure,
         };
-        let plant = Plant { system: &system, policy: &policy };
-        backend.reach_avoid(plant, &task, &mut |_, _| Ok(())).expect("a measure");
-        x = system.step(x, plan[0]);
+        program.reach_avoid(&task, &mut |_, _| Ok(())).expect("a measure");
+        x = system.step(x, [plan[0]]);
         // Away from rest now and then, so that there is something to do.
         if step % 50 == 0 {
             x = [0.8, 0.0];

@@ -2,10 +2,12 @@
 
 #![allow(dead_code, reason = "each bench takes what it needs")]
 
+use std::array::from_fn;
+
 use reachcast::cost::Cost;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
-use reachcast::rollout::{Fold, MppiTask, Plant, RolloutSpec};
+use reachcast::rollout::{Fold, MppiProblem, Planning, Plant, RolloutSpec};
 use reachcast::system::System;
 
 /// Damping of the ego's velocities: physics without a network.
@@ -47,37 +49,40 @@ where
     starts.iter().map(measure).collect()
 }
 
-/// The improved plan of the first problem of `task`, `[H]`: no networks, no noise cost.
+/// The improved plan of `problem`, `[H, controls]`: no networks, no noise cost.
 pub(crate) fn plan<S, C, const NX: usize, const NU: usize, const NC: usize>(
     system: &S,
     cost: &C,
-    task: &MppiTask<'_, NX, NU, NC>,
-) -> Vec<[f32; NU]>
+    planning: &Planning,
+    problem: &MppiProblem,
+) -> Vec<f32>
 where
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
-    let (settings, problem) = (task.spec.settings(), &task.problems[0]);
+    let settings = planning.spec.settings();
+    let start: [f32; NX] = from_fn(|i| problem.start[i]);
     let sample = |number| {
-        let controls = task.controls(0, number);
-        let (mut x, mut total) = (problem.start, 0.0);
-        for (u, context) in controls.iter().zip(&problem.context) {
+        let controls = planning.controls(problem, 0, number);
+        let (mut x, mut total) = (start, 0.0);
+        let stages = problem.context.as_chunks::<NC>().0;
+        for (u, context) in controls.as_chunks::<NU>().0.iter().zip(stages) {
             total += cost.stage(x, *u, *context);
             x = system.step(x, *u);
         }
         (total, controls)
     };
-    let samples: Vec<(f32, Vec<[f32; NU]>)> = (0..settings.samples).map(sample).collect();
+    let samples: Vec<(f32, Vec<f32>)> = (0..settings.samples).map(sample).collect();
     let least = samples.iter().fold(f32::INFINITY, |least, (cost, _)| least.min(*cost));
-    let mut plan = vec![[0.0; NU]; settings.horizon as usize];
+    let mut plan = vec![0.0; problem.plan.len()];
     let mut weights = 0.0;
     for (cost, controls) in &samples {
         let weight = ((least - cost) / settings.temperature).exp();
         weights += weight;
-        for (sum, u) in plan.as_flattened_mut().iter_mut().zip(controls.as_flattened()) {
+        for (sum, u) in plan.iter_mut().zip(controls) {
             *sum += weight * u;
         }
     }
-    plan.as_flattened_mut().iter_mut().for_each(|sum| *sum /= weights);
+    plan.iter_mut().for_each(|sum| *sum /= weights);
     plan
 }

@@ -4,15 +4,12 @@ pub mod cpu;
 mod event;
 pub mod gpu;
 mod physics;
+mod plan_program;
 mod program;
-mod softmin;
 
-use crate::cost::Cost;
 use crate::error::Result;
 use crate::policy::Policy;
-use crate::rollout::{
-    DeviationTask, Farthest, MppiResult, MppiTask, PairMeasure, Plant, ReachAvoidTask,
-};
+use crate::rollout::{DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask};
 use crate::system::System;
 
 use cpu::Cpu;
@@ -20,6 +17,7 @@ use gpu::Gpu;
 
 pub use event::{Action, Event, add_events};
 pub use physics::physics;
+pub use plan_program::PlanProgram;
 pub use program::Program;
 
 /// The native CPU, or a GPU through wgpu.
@@ -102,27 +100,6 @@ impl Backend {
         match self {
             Self::Cpu(cpu) => cpu.deviation(plant, task, sink),
             Self::Gpu(gpu) => gpu.deviation(plant, task, sink),
-        }
-    }
-    /// Improves the plan of each problem of `task` once, section 7 of `docs/method.md`; in the
-    /// order of the problems.
-    ///
-    /// # Errors
-    /// [`crate::Error::Invalid`] where the parts of the task do not fit, and those of the device.
-    pub fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
-        &self,
-        system: &S,
-        cost: &C,
-        task: &MppiTask<'_, NX, NU, NC>,
-    ) -> Result<Vec<MppiResult<NU>>>
-    where
-        S: System<NX, NU>,
-        C: Cost<NX, NU, NC>,
-    {
-        task.check()?;
-        match self {
-            Self::Cpu(cpu) => cpu.mppi(system, cost, task),
-            Self::Gpu(gpu) => gpu.mppi(system, cost, task),
         }
     }
 }

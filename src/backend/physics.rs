@@ -49,6 +49,10 @@ pub(crate) enum Role {
     Observe,
     /// The controls from what a network says.
     Act,
+    /// The cost of a stage of a plan.
+    Stage,
+    /// The number of the cell of a map.
+    Cell,
 }
 
 impl Role {
@@ -61,6 +65,8 @@ impl Role {
             Self::Control => "plant_control",
             Self::Observe => "plant_observe",
             Self::Act => "plant_act",
+            Self::Stage => "stage_cost",
+            Self::Cell => "map_cell",
         }
     }
 
@@ -68,9 +74,9 @@ impl Role {
     fn always(self, part: Part) -> bool {
         match part {
             Part::State => true,
-            Part::Control => self == Self::Step,
+            Part::Control => matches!(self, Self::Step | Self::Stage),
             Part::Said => self == Self::Act,
-            Part::Parameters | Part::Seconds | Part::Step => false,
+            Part::Parameters | Part::Seconds | Part::Step | Part::Context => false,
         }
     }
 }
@@ -90,11 +96,21 @@ pub(crate) enum Part {
     Step,
     /// What the network says.
     Said,
+    /// What the cost of a stage wants to know.
+    Context,
 }
 
 impl Part {
-    const ALL: [Self; 6] =
-        [Self::State, Self::Control, Self::Parameters, Self::Seconds, Self::Step, Self::Said];
+    /// In the order of the inputs; whoever has the last two has one of them alone.
+    const ALL: [Self; 7] = [
+        Self::State,
+        Self::Control,
+        Self::Parameters,
+        Self::Seconds,
+        Self::Step,
+        Self::Said,
+        Self::Context,
+    ];
 
     /// Name of the argument.
     fn name(self) -> &'static str {
@@ -105,6 +121,7 @@ impl Part {
             Self::Seconds => "seconds",
             Self::Step => "number",
             Self::Said => "said",
+            Self::Context => "context",
         }
     }
 }
@@ -122,9 +139,18 @@ pub(crate) struct Function {
 }
 
 impl Function {
+    /// Prints `graph`, a formula of `model`; behind the inputs of the model it takes as many numbers
+    /// of a network and of context as `more` says.
+    pub(crate) fn of(model: &Model, role: Role, graph: &Graph, more: [usize; 2]) -> Self {
+        let (states, controls) = (model.states.len(), model.controls.len());
+        let [said, context] = more;
+        let lengths = [states, controls, model.parameters.len(), 1, 1, said, context];
+        Self::new(role, graph, lengths)
+    }
+
     /// Prints `graph`, whose inputs are `lengths` of each part: what it does not read is no
     /// argument, so that nobody pays for it.
-    fn new(role: Role, graph: &Graph, lengths: [usize; 6]) -> Self {
+    fn new(role: Role, graph: &Graph, lengths: [usize; 7]) -> Self {
         let mut read = vec![false; graph.inputs];
         for node in &graph.nodes {
             if let Node::Input(input) = node {
@@ -192,9 +218,7 @@ impl Physics {
                 graphs.extend(act.iter().map(|graph| (Role::Act, graph)));
             }
         }
-        let (states, controls) = (model.states.len(), model.controls.len());
-        let lengths = [states, controls, model.parameters.len(), 1, 1, said];
-        let print = |(role, graph): (Role, &Graph)| Function::new(role, graph, lengths);
+        let print = |(role, graph): (Role, &Graph)| Function::of(model, role, graph, [said, 0]);
         Self { functions: graphs.into_iter().map(print).collect() }
     }
 

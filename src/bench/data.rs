@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::cost::{Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, Safety};
+use crate::cost::{Fence, LaneCost, RaceCost, RaceReference, Safety};
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
 use crate::rollout::{
     MppiProblem, MppiSettings, MppiSpec, Purpose, Region, RolloutSpec, Sigma, Starts, Stream,
 };
-use crate::system::DroneRace;
+use crate::system::{DroneRace, System};
 
 /// Steps of a rollout.
 pub const HORIZON: u32 = 30;
@@ -152,25 +152,22 @@ pub fn lane() -> RaceCost {
 ///
 /// # Errors
 /// [`Error::Invalid`] if there are none or too many.
-pub fn mppi_spec(samples: u32) -> Result<MppiSpec<3>> {
+pub fn mppi_spec(samples: u32) -> Result<MppiSpec> {
     MppiSpec::new(MppiSettings {
         temperature: TEMPERATURE,
-        sigma: Sigma::PerControl([SIGMA; 3]),
-        ..MppiSettings::new(&DroneRace::default(), samples, PLAN)
+        sigma: Sigma::PerControl(vec![SIGMA; 3]),
+        ..MppiSettings::new(&DroneRace::default().controls(), samples, PLAN)
     })
 }
 
 /// Problem `number`: from [`PLAN_START`] at [`SPEED`], with noise of its own.
-pub fn mppi_problem(seed: u64, number: u32) -> MppiProblem<12, 3, RACE_CONTEXT> {
+pub fn mppi_problem(seed: u64, number: u32) -> MppiProblem {
     let context = |t| {
         RaceReference { speed: SPEED, last: t + 1 == PLAN, ..RaceReference::default() }.context()
     };
-    MppiProblem {
-        start: PLAN_START,
-        plan: vec![[0.0; 3]; PLAN as usize],
-        context: (0..PLAN).map(context).collect(),
-        stream: Stream::new(seed, Purpose::ControlNoise, number),
-    }
+    let contexts: Vec<_> = (0..PLAN).map(context).collect();
+    let stream = Stream::new(seed, Purpose::ControlNoise, number);
+    MppiProblem::new(PLAN_START, &[[0.0; 3]; PLAN as usize], &contexts, stream)
 }
 
 #[cfg(test)]

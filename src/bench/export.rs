@@ -9,8 +9,9 @@ use crate::backend::Backend;
 use crate::cost::RaceCost;
 use crate::error::Result;
 use crate::files::{Existing, Staged, check_room, json, npy_bytes};
+use crate::model::Plant;
 use crate::policy::Mlp;
-use crate::rollout::{CostQuery, MppiTask, Plant, Query, ReachAvoidTask, Starts, Tightening};
+use crate::rollout::{CostQuery, MppiTask, Planning, Query, ReachAvoidTask, Starts, Tightening};
 use crate::system::DroneRace;
 
 /// Starts whose measures are exported.
@@ -105,7 +106,8 @@ fn settings(seed: u64, networks: Vec<String>) -> Settings {
 
 /// The measures of the first [`MEASURES`] starts.
 fn measures(backend: &Backend, data: &Data, network: &Mlp) -> Result<Vec<f32>> {
-    let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
+    let spec = data::rollout_spec()?;
+    let plant = Plant::of(DroneRace::default(), network.clone());
     let task = ReachAvoidTask {
         starts: Starts::listed(&*data.starts),
         range: 0..MEASURES as u64,
@@ -114,7 +116,7 @@ fn measures(backend: &Backend, data: &Data, network: &Mlp) -> Result<Vec<f32>> {
         query: Query::Measure,
     };
     let mut measures = Vec::with_capacity(MEASURES);
-    backend.reach_avoid(Plant { system: &system, policy: network }, &task, &mut |_, values| {
+    backend.prepare(&plant)?.reach_avoid(&task, &mut |_, values| {
         measures.extend_from_slice(values);
         Ok(())
     })?;
@@ -125,15 +127,15 @@ fn measures(backend: &Backend, data: &Data, network: &Mlp) -> Result<Vec<f32>> {
 fn export_plan(backend: &Backend, seed: u64, staged: &mut Staged) -> Result<()> {
     let (spec, problem) = (data::mppi_spec(SAMPLES)?, data::mppi_problem(seed, 0));
     let problems = std::slice::from_ref(&problem);
-    let (value, disturbance, costs) = (None, None, CostQuery::Each);
-    let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
-    let controls: Vec<[f32; 3]> = (0..SAMPLES).flat_map(|k| task.controls(0, k)).collect();
+    let task = MppiTask { problems, iteration: 0, costs: CostQuery::Each };
+    let planning = Planning::of(&DroneRace::default(), data::lane(), spec);
+    let controls: Vec<f32> = (0..SAMPLES).flat_map(|k| planning.controls(&problem, 0, k)).collect();
     let (samples, horizon) = (SAMPLES as usize, data::PLAN as usize);
     let shape = [samples, 3 * horizon];
-    staged.add("mppi_controls.npy", &npy_bytes(controls.as_flattened(), shape))?;
-    for plan in backend.mppi(&DroneRace::default(), &data::lane(), &task)? {
+    staged.add("mppi_controls.npy", &npy_bytes(&controls, shape))?;
+    for plan in backend.prepare_plans(&planning)?.improve(&task)? {
         staged.add("mppi_costs.npy", &npy_bytes(&plan.costs, [samples, 1]))?;
-        staged.add("mppi_plan.npy", &npy_bytes(plan.plan.as_flattened(), [horizon, 3]))?;
+        staged.add("mppi_plan.npy", &npy_bytes(&plan.plan, [horizon, 3]))?;
     }
     Ok(())
 }

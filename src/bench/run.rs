@@ -9,7 +9,7 @@ use super::record::{
     WorkloadRecord,
 };
 use super::scaling::{SIZES, scaling};
-use super::workload::{self, Workload};
+use super::workload::{self, PreparedWorkload, Workload};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{AdapterKind, KernelTime};
@@ -153,7 +153,8 @@ impl BenchRecord {
         watch: &dyn Watch,
     ) -> Result<()> {
         watch.begin(&workload.name, 1);
-        let timing = measure(&self.protocol, || workload.call(backend))?;
+        let prepared = workload.prepare(backend)?;
+        let timing = measure(&self.protocol, || prepared.call())?;
         watch.advance(1)?;
         // Before, between or after failures: these are not the adapter's times.
         if let (Backend::Gpu(_), Some(event)) = (backend, backend.events().first()) {
@@ -173,7 +174,7 @@ impl BenchRecord {
             steps_per_second: workload.steps * units_per_second,
             flops_per_second: workload.flops * units_per_second,
             share: 0.0,
-            kernels: kernel_times(workload, backend)?,
+            kernels: kernel_times(&prepared, backend)?,
         });
         Ok(())
     }
@@ -205,10 +206,10 @@ impl BenchRecord {
 }
 
 /// Times on the adapter of one call of `workload`.
-fn kernel_times(workload: &Workload, backend: &Backend) -> Result<Vec<KernelRecord>> {
+fn kernel_times(workload: &PreparedWorkload<'_>, backend: &Backend) -> Result<Vec<KernelRecord>> {
     let Backend::Gpu(gpu) = backend else { return Ok(Vec::new()) };
     gpu.time_kernels(true);
-    let called = workload.call(backend);
+    let called = workload.call();
     gpu.time_kernels(false);
     called?;
     let record = |time: KernelTime| KernelRecord {

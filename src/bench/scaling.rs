@@ -5,12 +5,13 @@ use std::hint::black_box;
 use super::data::{self, Data};
 use super::measure::{Protocol, measure};
 use super::record::ScalingRecord;
-use crate::backend::Backend;
+use crate::backend::{Backend, Program};
 use crate::error::Result;
+use crate::model::Plant;
 use crate::policy::Mlp;
-use crate::rollout::{Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
+use crate::rollout::{Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
 use crate::scenario::Watch;
-use crate::system::{DroneRace, System};
+use crate::system::DroneRace;
 
 /// Sizes of the batches.
 pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
@@ -29,10 +30,12 @@ pub fn scaling(
     watch: &dyn Watch,
 ) -> Result<Vec<ScalingRecord>> {
     let (_, network) = &data.networks[0];
+    let plant = Plant::of(DroneRace::default(), Mlp::clone(network));
+    let program = backend.prepare(&plant)?;
     let batch = |&rollouts: &u64| {
         reset_peak();
         watch.begin(&format!("{rollouts} rollouts"), rollouts);
-        let timing = measure(protocol, || roll(backend, network, data.seed, rollouts, watch))?;
+        let timing = measure(protocol, || roll(&program, data.seed, rollouts, watch))?;
         Ok(ScalingRecord {
             backend: backend.name().to_owned(),
             rollouts,
@@ -45,11 +48,12 @@ pub fn scaling(
 }
 
 /// Rolls out `count` starts drawn from the default box of the race.
-fn roll(backend: &Backend, network: &Mlp, seed: u64, count: u64, watch: &dyn Watch) -> Result<()> {
-    let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
-    let axes = system.states();
-    let low = axes.each_ref().map(|axis| axis.low);
-    let region = Region::new_box(low, axes.each_ref().map(|axis| axis.high))?;
+fn roll(program: &Program<'_>, seed: u64, count: u64, watch: &dyn Watch) -> Result<()> {
+    let spec = data::rollout_spec()?;
+    let axes = &program.plant().model.states;
+    let low: Vec<f32> = axes.iter().map(|axis| axis.low).collect();
+    let high: Vec<f32> = axes.iter().map(|axis| axis.high).collect();
+    let region = Region::new_box(low, high)?;
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region, stream: Stream::new(seed, Purpose::Bench, STREAM) },
         range: 0..count,
@@ -57,7 +61,7 @@ fn roll(backend: &Backend, network: &Mlp, seed: u64, count: u64, watch: &dyn Wat
         tightening: &Tightening::none(&spec),
         query: Query::Measure,
     };
-    backend.reach_avoid(Plant { system: &system, policy: network }, &task, &mut |_, measures| {
+    program.reach_avoid(&task, &mut |_, measures| {
         black_box(measures);
         watch.advance(measures.len() as u64)
     })

@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use super::data::{self, Data};
 use super::flops;
-use crate::backend::Backend;
+use crate::backend::{Backend, PlanProgram, Program};
 use crate::control::DriveBenchmark;
-use crate::cost::Cost;
 use crate::error::Result;
+use crate::model::Plant;
 use crate::policy::Mlp;
 use crate::rollout::{
-    CostQuery, DeviationTask, Fold, MppiProblem, MppiSpec, MppiTask, PairControl, Pairs, Plant,
-    Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, trajectory,
+    self, CostQuery, DeviationTask, Fold, MppiProblem, MppiTask, PairControl, Pairs, Planning,
+    Purpose, Query, ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening, trajectory,
 };
 use crate::system::{DroneRace, System};
 
@@ -30,9 +30,6 @@ const DRIVE_SAMPLES: u32 = 16_384;
 /// Starts whose rollouts tell how soon a sign is decided.
 const DECIDED: usize = 100;
 
-/// One call of a workload on a backend.
-type Call = Box<dyn Fn(&Backend) -> Result<()>>;
-
 /// Work of a fixed size that any backend does in one call.
 pub struct Workload {
     /// Kind, what it runs on, and size: `rollout/3x64/158`.
@@ -45,22 +42,107 @@ pub struct Workload {
     pub steps: f64,
     /// Floating-point operations of a unit, as [`flops`] counts them.
     pub flops: f64,
-    call: Call,
+    work: Work,
+}
+
+/// What a workload does.
+enum Work {
+    Measures { rollouts: Rollouts, query: Query },
+    Pairs { rollouts: Rollouts, stream: Stream },
+    Plan { planning: Planning, problem: MppiProblem },
+}
+
+/// Rollouts of listed starts.
+struct Rollouts {
+    plant: Plant,
+    starts: Arc<[[f32; 12]]>,
+    count: u64,
+    spec: RolloutSpec,
+    tightening: Tightening,
+}
+
+/// A workload prepared on a backend, for any number of calls.
+pub struct PreparedWorkload<'a> {
+    workload: &'a Workload,
+    program: Prepared<'a>,
+}
+
+/// What a backend keeps of it.
+enum Prepared<'a> {
+    Plant(Program<'a>),
+    Plans(PlanProgram<'a>),
 }
 
 impl Workload {
-    /// Does the work once.
+    /// Prepares the work on `backend`.
     ///
     /// # Errors
     /// Those of the backend.
-    pub fn call(&self, backend: &Backend) -> Result<()> {
-        (self.call)(backend)
+    pub fn prepare<'a>(&'a self, backend: &'a Backend) -> Result<PreparedWorkload<'a>> {
+        let program = match &self.work {
+            Work::Measures { rollouts, .. } | Work::Pairs { rollouts, .. } => {
+                Prepared::Plant(backend.prepare(&rollouts.plant)?)
+            }
+            Work::Plan { planning, .. } => Prepared::Plans(backend.prepare_plans(planning)?),
+        };
+        Ok(PreparedWorkload { workload: self, program })
     }
 
     /// Floating-point operations of a call.
     pub fn call_flops(&self) -> f64 {
         self.units as f64 * self.flops
     }
+}
+
+impl PreparedWorkload<'_> {
+    /// Does the work once.
+    ///
+    /// # Errors
+    /// Those of the backend.
+    pub fn call(&self) -> Result<()> {
+        match (&self.workload.work, &self.program) {
+            (Work::Measures { rollouts, query }, Prepared::Plant(program)) => {
+                measures(program, rollouts, *query)
+            }
+            (Work::Pairs { rollouts, stream }, Prepared::Plant(program)) => {
+                deviations(program, rollouts, *stream)
+            }
+            (Work::Plan { problem, .. }, Prepared::Plans(program)) => {
+                let problems = std::slice::from_ref(problem);
+                let task = MppiTask { problems, iteration: 0, costs: CostQuery::Summary };
+                program.improve(&task).map(|plans| drop(black_box(plans)))
+            }
+            _ => unreachable!("a workload is prepared as what it is"),
+        }
+    }
+}
+
+/// Measures or signs of the starts.
+fn measures(program: &Program<'_>, rollouts: &Rollouts, query: Query) -> Result<()> {
+    let Rollouts { starts, count, spec, tightening, .. } = rollouts;
+    let starts = Starts::listed(&**starts);
+    let task = ReachAvoidTask { starts, range: 0..*count, spec: *spec, tightening, query };
+    program.reach_avoid(&task, &mut |_, measures| {
+        black_box(measures);
+        Ok(())
+    })
+}
+
+/// Pairs around the starts, the perturbed rollout under the nominal controls.
+fn deviations(program: &Program<'_>, rollouts: &Rollouts, stream: Stream) -> Result<()> {
+    let Rollouts { starts, count, spec, tightening, .. } = rollouts;
+    let task = DeviationTask {
+        pairs: Pairs { nominal: Starts::listed(&**starts), radius: RADIUS, stream },
+        range: 0..*count,
+        spec: *spec,
+        tightening,
+        control: PairControl::Replay,
+    };
+    let farthest = program.deviation(&task, &mut |_, measures| {
+        black_box(measures);
+        Ok(())
+    });
+    farthest.map(|farthest| drop(black_box(farthest)))
 }
 
 impl fmt::Debug for Workload {
@@ -85,12 +167,14 @@ pub fn all(data: &Data) -> Result<Vec<Workload>> {
     all.push(pairs(format!("deviation/{name}/{PAIRS}"), data, network, PAIRS)?);
     for samples in SAMPLES {
         let (spec, problem) = (data::mppi_spec(samples)?, data::mppi_problem(data.seed, 0));
-        let name = format!("mppi/lane/{samples}");
-        all.push(plan(name, DroneRace::default(), data::lane(), spec, problem));
+        let (system, cost) = (DroneRace::default(), data::lane());
+        let flops = flops::sample(&system, &cost, spec.horizon());
+        let planning = Planning::of(&system, cost, spec);
+        all.push(plan(format!("mppi/lane/{samples}"), flops, planning, problem));
     }
-    let DriveBenchmark { system, planner, problem } = DriveBenchmark::new(DRIVE_SAMPLES)?;
-    let name = format!("mppi/drive/{DRIVE_SAMPLES}");
-    all.push(plan(name, system, planner.cost, planner.spec, problem));
+    let DriveBenchmark { system, cost, planning, problem } = DriveBenchmark::new(DRIVE_SAMPLES)?;
+    let flops = flops::sample(&system, &cost, planning.spec.horizon());
+    all.push(plan(format!("mppi/drive/{DRIVE_SAMPLES}"), flops, planning, problem));
     Ok(all)
 }
 
@@ -113,27 +197,24 @@ fn reach_avoid(
     count: u64,
     (query, steps): (Query, f64),
 ) -> Result<Workload> {
+    let flops = rollout::Plant { system: &DroneRace::default(), policy: &**policy };
+    let flops = flops::rollout(flops, steps);
+    let work = Work::Measures { rollouts: driven(data, policy, count)?, query };
+    Ok(Workload { name, unit: "rollout", units: count, steps, flops, work })
+}
+
+/// The first `count` starts in feedback with `network`.
+fn driven(data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Rollouts> {
     let spec = data::rollout_spec()?;
-    let (policy, starts) = (Arc::clone(policy), Arc::clone(&data.starts));
-    let system = DroneRace::default();
-    let flops = flops::rollout(Plant { system: &system, policy: &*policy }, steps);
-    let tightening = Tightening::none(&spec);
-    let call = move |backend: &Backend| {
-        let starts = Starts::listed(&*starts);
-        let task = ReachAvoidTask { starts, range: 0..count, spec, tightening: &tightening, query };
-        let plant = Plant { system: &system, policy: &*policy };
-        backend.reach_avoid(plant, &task, &mut |_, measures| {
-            black_box(measures);
-            Ok(())
-        })
-    };
-    Ok(Workload { name, unit: "rollout", units: count, steps, flops, call: Box::new(call) })
+    let plant = Plant::of(DroneRace::default(), Mlp::clone(network));
+    let (starts, tightening) = (Arc::clone(&data.starts), Tightening::none(&spec));
+    Ok(Rollouts { plant, starts, count, spec, tightening })
 }
 
 /// Mean number of steps until the sign of a measure is decided, over some of the starts.
 fn decided_steps(data: &Data, policy: &Mlp) -> Result<f64> {
     let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
-    let plant = Plant { system: &system, policy };
+    let plant = rollout::Plant { system: &system, policy };
     let steps = |start: &[f32; 12]| {
         let mut fold = Fold::new();
         let states = trajectory::<f32, _, _, 12, 3>(plant, *start, spec.horizon);
@@ -149,54 +230,20 @@ fn decided_steps(data: &Data, policy: &Mlp) -> Result<f64> {
 
 /// Pairs around the first `count` starts, the perturbed rollout under the nominal controls.
 fn pairs(name: String, data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Workload> {
-    let spec = data::rollout_spec()?;
-    let (network, starts) = (Arc::clone(network), Arc::clone(&data.starts));
-    let system = DroneRace::default();
-    let steps = f64::from(spec.horizon);
-    let flops = flops::replayed_pair(Plant { system: &system, policy: &*network }, steps);
-    let tightening = Tightening::none(&spec);
+    let steps = f64::from(data::HORIZON);
+    let plant = rollout::Plant { system: &DroneRace::default(), policy: &**network };
+    let flops = flops::replayed_pair(plant, steps);
     let stream = Stream::new(data.seed, Purpose::User, 0);
-    let call = move |backend: &Backend| {
-        let task = DeviationTask {
-            pairs: Pairs { nominal: Starts::listed(&*starts), radius: RADIUS, stream },
-            range: 0..count,
-            spec,
-            tightening: &tightening,
-            control: PairControl::Replay,
-        };
-        let plant = Plant { system: &system, policy: &*network };
-        let farthest = backend.deviation(plant, &task, &mut |_, measures| {
-            black_box(measures);
-            Ok(())
-        });
-        farthest.map(|farthest| drop(black_box(farthest)))
-    };
-    Ok(Workload { name, unit: "pair", units: count, steps, flops, call: Box::new(call) })
+    let work = Work::Pairs { rollouts: driven(data, network, count)?, stream };
+    Ok(Workload { name, unit: "pair", units: count, steps, flops, work })
 }
 
 /// One improvement of a plan, its noise drawn anew.
-fn plan<S, C, const NX: usize, const NU: usize, const NC: usize>(
-    name: String,
-    system: S,
-    cost: C,
-    spec: MppiSpec<NU>,
-    problem: MppiProblem<NX, NU, NC>,
-) -> Workload
-where
-    S: System<NX, NU> + 'static,
-    C: Cost<NX, NU, NC> + 'static,
-{
-    let (samples, horizon) = (spec.settings().samples, spec.settings().horizon);
-    let flops = flops::sample(&system, &cost, horizon as usize);
-    let call = move |backend: &Backend| {
-        let problems = std::slice::from_ref(&problem);
-        let (value, disturbance, costs) = (None, None, CostQuery::Summary);
-        let task = MppiTask { spec: &spec, problems, iteration: 0, value, disturbance, costs };
-        backend.mppi(&system, &cost, &task).map(|plans| drop(black_box(plans)))
-    };
-    let steps = f64::from(horizon);
-    let (unit, units) = ("sample", u64::from(samples));
-    Workload { name, unit, units, steps, flops, call: Box::new(call) }
+fn plan(name: String, flops: f64, planning: Planning, problem: MppiProblem) -> Workload {
+    let settings = planning.spec.settings();
+    let (units, steps) = (u64::from(settings.samples), f64::from(settings.horizon));
+    let work = Work::Plan { planning, problem };
+    Workload { name, unit: "sample", units, steps, flops, work }
 }
 
 #[cfg(test)]
@@ -212,7 +259,7 @@ mod tests {
             assert!(workload.flops > 1000.0, "{workload:?}: {}", workload.flops);
             assert!(workload.name.ends_with(&workload.units.to_string()), "{workload:?}");
             if workload.call_flops() < 1e9 {
-                workload.call(&backend).unwrap();
+                workload.prepare(&backend).unwrap().call().unwrap();
             }
         }
     }

@@ -2,10 +2,8 @@
 
 use crate::cost::{CostMap, GoalCost, Grid};
 use crate::error::Result;
-use crate::rollout::{MppiProblem, MppiSettings, MppiSpec, Purpose, Sigma, Stream};
-use crate::system::DiffDrive;
-
-use super::mppi::Planner;
+use crate::rollout::{MppiProblem, MppiSettings, MppiSpec, Planning, Purpose, Sigma, Stream};
+use crate::system::{DiffDrive, System};
 
 /// Steps of a plan.
 const HORIZON: u32 = 100;
@@ -33,10 +31,12 @@ const OBSTACLE: f32 = 20.0;
 pub struct DriveBenchmark {
     /// The drive.
     pub system: DiffDrive,
-    /// Cost and settings; one improvement per plan.
-    pub planner: Planner<'static, GoalCost, 2>,
+    /// The cost of a stage.
+    pub cost: GoalCost,
+    /// Both with the settings.
+    pub planning: Planning,
     /// From the published start, with a plan of zeros.
-    pub problem: MppiProblem<3, 2, 3>,
+    pub problem: MppiProblem,
 }
 
 impl DriveBenchmark {
@@ -48,25 +48,17 @@ impl DriveBenchmark {
         let system = DiffDrive::default();
         let settings = MppiSettings {
             temperature: 1.0,
-            sigma: Sigma::PerControl([0.2; 2]),
-            ..MppiSettings::new(&system, samples, HORIZON)
+            sigma: Sigma::PerControl(vec![0.2; 2]),
+            ..MppiSettings::new(&system.controls(), samples, HORIZON)
         };
         let grid = Grid { origin: system.low, resolution: RESOLUTION, size: [CELLS; 2] };
         let map = CostMap::around(grid, &system.obstacles, INFLATION, OBSTACLE)?;
-        let planner = Planner {
-            spec: MppiSpec::new(settings)?,
-            cost: GoalCost { distance: 5.0, angle: 5.0, map },
-            iterations: 1,
-            value: None,
-            disturbance: None,
-        };
+        let cost = GoalCost { distance: 5.0, angle: 5.0, map };
+        let planning = Planning::of(&system, cost.clone(), MppiSpec::new(settings)?);
         let [x, y] = system.goal.center;
-        let problem = MppiProblem {
-            start: START,
-            plan: vec![[0.0; 2]; HORIZON as usize],
-            context: vec![[x, y, GOAL_YAW]; HORIZON as usize],
-            stream: Stream::new(1, Purpose::ControlNoise, 0),
-        };
-        Ok(Self { system, planner, problem })
+        let (plan, goals) = ([[0.0; 2]; HORIZON as usize], [[x, y, GOAL_YAW]; HORIZON as usize]);
+        let stream = Stream::new(1, Purpose::ControlNoise, 0);
+        let problem = MppiProblem::new(START, &plan, &goals, stream);
+        Ok(Self { system, cost, planning, problem })
     }
 }

@@ -5,9 +5,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::controller::{Active, Controller, Decision, FilterLog, World};
-use super::plan::{Paths, Plan, fan, problem, stream};
+use super::plan::{Networks, Paths, Plan, fan, first, problem, stream};
 use super::settings::PlanSettings;
-use crate::control::mppi::{policy_plan, shifted};
+use crate::control::mppi::{PolicyPlan, shifted};
 use crate::control::{BarrierFilter, Filtered};
 use crate::cost::RaceReference;
 use crate::error::Result;
@@ -66,7 +66,7 @@ pub(super) struct MppiController<'a> {
     warm: bool,
     paths: Paths,
     /// The plan of each race, none before its first step.
-    plans: Vec<Option<Vec<[f32; 3]>>>,
+    plans: Vec<Option<Vec<f32>>>,
 }
 
 impl<'a> MppiController<'a> {
@@ -77,7 +77,7 @@ impl<'a> MppiController<'a> {
         races: usize,
         paths: Paths,
     ) -> Result<Self> {
-        let plan = Plan::new(section, settings, world.system)?;
+        let plan = Plan::new(section, settings, &world, Networks::default())?;
         Ok(Self { world, plan, filter: None, warm: false, paths, plans: vec![None; races] })
     }
 
@@ -94,15 +94,15 @@ impl<'a> MppiController<'a> {
     }
 
     /// The plan to improve at `race`.
-    fn start_plan(&self, race: &Active) -> Vec<[f32; 3]> {
+    fn start_plan(&self, race: &Active) -> Vec<f32> {
         let horizon = self.plan.planner.horizon();
         match &self.plans[race.place] {
             _ if self.warm => {
-                let World { system, policy, .. } = self.world;
-                policy_plan(system, policy, race.state, horizon, |_| {}).0
+                let plant = self.world.program.plant();
+                PolicyPlan::new(plant, &race.state, horizon, |_| {}).controls
             }
-            Some(plan) => shifted(plan),
-            None => vec![[0.0; 3]; horizon],
+            Some(plan) => shifted(plan, 3),
+            None => vec![0.0; 3 * horizon],
         }
     }
 }
@@ -115,20 +115,19 @@ impl Controller for MppiController<'_> {
             problem(race.state, self.start_plan(race), stream(race.seed, step), |_| reference)
         };
         let mut problems: Vec<_> = active.par_iter().map(begin).collect();
-        let World { backend, system, .. } = self.world;
-        let results = self.plan.planner.improve(backend, system, &mut problems)?;
+        let results = self.plan.planner.improve(&mut problems)?;
         let mut decisions = Vec::with_capacity(active.len());
         for (number, (race, result)) in active.iter().zip(results).enumerate() {
             let mut decision = Decision {
-                control: result.plan[0],
+                control: first(&result.plan),
                 effective_samples: Some(result.effective_samples),
                 best_cost: Some(result.least_cost),
                 non_finite: result.non_finite,
-                fan: fan(&self.plan, system, &problems, number, self.paths),
+                fan: fan(&self.plan, &problems[number], self.paths),
                 ..Decision::default()
             };
             if let Some(filter) = &self.filter {
-                filtered(filter, system, race, &mut decision);
+                filtered(filter, self.world.system, race, &mut decision);
             }
             self.plans[race.place] = Some(result.plan);
             decisions.push(decision);

@@ -1,18 +1,20 @@
 //! The hierarchical controller, Algorithm 2: all races step together, each tier as one batch.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::controller::{Active, Controller, Decision, World};
-use super::plan::{Paths, Plan, RaceProblem, fan, problem, stream};
+use super::plan::{Networks, Paths, Plan, fan, first, problem, stream};
 use super::settings::{FirstPlan, HybridSettings, RecoveryPoint};
-use crate::control::mppi::{policy_plan, shifted};
+use crate::control::mppi::{PolicyPlan, shifted};
 use crate::control::tier::{Asked, Case, Certifier, Standing, Tier};
 use crate::cost::RaceReference;
 use crate::error::Result;
-use crate::policy::Policy;
-use crate::rollout::{Disturbance, ValueTerm};
+use crate::model::Plant;
+use crate::policy::{Mlp, Policy};
+use crate::rollout::{Disturbance, MppiProblem, MppiResult, ValueTerm};
 use crate::scenario::global::slice_through;
 use crate::scenario::ledger::Ledger;
 use crate::system::{DroneRace, System};
@@ -32,6 +34,8 @@ pub(super) struct Hybrid<'a> {
     certifier: Certifier<'a>,
     fast: Plan<'a>,
     recovery: Plan<'a>,
+    /// What plans of the policy are rolled out with.
+    planned: Plant,
     paths: Paths,
     races: Vec<Memory>,
 }
@@ -42,7 +46,7 @@ struct Memory {
     /// Whether the target was reached once.
     reached: bool,
     /// The plan of tier 0, none before its first step there.
-    plan: Option<Vec<[f32; 3]>>,
+    plan: Option<Vec<f32>>,
     ledger: Ledger,
 }
 
@@ -53,15 +57,14 @@ impl<'a> Hybrid<'a> {
         let HybridSettings { global, local, domain, .. } = *asked;
         let certificates = Asked { global, local, domain };
         let certifier = Certifier::new(world.program, world.certificates, certificates)?;
-        let fast = Plan::new("race.hybrid.fast", &asked.fast, world.system)?;
-        let mut recovery = Plan::new("race.hybrid.recovery", &asked.recovery, world.system)?;
-        let (weight, threshold) = (asked.value_weight, asked.value_threshold);
-        let value = |network| ValueTerm { network, weight, threshold };
-        recovery.planner.value = world.value.filter(|_| weight > 0.0).map(value);
-        recovery.planner.disturbance =
-            world.disturbance.map(|network| Disturbance { network, entries: &DISTURBED });
+        let fast = Plan::new("race.hybrid.fast", &asked.fast, &world, Networks::default())?;
+        let networks = networks(&world);
+        let recovery = Plan::new("race.hybrid.recovery", &asked.recovery, &world, networks)?;
+        let ego_gain = if asked.plan_gain > 0.0 { asked.plan_gain } else { world.system.ego_gain };
+        let planned = Plant::of(DroneRace { ego_gain, ..*world.system }, world.policy.clone());
         let memory = Memory { reached: false, plan: None, ledger: Ledger::new(world.race.beta)? };
-        Ok(Self { world, certifier, fast, recovery, paths, races: vec![memory; races] })
+        let races = vec![memory; races];
+        Ok(Self { world, certifier, fast, recovery, planned, paths, races })
     }
 
     fn settings(&self) -> &'a HybridSettings {
@@ -82,18 +85,17 @@ impl<'a> Hybrid<'a> {
     fn fly_fast(&mut self, step: u32, races: &[Active]) -> Result<Vec<Decision>> {
         let begun = Instant::now();
         let begin = |race: &Active| self.fast_problem(step, race);
-        let mut problems: Vec<RaceProblem> = races.iter().map(begin).collect();
-        let World { backend, system, .. } = self.world;
-        let results = self.fast.planner.improve(backend, system, &mut problems)?;
+        let mut problems: Vec<MppiProblem> = races.iter().map(begin).collect();
+        let results = self.fast.planner.improve(&mut problems)?;
         let mut decisions = Vec::with_capacity(races.len());
         for (number, (race, result)) in races.iter().zip(results).enumerate() {
             decisions.push(Decision {
-                control: result.plan[0],
+                control: first(&result.plan),
                 tier: Some(Tier::Target),
                 effective_samples: Some(result.effective_samples),
                 best_cost: Some(result.least_cost),
                 non_finite: result.non_finite,
-                fan: fan(&self.fast, system, &problems, number, self.paths),
+                fan: fan(&self.fast, &problems[number], self.paths),
                 ..Decision::default()
             });
             self.races[race.place].plan = Some(result.plan);
@@ -102,14 +104,14 @@ impl<'a> Hybrid<'a> {
     }
 
     /// The fast plan of a race before it is improved.
-    fn fast_problem(&self, step: u32, race: &Active) -> RaceProblem {
+    fn fast_problem(&self, step: u32, race: &Active) -> MppiProblem {
         let asked = self.settings();
         let horizon = self.fast.planner.horizon();
         let plan = match (&self.races[race.place].plan, asked.first_plan) {
-            (Some(plan), _) => shifted(plan),
-            (None, FirstPlan::Zero) => vec![[0.0; 3]; horizon],
-            (None, FirstPlan::Brake) => vec![brake(&race.state); horizon],
-            (None, FirstPlan::Policy) => self.policy_plan(race.state, horizon).0,
+            (Some(plan), _) => shifted(plan, 3),
+            (None, FirstPlan::Zero) => vec![0.0; 3 * horizon],
+            (None, FirstPlan::Brake) => vec![brake(&race.state); horizon].into_flattened(),
+            (None, FirstPlan::Policy) => self.policy_plan(&race.state, horizon).controls,
         };
         let near = asked.near_gate && near_gate(&race.state);
         let speed = if near { asked.near_gate_speed } else { self.fast.speed };
@@ -118,13 +120,9 @@ impl<'a> Hybrid<'a> {
     }
 
     /// A rollout of the policy with the gain and the opponent that plans start from.
-    fn policy_plan(&self, start: [f32; 12], horizon: usize) -> (Vec<[f32; 3]>, Vec<[f32; 12]>) {
-        let asked = self.settings();
-        let plant = self.world.system;
-        let ego_gain = if asked.plan_gain > 0.0 { asked.plan_gain } else { plant.ego_gain };
-        let system = DroneRace { ego_gain, ..*plant };
-        let held = asked.hold_opponent;
-        policy_plan(&system, self.world.policy, start, horizon, |x| {
+    fn policy_plan(&self, start: &[f32; 12], horizon: usize) -> PolicyPlan {
+        let held = self.settings().hold_opponent;
+        PolicyPlan::new(&self.planned, start, horizon, |x| {
             if held {
                 x[6..].copy_from_slice(&start[6..]);
             }
@@ -162,7 +160,7 @@ impl<'a> Hybrid<'a> {
     ) -> Result<Vec<(Decision, [f32; 3])>> {
         let horizon = self.recovery.planner.horizon();
         let begin = |(race, standing): &(Active, &Standing)| {
-            let (plan, states) = self.policy_plan(race.state, horizon);
+            let PolicyPlan { controls, states } = self.policy_plan(&race.state, horizon);
             let point = self.recovery_point(&race.state, standing, &states);
             let reference = |t: usize| RaceReference {
                 position: point,
@@ -170,30 +168,24 @@ impl<'a> Hybrid<'a> {
                 speed: self.recovery.speed,
                 last: false,
             };
-            (problem(race.state, plan, stream(race.seed, step), reference), point)
+            (problem(race.state, controls, stream(race.seed, step), reference), point)
         };
         let begun: Vec<_> = races.par_iter().map(begin).collect();
         let (mut problems, points): (Vec<_>, Vec<_>) = begun.into_iter().unzip();
-        let World { backend, system, .. } = self.world;
-        let results = self.recovery.planner.improve(backend, system, &mut problems)?;
-        let decide = |(number, result): (usize, crate::rollout::MppiResult<3>)| Decision {
-            control: result.plan[0],
+        let results = self.recovery.planner.improve(&mut problems)?;
+        let decide = |(number, result): (usize, MppiResult)| Decision {
+            control: first(&result.plan),
             effective_samples: Some(result.effective_samples),
             best_cost: Some(result.least_cost),
             non_finite: result.non_finite,
-            fan: fan(&self.recovery, system, &problems, number, self.paths),
+            fan: fan(&self.recovery, &problems[number], self.paths),
             ..Decision::default()
         };
         Ok(results.into_iter().enumerate().map(decide).zip(points).collect())
     }
 
     /// Where recovery steers to from `x`, at the height that the ego has.
-    fn recovery_point(
-        &self,
-        x: &[f32; 12],
-        standing: &Standing,
-        planned: &[[f32; 12]],
-    ) -> [f32; 3] {
+    fn recovery_point(&self, x: &[f32; 12], standing: &Standing, planned: &[Vec<f32>]) -> [f32; 3] {
         let gate = [0.0, 0.0, x[4]];
         match self.settings().recovery_point {
             RecoveryPoint::Gate => gate,
@@ -269,6 +261,19 @@ impl Hybrid<'_> {
             decisions.push(decision);
         }
         Ok(shared(decisions, begun))
+    }
+}
+
+/// The networks that take part in the recovery of `world`.
+fn networks(world: &World<'_>) -> Networks {
+    let asked = &world.race.hybrid;
+    let (weight, threshold) = (asked.value_weight, asked.value_threshold);
+    let shared = |network: &Mlp| Arc::new(network.clone());
+    let value = world.value.filter(|_| weight > 0.0).map(shared);
+    let entries = DISTURBED.to_vec();
+    Networks {
+        value: value.map(|network| ValueTerm { network, weight, threshold }),
+        disturbance: world.disturbance.map(shared).map(|network| Disturbance { network, entries }),
     }
 }
 

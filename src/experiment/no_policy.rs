@@ -4,11 +4,12 @@ use std::time::Instant;
 
 use super::controller::{Active, Controller, Decision, World};
 use super::hybrid::{near_gate, shared};
-use super::plan::{Paths, Plan, RaceProblem, fan, problem, stream};
+use super::plan::{Networks, Paths, Plan, fan, first, problem, stream};
 use crate::control::mppi::shifted;
 use crate::control::tier::Tier;
 use crate::cost::RaceReference;
 use crate::error::Result;
+use crate::rollout::MppiProblem;
 use crate::system::System;
 
 /// The hybrid without policy and certificates: two plans, in the target and outside.
@@ -18,17 +19,18 @@ pub(super) struct NoPolicy<'a> {
     outside: Plan<'a>,
     paths: Paths,
     /// Whether the target was reached once, and the last plan.
-    races: Vec<(bool, Option<Vec<[f32; 3]>>)>,
+    races: Vec<(bool, Option<Vec<f32>>)>,
 }
 
 impl<'a> NoPolicy<'a> {
     /// The controller of `races` races.
     pub(super) fn new(world: World<'a>, races: usize, paths: Paths) -> Result<Self> {
         let asked = &world.race.no_policy;
+        let plan = |key: &str, asked| Plan::new(key, asked, &world, Networks::default());
         Ok(Self {
             world,
-            fast: Plan::new("race.no_policy.fast", &asked.fast, world.system)?,
-            outside: Plan::new("race.no_policy.recovery", &asked.recovery, world.system)?,
+            fast: plan("race.no_policy.fast", &asked.fast)?,
+            outside: plan("race.no_policy.recovery", &asked.recovery)?,
             paths,
             races: vec![(false, None); races],
         })
@@ -51,23 +53,22 @@ impl<'a> NoPolicy<'a> {
         let reference = RaceReference { speed: plan.speed, ..RaceReference::default() };
         let begin = |race: &Active| {
             let before = self.races[race.place].1.as_deref();
-            let mut start = before.map_or_else(Vec::new, shifted);
+            let mut start = before.map_or_else(Vec::new, |plan| shifted(plan, 3));
             // The two plans may be of different length.
-            start.resize(horizon, [0.0; 3]);
+            start.resize(3 * horizon, 0.0);
             problem(race.state, start, stream(race.seed, step), |_| reference)
         };
-        let mut problems: Vec<RaceProblem> = races.iter().map(begin).collect();
-        let World { backend, system, .. } = self.world;
-        let results = plan.planner.improve(backend, system, &mut problems)?;
+        let mut problems: Vec<MppiProblem> = races.iter().map(begin).collect();
+        let results = plan.planner.improve(&mut problems)?;
         let mut decisions = Vec::with_capacity(races.len());
         for (number, (race, result)) in races.iter().zip(results).enumerate() {
             decisions.push(Decision {
-                control: result.plan[0],
+                control: first(&result.plan),
                 tier: Some(tier),
                 effective_samples: Some(result.effective_samples),
                 best_cost: Some(result.least_cost),
                 non_finite: result.non_finite,
-                fan: fan(plan, system, &problems, number, self.paths),
+                fan: fan(plan, &problems[number], self.paths),
                 ..Decision::default()
             });
             self.races[race.place].1 = Some(result.plan);

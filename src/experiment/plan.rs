@@ -1,35 +1,51 @@
 //! What the plans of all controllers share: planners from settings, problems, sampled paths.
 
+use std::array::from_fn;
+
+use super::controller::World;
 use super::settings::PlanSettings;
 use crate::control::mppi::Planner;
-use crate::cost::{RACE_CONTEXT, RaceCost, RaceReference};
+use crate::cost::RaceReference;
 use crate::error::Result;
-use crate::rollout::{MppiProblem, Purpose, Stream};
-use crate::system::DroneRace;
-
-/// A problem of the race.
-pub(super) type RaceProblem = MppiProblem<12, 3, RACE_CONTEXT>;
+use crate::rollout::{Disturbance, MppiProblem, Planning, Purpose, Stream, ValueTerm};
 
 /// A planner and the speed that it keeps.
 pub(super) struct Plan<'a> {
     /// The planner.
-    pub(super) planner: Planner<'a, RaceCost, 3>,
+    pub(super) planner: Planner<'a>,
     /// Speed toward the gate, m/s.
     pub(super) speed: f32,
 }
 
-impl Plan<'_> {
-    /// The planner that the `settings` of `section` ask for.
-    pub(super) fn new(section: &str, settings: &PlanSettings, system: &DroneRace) -> Result<Self> {
-        let planner = Planner {
-            spec: settings.spec(section, system)?,
-            cost: settings.cost,
-            iterations: settings.iterations,
-            value: None,
-            disturbance: None,
-        };
+/// The networks that take part in plans.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Networks {
+    /// Penalty on the value along the rollouts.
+    pub(super) value: Option<ValueTerm>,
+    /// What pushes the opponent.
+    pub(super) disturbance: Option<Disturbance>,
+}
+
+impl<'a> Plan<'a> {
+    /// The planner that the `settings` of `section` ask for, prepared.
+    pub(super) fn new(
+        section: &str,
+        settings: &PlanSettings,
+        world: &World<'a>,
+        networks: Networks,
+    ) -> Result<Self> {
+        let spec = settings.spec(section, world.system)?;
+        let Networks { value, disturbance } = networks;
+        let planning =
+            Planning { value, disturbance, ..Planning::of(world.system, settings.cost, spec) };
+        let planner = Planner::new(world.backend, &planning, settings.iterations)?;
         Ok(Self { planner, speed: settings.speed })
     }
+}
+
+/// The first controls of a plan.
+pub(super) fn first(plan: &[f32]) -> [f32; 3] {
+    from_fn(|i| plan[i])
 }
 
 /// The stream of the control noise of a race at one step.
@@ -40,14 +56,14 @@ pub(super) fn stream(seed: u64, step: u32) -> Stream {
 /// The problem at `start`, with the reference of each stage.
 pub(super) fn problem(
     start: [f32; 12],
-    plan: Vec<[f32; 3]>,
+    plan: Vec<f32>,
     stream: Stream,
     reference: impl Fn(usize) -> RaceReference,
-) -> RaceProblem {
-    let last = plan.len() - 1;
-    let stage = |t: usize| RaceReference { last: t == last, ..reference(t) }.context();
-    let context = (0..plan.len()).map(stage).collect();
-    MppiProblem { start, plan, context, stream }
+) -> MppiProblem {
+    let horizon = plan.len() / 3;
+    let stage = |t: usize| RaceReference { last: t + 1 == horizon, ..reference(t) }.context();
+    let context = (0..horizon).flat_map(stage).collect();
+    MppiProblem { start: start.to_vec(), plan, context, first_step: 0, stream }
 }
 
 /// Whether sampled paths are wanted, for a picture.
@@ -62,21 +78,15 @@ pub(super) enum Paths {
 /// Paths of a picture.
 const DRAWN: u32 = 24;
 
-/// The first samples of problem `number` around its improved plan: x and y of the ego.
-pub(super) fn fan(
-    plan: &Plan<'_>,
-    system: &DroneRace,
-    problems: &[RaceProblem],
-    number: usize,
-    paths: Paths,
-) -> Vec<Vec<[f32; 2]>> {
+/// The first samples of `problem` around its improved plan: x and y of the ego.
+pub(super) fn fan(plan: &Plan<'_>, problem: &MppiProblem, paths: Paths) -> Vec<Vec<[f32; 2]>> {
     if paths == Paths::None {
         return Vec::new();
     }
-    let task = plan.planner.task(problems, 0);
-    let samples = DRAWN.min(plan.planner.spec.settings().samples);
+    let planning = plan.planner.planning();
+    let samples = DRAWN.min(planning.spec.settings().samples);
     let path = |sample| {
-        let states = task.states(system, number, sample);
+        let states = planning.states(problem, 0, sample);
         states.into_iter().map(|x| [x[0], x[2]]).collect()
     };
     (0..samples).map(path).collect()

@@ -262,7 +262,7 @@ impl PlanSettings {
     ///
     /// # Errors
     /// [`Error::Invalid`], as [`MppiSpec::new`], and for no iteration.
-    pub fn spec(&self, section: &str, system: &DroneRace) -> Result<MppiSpec<3>> {
+    pub fn spec(&self, section: &str, system: &DroneRace) -> Result<MppiSpec> {
         if self.iterations > MOST_ITERATIONS {
             let problem = format!(
                 "{} improvements of a plan at each control step, at most {MOST_ITERATIONS}; more \
@@ -280,14 +280,16 @@ impl PlanSettings {
             horizon: self.horizon,
             temperature: self.temperature,
             sigma: match self.sigma {
-                SigmaSetting::Same(sigma) => Sigma::PerControl([sigma; 3]),
-                SigmaSetting::PerControl(sigma) => Sigma::PerControl(sigma),
-                SigmaSetting::Covariance(matrix) => Sigma::Covariance(matrix),
+                SigmaSetting::Same(sigma) => Sigma::PerControl(vec![sigma; 3]),
+                SigmaSetting::PerControl(sigma) => Sigma::PerControl(sigma.to_vec()),
+                SigmaSetting::Covariance(matrix) => {
+                    Sigma::Covariance(matrix.map(|row| row.to_vec()).to_vec())
+                }
             },
             noise: self.noise,
             antithetic: self.antithetic,
             noise_cost: self.noise_cost,
-            bounds: system.controls().map(|axis| [axis.low, axis.high]),
+            bounds: system.controls().map(|axis| [axis.low, axis.high]).to_vec(),
         };
         MppiSpec::new(settings).map_err(|error| match error {
             Error::Invalid { place, problem } => {

@@ -4,12 +4,14 @@ mod controller;
 mod identity;
 mod plant;
 mod recorded;
+mod stage;
 pub mod text;
 
 use std::sync::Arc;
 
 pub use controller::{Controller, Law};
 pub use plant::Plant;
+pub use stage::{MapCost, StageCost};
 
 use crate::formula::Graph;
 pub use crate::system::Parameter;

@@ -58,13 +58,27 @@ pub(super) fn recorded<S, const NX: usize, const NU: usize>(
 where
     S: System<NX, NU>,
 {
+    recorded_with(system, 0, |x, u, _| formula(from_fn(|i| x[i]), from_fn(|i| u[i])))
+}
+
+/// Records `formula` of states, controls and `more` inputs that stand behind those of the model of
+/// `system`.
+pub(super) fn recorded_with<S, const NX: usize, const NU: usize>(
+    system: &S,
+    more: usize,
+    formula: impl FnOnce(&[Expr], &[Expr], &[Expr]) -> Vec<Expr>,
+) -> Graph
+where
+    S: System<NX, NU>,
+{
     let parameters = system.parameters();
     let names: Vec<(&str, usize)> = parameters
         .iter()
         .enumerate()
         .map(|(i, parameter)| (parameter.name.as_str(), NX + NU + i))
         .collect();
-    record_with(NX + NU + names.len() + 2, &names, |inputs| {
-        formula(from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i]))
+    let own = NX + NU + names.len() + 2;
+    record_with(own + more, &names, |inputs| {
+        formula(&inputs[..NX], &inputs[NX..NX + NU], &inputs[own..])
     })
 }

@@ -4,21 +4,23 @@ mod fold;
 mod mppi;
 mod noise;
 mod philox;
+mod planning;
 mod reference;
 mod region;
 pub mod replay;
 mod sample;
 mod spec;
 mod starts;
+mod tally;
 
 pub use crate::files::{StateList, States};
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
-pub use mppi::{
-    CostQuery, Disturbance, MAX_PLAN, MAX_SAMPLES, MppiProblem, MppiResult, MppiSettings, MppiSpec,
-    MppiTask, NoiseKind, Sigma, ValueTerm,
-};
+pub use mppi::{MAX_PLAN, MAX_SAMPLES, MppiSettings, MppiSpec, NoiseKind, Sigma};
 pub use noise::{Noise, NoiseShape, SPLINE_SUPPORT, SplineRow};
 pub use philox::philox;
+pub use planning::{
+    CostQuery, Disturbance, MppiProblem, MppiResult, MppiTask, Planning, ValueTerm,
+};
 pub use reference::{measure, pair_measures, trajectory};
 pub use region::{Ball, Region, sample_ball};
 pub use sample::{GENERATOR, Purpose, Stream, normal_pair};
@@ -27,3 +29,5 @@ pub use spec::{
     RolloutSpec, Tightening,
 };
 pub use starts::{Pairs, Starts};
+pub(crate) use tally::Partial;
+pub use tally::PlanTally;

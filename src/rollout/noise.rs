@@ -12,10 +12,12 @@ pub const SPLINE_SUPPORT: usize = 4;
 /// The noise of all samples: standard normal numbers, shaped over time, then scaled.
 ///
 /// Normal number `n` of a sample is entry `n % 4` of the block `n / 4`, and belongs to control
-/// `n % NU` of the draw `n / NU`: a step, or a knot.
+/// `n % NU` of the draw `n / NU`, a step or a knot, of NU controls.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Noise<const NU: usize> {
-    factor: [[f32; NU]; NU],
+pub struct Noise {
+    /// Row by row.
+    factor: Vec<f32>,
+    controls: usize,
     horizon: usize,
     antithetic: bool,
     shape: NoiseShape,
@@ -51,9 +53,16 @@ pub struct SplineRow {
     pub weights: [f32; SPLINE_SUPPORT],
 }
 
-impl<const NU: usize> Noise<NU> {
+impl Noise {
     /// The noise that `settings` ask for, scaled by the lower triangular `factor`.
-    pub(super) fn new(settings: &MppiSettings<NU>, factor: [[f32; NU]; NU]) -> Result<Self> {
+    /// `factor` is given row by row.
+    pub(super) fn new(settings: &MppiSettings, factor: Vec<f32>) -> Result<Self> {
+        let controls = settings.bounds.len();
+        if factor.len() != controls * controls {
+            let problem =
+                format!("is of {} controls; there are bounds for {controls}", factor.len().isqrt());
+            return Err(Error::invalid("sigma", problem));
+        }
         let independent = settings.noise == NoiseKind::Independent;
         if settings.noise_cost && !independent {
             let problem = "the noise cost is that of independent noise; take one or the other";
@@ -65,12 +74,17 @@ impl<const NU: usize> Noise<NU> {
             NoiseKind::Spline { knots } => spline(knots, settings.horizon)?,
         };
         let horizon = settings.horizon as usize;
-        Ok(Self { factor, horizon, antithetic: settings.antithetic, shape })
+        Ok(Self { factor, controls, horizon, antithetic: settings.antithetic, shape })
     }
 
-    /// The lower triangular factor of the covariance.
-    pub fn factor(&self) -> &[[f32; NU]; NU] {
-        &self.factor
+    /// Row `i` of the lower triangular factor of the covariance.
+    pub fn factor(&self, i: usize) -> &[f32] {
+        &self.factor[i * self.controls..][..self.controls]
+    }
+
+    /// Number of controls.
+    pub fn controls(&self) -> usize {
+        self.controls
     }
 
     /// Whether neighbouring samples have opposite noise.
@@ -93,10 +107,10 @@ impl<const NU: usize> Noise<NU> {
 
     /// Room for the normal numbers of a group: whole blocks.
     pub(crate) fn room(&self) -> usize {
-        (self.draws() * NU).next_multiple_of(4)
+        (self.draws() * self.controls).next_multiple_of(4)
     }
 
-    /// The noise of the samples `first..first + N`, `[H]`, computed in vectors `V` that N is a
+    /// The noise of the samples `first..first + N`, `[H, controls]`, computed in vectors `V` that N is a
     /// multiple of; `normals` is scratch of [`Self::room`].
     ///
     /// # Panics
@@ -107,31 +121,33 @@ impl<const NU: usize> Noise<NU> {
         (stream, iteration): (Stream, u32),
         first: u32,
         normals: &mut [Lanes<N>],
-        noise: &mut [[Lanes<N>; NU]],
+        noise: &mut [[f32; N]],
     ) {
         self.draw::<V, N>((stream, iteration), first, normals);
+        let (steps, count) = (noise.chunks_exact_mut(self.controls).enumerate(), self.controls);
         match &self.shape {
             NoiseShape::Independent => {
-                for (t, e) in noise[..self.horizon].iter_mut().enumerate() {
-                    *e = self.scaled(&vector(normals, t));
+                for (t, e) in steps {
+                    self.scale(&normals[t * count..][..count], e);
                 }
             }
             NoiseShape::Colored { keep, fresh } => {
                 let (keep, fresh) = (Lanes::lit(*keep), Lanes::lit(*fresh));
-                let mut z: [Lanes<N>; NU] = vector(normals, 0);
-                for (t, e) in noise[..self.horizon].iter_mut().enumerate() {
+                for (t, e) in steps {
+                    // The correlated numbers take the place of the fresh ones.
+                    let (before, now) = normals.split_at_mut(t * count);
                     if t > 0 {
-                        let xi = vector::<N, NU>(normals, t);
-                        for (z, xi) in z.iter_mut().zip(xi) {
-                            *z = keep * *z + fresh * xi;
+                        for (z, before) in now.iter_mut().zip(&before[(t - 1) * count..]) {
+                            *z = keep * *before + fresh * *z;
                         }
                     }
-                    *e = self.scaled(&z);
+                    self.scale(&now[..count], e);
                 }
             }
             NoiseShape::Spline { knots, rows } => {
-                for (e, row) in noise.iter_mut().zip(rows) {
-                    *e = self.scaled(&between(normals, *knots, row));
+                for ((_, e), row) in steps.zip(rows) {
+                    between(normals, *knots, row, e);
+                    self.scale_in_place(e);
                 }
             }
         }
@@ -177,51 +193,52 @@ impl<const NU: usize> Noise<NU> {
 
     /// `L z`.
     #[inline(always)]
-    fn scaled<const N: usize>(&self, z: &[Lanes<N>; NU]) -> [Lanes<N>; NU] {
-        let mut e = [Lanes([0.0; N]); NU];
-        for i in 0..NU {
-            e[i] = Lanes::lit(self.factor[i][i]) * z[i];
-            for (factor, z) in self.factor[i][..i].iter().zip(z) {
+    fn scale<const N: usize>(&self, z: &[Lanes<N>], e: &mut [[f32; N]]) {
+        e.iter_mut().zip(z).for_each(|(e, z)| *e = z.0);
+        self.scale_in_place(e);
+    }
+
+    /// `L e` in the place of `e`: the last control first, which none before it needs.
+    #[inline(always)]
+    fn scale_in_place<const N: usize>(&self, e: &mut [[f32; N]]) {
+        for i in (0..e.len()).rev() {
+            let (before, rest) = e.split_at_mut(i);
+            let row = self.factor(i);
+            let mut sum = Lanes::lit(row[i]) * Lanes(rest[0]);
+            for (factor, z) in row.iter().zip(before) {
                 if *factor != 0.0 {
-                    e[i] = e[i] + Lanes::lit(*factor) * *z;
+                    sum = sum + Lanes::lit(*factor) * Lanes(*z);
                 }
             }
+            rest[0] = sum.0;
         }
-        e
     }
 
-    /// The noise of one sample, `[H]`.
-    pub fn sample(&self, stream: Stream, iteration: u32, sample: u32) -> Vec<[f32; NU]> {
+    /// The noise of one sample, `[H, controls]`.
+    pub fn sample(&self, stream: Stream, iteration: u32, sample: u32) -> Vec<f32> {
         let mut normals = vec![Lanes([0.0; 1]); self.room()];
-        let mut noise = vec![[Lanes([0.0; 1]); NU]; self.horizon];
+        let mut noise = vec![[0.0; 1]; self.horizon * self.controls];
         self.fill::<Lanes<1>, 1>((stream, iteration), sample, &mut normals, &mut noise);
-        noise.into_iter().map(|e| e.map(|lane| lane.0[0])).collect()
+        noise.into_flattened()
     }
-}
-
-/// The draw number `draw`.
-#[inline(always)]
-fn vector<const N: usize, const NU: usize>(normals: &[Lanes<N>], draw: usize) -> [Lanes<N>; NU] {
-    let mut z = [Lanes([0.0; N]); NU];
-    z.copy_from_slice(&normals[draw * NU..][..NU]);
-    z
 }
 
 /// The weighted sum of the knots of a step.
 #[inline(always)]
-fn between<const N: usize, const NU: usize>(
+fn between<const N: usize>(
     normals: &[Lanes<N>],
     knots: usize,
     row: &SplineRow,
-) -> [Lanes<N>; NU] {
-    let mut z = [Lanes([0.0; N]); NU];
+    z: &mut [[f32; N]],
+) {
+    let count = z.len();
+    z.fill([0.0; N]);
     for (k, weight) in row.weights.iter().enumerate().take(knots - row.first as usize) {
-        let knot = vector::<N, NU>(normals, row.first as usize + k);
+        let knot = &normals[(row.first as usize + k) * count..][..count];
         for (z, knot) in z.iter_mut().zip(knot) {
-            *z = *z + Lanes::lit(*weight) * knot;
+            *z = (Lanes(*z) + Lanes::lit(*weight) * *knot).0;
         }
     }
-    z
 }
 
 /// Autoregression with correlation time `time`.

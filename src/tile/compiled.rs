@@ -50,24 +50,24 @@ where
 }
 
 /// The rows of a frame as far as a tile fills them, in blocks.
-struct Blocks<'a> {
+pub(super) struct Blocks<'a> {
     cells: &'a [Cell<Block>],
     /// Blocks of a row.
     stride: usize,
     /// Blocks of a row that trajectories are in.
-    length: usize,
+    pub(super) length: usize,
 }
 
 impl<'a> Blocks<'a> {
     #[inline(always)]
-    fn new(frame: &'a mut Frame, lanes: usize) -> Self {
+    pub(super) fn new(frame: &'a mut Frame, lanes: usize) -> Self {
         let stride = frame.width() / GRANULE;
         Self { cells: frame.blocks(), stride, length: lanes.div_ceil(GRANULE) }
     }
 
     /// `R` rows from `first` on. Cut once, so that the loop over the blocks checks no bounds.
     #[inline(always)]
-    fn rows<const R: usize>(&self, first: usize) -> [&'a [Cell<Block>]; R] {
+    pub(super) fn rows<const R: usize>(&self, first: usize) -> [&'a [Cell<Block>]; R] {
         let mut rows = [&self.cells[..0]; R];
         for (i, row) in rows.iter_mut().enumerate() {
             *row = &self.cells[(first + i) * self.stride..][..self.length];
@@ -78,7 +78,11 @@ impl<'a> Blocks<'a> {
 
 /// The vectors of `rows` from number `at` of a block on.
 #[inline(always)]
-fn load<V: Vector, const R: usize>(rows: &[&[Cell<Block>]; R], block: usize, at: usize) -> [V; R] {
+pub(super) fn load<V: Vector, const R: usize>(
+    rows: &[&[Cell<Block>]; R],
+    block: usize,
+    at: usize,
+) -> [V; R] {
     let mut vectors = [V::lit(0.0); R];
     for (vector, row) in vectors.iter_mut().zip(rows) {
         *vector = V::load(&row[block].get()[at..]);
@@ -88,7 +92,7 @@ fn load<V: Vector, const R: usize>(rows: &[&[Cell<Block>]; R], block: usize, at:
 
 /// Writes `vectors` to `rows` from number `at` of a block on.
 #[inline(always)]
-fn store<V: Vector, const R: usize>(
+pub(super) fn store<V: Vector, const R: usize>(
     vectors: [V; R],
     rows: &[&[Cell<Block>]; R],
     block: usize,

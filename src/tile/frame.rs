@@ -54,12 +54,40 @@ pub(crate) enum Clock {
     Ignored,
 }
 
+/// Numbers that begin at a cache line.
+#[derive(Debug)]
+pub(crate) struct Aligned {
+    numbers: Vec<f32>,
+    /// Where they begin.
+    begin: usize,
+}
+
+impl Aligned {
+    /// `count` zeros.
+    pub(crate) fn zeros(count: usize) -> Self {
+        let numbers = vec![0.0; count + LINE / size_of::<f32>()];
+        // A place beyond the allowance cannot be: then they begin where they do.
+        let begin = numbers.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
+        Self { numbers, begin }
+    }
+
+    /// All of them, and perhaps a few zeros behind.
+    #[inline(always)]
+    pub(crate) fn all(&self) -> &[f32] {
+        &self.numbers[self.begin..]
+    }
+
+    /// The same to write to.
+    #[inline(always)]
+    pub(crate) fn all_mut(&mut self) -> &mut [f32] {
+        &mut self.numbers[self.begin..]
+    }
+}
+
 /// Rows of `width` numbers, one for each trajectory, as a [`Layout`] says.
 #[derive(Debug)]
 pub(crate) struct Frame {
-    numbers: Vec<f32>,
-    /// Where the first row begins in `numbers`.
-    begin: usize,
+    numbers: Aligned,
     width: usize,
     layout: Layout,
 }
@@ -68,10 +96,7 @@ impl Frame {
     /// Zeros for tiles of up to `lanes` trajectories.
     pub(crate) fn new(layout: Layout, lanes: usize) -> Self {
         let width = lanes.next_multiple_of(GRANULE);
-        let numbers = vec![0.0; layout.rows() * width + LINE / size_of::<f32>()];
-        // A place beyond the allowance cannot be: then rows begin where they do.
-        let begin = numbers.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
-        Self { numbers, begin, width, layout }
+        Self { numbers: Aligned::zeros(layout.rows() * width), width, layout }
     }
 
     /// Numbers of a row.
@@ -107,13 +132,13 @@ impl Frame {
     /// All rows, one after the other, `[rows, width]`.
     #[inline(always)]
     pub(crate) fn rows(&self) -> &[f32] {
-        &self.numbers[self.begin..]
+        self.numbers.all()
     }
 
     /// The same to write to.
     #[inline(always)]
     pub(crate) fn rows_mut(&mut self) -> &mut [f32] {
-        &mut self.numbers[self.begin..]
+        self.numbers.all_mut()
     }
 
     /// The rows in blocks, `[rows, width / GRANULE]`: cells, as formulas write rows that they read.

@@ -3,11 +3,13 @@
 mod compiled;
 mod frame;
 mod native;
+mod stages;
 mod tape;
 
 pub(crate) use compiled::{CompiledPolicy, CompiledSystem};
-pub(crate) use frame::{Clock, Frame, Layout};
+pub(crate) use frame::{Aligned, Clock, Frame, Layout};
 pub(crate) use native::{NativeFormula, NativeSystem};
+pub(crate) use stages::{CompiledStages, NativeStages, Stages, cell_cost, clipped, noise_cost};
 pub(crate) use tape::{Source, Tape};
 
 /// Smallest number of trajectories of a tile; widths are multiples of it.

@@ -2,7 +2,6 @@
 
 use crate::policy::Mlp;
 use crate::real::Real;
-use crate::rollout::Disturbance;
 use crate::system::{Axis, System};
 
 /// `x` after the disturbance `d` has pushed it: `x + sum_j scale_j d_j` on the named coordinates.
@@ -22,7 +21,8 @@ pub fn pushed<R: Real, const NX: usize>(
 #[derive(Clone, Copy, Debug)]
 pub struct Disturbed<'a, S> {
     system: &'a S,
-    disturbance: Disturbance<'a>,
+    network: &'a Mlp,
+    entries: &'a [(usize, f32)],
 }
 
 impl<'a, S> Disturbed<'a, S> {
@@ -32,7 +32,7 @@ impl<'a, S> Disturbed<'a, S> {
     /// If the network has not one output for each of them.
     pub fn new(system: &'a S, network: &'a Mlp, entries: &'a [(usize, f32)]) -> Self {
         assert_eq!(network.widths().last(), Some(&entries.len()), "outputs of the disturbance");
-        Self { system, disturbance: Disturbance { network, entries } }
+        Self { system, network, entries }
     }
 }
 
@@ -51,8 +51,7 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> System<NX, NU> for Dis
 
     #[inline(always)]
     fn step<R: Real>(&self, x: [R; NX], u: [R; NU]) -> [R; NX] {
-        let Disturbance { network, entries } = self.disturbance;
-        pushed(self.system.step(x, u), entries, &network.forward(&x))
+        pushed(self.system.step(x, u), self.entries, &self.network.forward(&x))
     }
 
     #[inline(always)]

@@ -9,9 +9,10 @@ use reachcast::cost::Quadratic;
 use reachcast::policy::Activation;
 use reachcast::rollout::{
     CostQuery, DeviationTask, Farthest, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask,
-    PairControl, PairMeasure, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Stream,
+    PairControl, PairMeasure, Pairs, Planning, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec,
+    Stream,
 };
-use reachcast::system::{DoubleIntegrator, DroneRace};
+use reachcast::system::{DoubleIntegrator, DroneRace, System};
 use reachcast::{Error, Fault, Result};
 
 use crate::{drawn, gpu, ramp, random_network, whole_box};
@@ -49,7 +50,7 @@ struct Found {
     values: Vec<f32>,
     pairs: Vec<PairMeasure>,
     farthest: Vec<Farthest>,
-    plans: Vec<MppiResult<1>>,
+    plans: Vec<MppiResult>,
 }
 
 impl Found {
@@ -125,18 +126,16 @@ fn pairs(backend: &Backend, found: &mut Found) -> Result<()> {
 fn plans(backend: &Backend, found: &mut Found) -> Result<()> {
     let system = DoubleIntegrator::default();
     let cost = Quadratic { state: [2.0, 0.5], control: [0.1], last: [20.0, 5.0], obstacle: None };
-    let spec = MppiSpec::new(MppiSettings::new(&system, 100, 8)).expect("settings");
-    let problem = |number: u32| MppiProblem {
-        start: [0.1 * number as f32, -0.2],
-        plan: vec![[0.1]; 8],
-        context: vec![[0.0; 3]; 8],
-        stream: Stream::new(63, Purpose::ControlNoise, number),
+    let settings = MppiSettings::new(&system.controls(), 100, 8);
+    let planning =
+        Planning::of::<_, _, 2, 1, 3>(&system, cost, MppiSpec::new(settings).expect("settings"));
+    let problem = |number: u32| {
+        let stream = Stream::new(63, Purpose::ControlNoise, number);
+        MppiProblem::new([0.1 * number as f32, -0.2], &[[0.1]; 8], &[[0.0; 3]; 8], stream)
     };
     let problems: Vec<_> = (0..PROBLEMS).map(problem).collect();
-    let (value, disturbance, costs) = (None, None, CostQuery::Each);
-    let task =
-        MppiTask { spec: &spec, problems: &problems, iteration: 0, value, disturbance, costs };
-    found.plans = backend.mppi(&system, &cost, &task)?;
+    let task = MppiTask { problems: &problems, iteration: 0, costs: CostQuery::Each };
+    found.plans = backend.prepare_plans(&planning)?.improve(&task)?;
     assert_eq!(found.plans.len(), problems.len(), "problems, each once");
     Ok(())
 }

@@ -1,18 +1,19 @@
 //! MPPI on an adapter against an f64 loop over the same controls, and what its chunks hold.
 
 use std::f32::consts::TAU;
+use std::sync::Arc;
 
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::cost::{
-    CenterlineCost, Cost, Fence, LaneCost, Obstacle, Quadratic, RACE_CONTEXT, RaceCost,
-    RaceReference, RecoveryCost, Safety, SafetyCone,
+    CenterlineCost, Cost, Fence, LaneCost, Obstacle, Quadratic, RaceCost, RaceReference,
+    RecoveryCost, Safety, SafetyCone,
 };
 use reachcast::policy::{Activation, Mlp};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
-    Purpose, Sigma, Stream, ValueTerm,
+    Planning, Purpose, Sigma, Stream, ValueTerm,
 };
 use reachcast::system::{DoubleIntegrator, DroneRace, System};
 
@@ -27,38 +28,32 @@ fn stream(number: u32) -> Stream {
     Stream::new(0x1_2345_6789, Purpose::ControlNoise, number)
 }
 
-fn task<'a, const NX: usize, const NU: usize, const NC: usize>(
-    spec: &'a MppiSpec<NU>,
-    problems: &'a [MppiProblem<NX, NU, NC>],
-) -> MppiTask<'a, NX, NU, NC> {
-    MppiTask {
-        spec,
-        problems,
-        iteration: 3,
-        value: None,
-        disturbance: None,
-        costs: CostQuery::Each,
-    }
+fn task(problems: &[MppiProblem]) -> MppiTask<'_> {
+    MppiTask { problems, iteration: 3, costs: CostQuery::Each }
 }
 
-/// Runs `task` on the adapter, if there is one, and holds every problem against f64.
+fn improve(backend: &Backend, planning: &Planning, task: &MppiTask<'_>) -> Vec<MppiResult> {
+    backend.prepare_plans(planning).and_then(|program| program.improve(task)).expect("it runs")
+}
+
+/// Runs `problems` on the adapter, if there is one, and holds every problem against f64.
 fn agree<S, C, const NX: usize, const NU: usize, const NC: usize>(
     system: &S,
     cost: &C,
-    task: &MppiTask<'_, NX, NU, NC>,
+    planning: &Planning,
+    problems: &[MppiProblem],
 ) where
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
     let Some(gpu) = gpu() else { return };
-    let results = Backend::Gpu(gpu).mppi(system, cost, task).expect("the adapter runs it");
-    let twins = host().mppi(system, cost, task).expect("the host runs it");
-    assert_eq!(results.len(), task.problems.len());
-    let settings = task.spec.settings();
-    let scales = (settings.temperature, settings.bounds);
+    let task = task(problems);
+    let results = improve(&Backend::Gpu(gpu), planning, &task);
+    let twins = improve(&host(), planning, &task);
+    assert_eq!(results.len(), problems.len());
     for (number, (result, twin)) in results.iter().zip(&twins).enumerate() {
-        let truth = truth((system, cost), task, number);
-        differences(&truth, result, twin, scales)
+        let truth = truth((system, cost), planning, (&problems[number], task.iteration));
+        differences(&truth, result, twin, planning.spec.settings())
             .unwrap_or_else(|e| panic!("problem {number}: {e}"));
     }
 }
@@ -69,29 +64,28 @@ fn quadratic() -> Quadratic<2, 1> {
 }
 
 /// A problem of the double integrator with a plan and a reference that differ at every step.
-fn integrator_problem(number: u32, horizon: u32) -> MppiProblem<2, 1, 3> {
+fn integrator_problem(number: u32, horizon: u32) -> MppiProblem {
     let phase = |t: u32| 0.3 * (t + 7 * number) as f32;
     let last = |t: u32| f32::from(u8::from(t + 1 == horizon));
-    MppiProblem {
-        start: [0.8 - 0.3 * number as f32, 0.2 * number as f32 - 0.5],
-        plan: (0..horizon).map(|t| [0.4 * phase(t).sin()]).collect(),
-        context: (0..horizon).map(|t| [0.2 * phase(t).cos(), 0.0, last(t)]).collect(),
-        stream: stream(number),
-    }
+    let start = [0.8 - 0.3 * number as f32, 0.2 * number as f32 - 0.5];
+    let plan: Vec<_> = (0..horizon).map(|t| [0.4 * phase(t).sin()]).collect();
+    let context: Vec<_> = (0..horizon).map(|t| [0.2 * phase(t).cos(), 0.0, last(t)]).collect();
+    MppiProblem::new(start, &plan, &context, stream(number))
 }
 
 /// The double integrator under `change`d settings: `problems` problems.
 fn integrator(
     (samples, horizon, problems): (u32, u32, u32),
-    change: impl FnOnce(&mut MppiSettings<1>),
+    change: impl FnOnce(&mut MppiSettings),
 ) {
     let system = DoubleIntegrator::default();
-    let mut settings = MppiSettings::new(&system, samples, horizon);
+    let mut settings = MppiSettings::new(&system.controls(), samples, horizon);
     settings.temperature = 0.5 + 0.1 * horizon as f32;
     change(&mut settings);
     let spec = MppiSpec::new(settings).expect("settings");
     let problems: Vec<_> = (0..problems).map(|i| integrator_problem(i, horizon)).collect();
-    agree(&system, &quadratic(), &task(&spec, &problems));
+    let planning = Planning::of::<_, _, 2, 1, 3>(&system, quadratic(), spec);
+    agree::<_, _, 2, 1, 3>(&system, &quadratic(), &planning, &problems);
 }
 
 #[test]
@@ -141,7 +135,7 @@ fn families() -> [RaceCost; 3] {
 }
 
 /// A problem of the race close to the gate and to the opponent.
-fn race_problem(number: u32, horizon: u32) -> MppiProblem<12, 3, RACE_CONTEXT> {
+fn race_problem(number: u32, horizon: u32) -> MppiProblem {
     let shift = 0.1 * number as f32;
     let wave = |t: u32, i: u32| 0.3 * (TAU * (t + 5 * i + number) as f32 / 11.0).sin();
     let reference = |t: u32| RaceReference {
@@ -150,12 +144,10 @@ fn race_problem(number: u32, horizon: u32) -> MppiProblem<12, 3, RACE_CONTEXT> {
         speed: 0.9 - shift,
         last: t + 1 == horizon,
     };
-    MppiProblem {
-        start: [0.3 - shift, 0.1, -0.9, 0.6, 0.2, -0.1, 0.1, 0.0, -0.7 + shift, 0.4, 0.25, 0.0],
-        plan: (0..horizon).map(|t| [wave(t, 0), wave(t, 1), wave(t, 2)]).collect(),
-        context: (0..horizon).map(|t| reference(t).context()).collect(),
-        stream: stream(100 + number),
-    }
+    let start = [0.3 - shift, 0.1, -0.9, 0.6, 0.2, -0.1, 0.1, 0.0, -0.7 + shift, 0.4, 0.25, 0.0];
+    let plan: Vec<_> = (0..horizon).map(|t| [wave(t, 0), wave(t, 1), wave(t, 2)]).collect();
+    let context: Vec<_> = (0..horizon).map(|t| reference(t).context()).collect();
+    MppiProblem::new(start, &plan, &context, stream(100 + number))
 }
 
 /// The race with `cost`: three problems, with networks where they are given.
@@ -163,25 +155,22 @@ fn race(
     cost: &RaceCost,
     (samples, horizon): (u32, u32),
     networks: [Option<&Mlp>; 2],
-    change: impl FnOnce(&mut MppiSettings<3>),
+    change: impl FnOnce(&mut MppiSettings),
 ) {
     let system = DroneRace::default();
-    let mut settings = MppiSettings::new(&system, samples, horizon);
+    let mut settings = MppiSettings::new(&system.controls(), samples, horizon);
     settings.temperature = 3.0;
     change(&mut settings);
     let spec = MppiSpec::new(settings).expect("settings");
     let problems: Vec<_> = (0..3).map(|i| race_problem(i, horizon)).collect();
-    let [value, disturbance] = networks;
-    let entries = [(7, 0.05), (9, 0.1), (11, -0.05)];
-    agree(
-        &system,
-        cost,
-        &MppiTask {
-            value: value.map(|network| ValueTerm { network, weight: 4.0, threshold: 0.3 }),
-            disturbance: disturbance.map(|network| Disturbance { network, entries: &entries }),
-            ..task(&spec, &problems)
-        },
-    );
+    let [value, disturbance] = networks.map(|network| network.cloned().map(Arc::new));
+    let entries = vec![(7, 0.05), (9, 0.1), (11, -0.05)];
+    let planning = Planning {
+        value: value.map(|network| ValueTerm { network, weight: 4.0, threshold: 0.3 }),
+        disturbance: disturbance.map(|network| Disturbance { network, entries }),
+        ..Planning::of(&system, *cost, spec)
+    };
+    agree(&system, cost, &planning, &problems);
 }
 
 #[test]
@@ -190,13 +179,14 @@ fn race_families() {
         race(&cost, (150, 20), [None; 2], |_| {});
     }
     let covariance = [[0.2, 0.05, -0.03], [0.05, 0.1, 0.02], [-0.03, 0.02, 0.3]];
+    let covariance = Sigma::Covariance(covariance.map(|row| row.to_vec()).to_vec());
     race(&families()[2], (150, 20), [None; 2], |settings| {
-        settings.sigma = Sigma::Covariance(covariance);
+        settings.sigma = covariance.clone();
         settings.noise_cost = true;
         settings.antithetic = true;
     });
     race(&families()[0], (100, 20), [None; 2], |settings| {
-        settings.sigma = Sigma::Covariance(covariance);
+        settings.sigma = covariance;
         settings.noise = NoiseKind::Spline { knots: 6 };
     });
 }
@@ -217,6 +207,7 @@ fn networks_along_the_rollout() {
 }
 
 /// One control per state, `x' = x + u / 10`; the cost is `|x - context|^2`.
+#[derive(Clone)]
 struct Drift<const N: usize>;
 
 impl<const N: usize> System<N, N> for Drift<N> {
@@ -251,14 +242,14 @@ impl<const N: usize> Cost<N, N, 1> for Drift<N> {
 /// split, and the noise has to survive that.
 fn split<const N: usize>(noise: NoiseKind) {
     let system = Drift::<N>;
-    let mut settings = MppiSettings::new(&system, 66, 512);
+    let mut settings = MppiSettings::new(&system.controls(), 66, 512);
     settings.temperature = 50.0;
     settings.noise = noise;
     let spec = MppiSpec::new(settings).expect("settings");
-    let context = (0..512).map(|t| [0.3 * (0.01 * t as f32).sin()]).collect();
-    let problem =
-        MppiProblem { start: [0.4; N], plan: vec![[-0.02; N]; 512], context, stream: stream(9) };
-    agree(&system, &system, &task(&spec, &[problem]));
+    let context: Vec<_> = (0..512).map(|t| [0.3 * (0.01 * t as f32).sin()]).collect();
+    let problem = MppiProblem::new([0.4; N], &[[-0.02; N]; 512], &context, stream(9));
+    let planning = Planning::of(&system, system.clone(), spec);
+    agree(&system, &system, &planning, &[problem]);
 }
 
 #[test]
@@ -273,15 +264,22 @@ fn plans_split_over_dispatches() {
 fn chunked(problems: u32, samples: u32, value: Option<&Mlp>) {
     let Some(gpu) = gpu() else { return };
     let system = DoubleIntegrator::default();
-    let mut settings = MppiSettings::new(&system, samples, 3);
+    let mut settings = MppiSettings::new(&system.controls(), samples, 3);
     settings.temperature = 2.0;
     settings.antithetic = true;
     let spec = MppiSpec::new(settings).expect("settings");
     let problems: Vec<_> = (0..problems).map(|i| integrator_problem(i % 8, 3)).collect();
-    let term = |network| ValueTerm { network, weight: 2.0, threshold: 0.5 };
-    let task = MppiTask { value: value.map(term), ..task(&spec, &problems) };
-    let device = Backend::Gpu(gpu).mppi(&system, &quadratic(), &task).expect("chunks run");
-    let host = host().mppi(&system, &quadratic(), &task).expect("the host runs");
+    let term = |network: &Mlp| ValueTerm {
+        network: Arc::new(network.clone()),
+        weight: 2.0,
+        threshold: 0.5,
+    };
+    let planning = Planning {
+        value: value.map(term),
+        ..Planning::of::<_, _, 2, 1, 3>(&system, quadratic(), spec)
+    };
+    let device = improve(&Backend::Gpu(gpu), &planning, &task(&problems));
+    let host = improve(&host(), &planning, &task(&problems));
     assert_eq!(device.len(), problems.len());
     for (number, (device, host)) in device.iter().zip(&host).enumerate() {
         assert_eq!(device.costs.len(), samples as usize);
@@ -295,10 +293,10 @@ fn chunked(problems: u32, samples: u32, value: Option<&Mlp>) {
     }
 }
 
-fn close<const NU: usize>(device: &MppiResult<NU>, host: &MppiResult<NU>, band: f32) {
+fn close(device: &MppiResult, host: &MppiResult, band: f32) {
     let relative = (device.effective_samples / host.effective_samples - 1.0).abs();
     assert!(relative <= 1e-3, "{} {}", device.effective_samples, host.effective_samples);
-    for (a, b) in device.plan.iter().flatten().zip(host.plan.iter().flatten()) {
+    for (a, b) in device.plan.iter().zip(&host.plan) {
         assert!((a - b).abs() <= band, "{a}, host {b}");
     }
 }
@@ -317,24 +315,25 @@ fn chunks_of_samples_and_of_problems() {
 fn summaries_leave_the_costs_away() {
     let Some(gpu) = gpu() else { return };
     let system = DoubleIntegrator::default();
-    let spec = MppiSpec::new(MppiSettings::new(&system, 100, 5)).expect("settings");
+    let spec = MppiSpec::new(MppiSettings::new(&system.controls(), 100, 5)).expect("settings");
     let problems = [integrator_problem(0, 5)];
-    let task = MppiTask { costs: CostQuery::Summary, ..task(&spec, &problems) };
+    let task = MppiTask { costs: CostQuery::Summary, ..task(&problems) };
     let backend = Backend::Gpu(gpu);
-    let run = |task: &MppiTask<'_, 2, 1, 3>| {
-        backend.mppi(&system, &quadratic(), task).expect("it runs").swap_remove(0)
-    };
+    let planning = Planning::of::<_, _, 2, 1, 3>(&system, quadratic(), spec);
+    let program = backend.prepare_plans(&planning).expect("a program");
+    let run = |task: &MppiTask<'_>| program.improve(task).expect("it runs").swap_remove(0);
     let first = run(&task);
     assert!(first.costs.is_empty());
-    close(&first, &host().mppi(&system, &quadratic(), &task).expect("it runs")[0], 1e-5);
+    close(&first, &improve(&host(), &planning, &task)[0], 1e-5);
     assert_eq!(first, run(&task), "the same bits again");
     let next = run(&MppiTask { iteration: 4, ..task });
     assert_ne!(first.plan, next.plan, "each iteration has noise of its own");
     let none = MppiTask { problems: &[], ..task };
-    assert!(backend.mppi(&system, &quadratic(), &none).expect("nothing to do").is_empty());
+    assert!(program.improve(&none).expect("nothing to do").is_empty());
 }
 
 /// Infinite where a control is above the context.
+#[derive(Clone)]
 struct Cliff;
 
 impl Cost<2, 1, 1> for Cliff {
@@ -349,37 +348,35 @@ fn costs_that_are_not_finite_have_no_weight() {
     let Some(gpu) = gpu() else { return };
     let backend = Backend::Gpu(gpu);
     let system = DoubleIntegrator::default();
-    let spec = MppiSpec::new(MppiSettings::new(&system, 100, 4)).expect("settings");
-    let problem = |number, edge: f32| MppiProblem {
-        start: [0.1, 0.0],
-        plan: vec![[0.05]; 4],
-        context: vec![[edge]; 4],
-        stream: stream(number),
+    let spec = MppiSpec::new(MppiSettings::new(&system.controls(), 100, 4)).expect("settings");
+    let problem = |number, edge: f32| {
+        MppiProblem::new([0.1, 0.0], &[[0.05]; 4], &[[edge]; 4], stream(number))
     };
     // Some above the edge, all above it, none.
     let problems = [problem(0, 0.2), problem(1, -2.0), problem(2, 2.0)];
-    let task = task(&spec, &problems);
-    let device = backend.mppi(&system, &Cliff, &task).expect("it runs");
+    let (task, planning) = (task(&problems), Planning::of(&system, Cliff, spec));
+    let device = improve(&backend, &planning, &task);
     for (number, result) in device.iter().enumerate() {
         let over = |k: u32| {
-            let edge = problems[number].context[0][0];
-            task.controls(number, k).iter().any(|[u]| *u > edge)
+            let edge = problems[number].context[0];
+            planning.controls(&problems[number], 3, k).iter().any(|u| *u > edge)
         };
         let lost: Vec<bool> = (0..100).map(over).collect();
         let infinite: Vec<bool> = result.costs.iter().map(|cost| cost.is_infinite()).collect();
         assert_eq!(infinite, lost, "problem {number}");
         assert_eq!(result.non_finite as usize, lost.iter().filter(|lost| **lost).count());
-        assert!(result.plan.iter().flatten().all(|u| u.is_finite()));
+        assert!(result.plan.iter().all(|u| u.is_finite()));
     }
     assert!((1..100).contains(&device[0].non_finite), "{}", device[0].non_finite);
     assert_eq!(device[1].plan, problems[1].plan, "the nominal plan is kept");
     assert_eq!((device[1].effective_samples, device[1].best), (0.0, 0));
     assert!(device[1].least_cost.is_infinite());
-    let host = host().mppi(&system, &Cliff, &task).expect("it runs");
+    let host = improve(&host(), &planning, &task);
     close(&device[0], &host[0], 1e-5);
 }
 
 /// The cost is finite, and too large to count.
+#[derive(Clone)]
 struct Huge;
 
 impl Cost<2, 1, 1> for Huge {
@@ -391,17 +388,12 @@ impl Cost<2, 1, 1> for Huge {
 #[test]
 fn huge_costs_count_as_infinite_on_both_backends() {
     let system = DoubleIntegrator::default();
-    let spec = MppiSpec::new(MppiSettings::new(&system, 100, 1)).expect("settings");
-    let problems = [MppiProblem {
-        start: [0.0; 2],
-        plan: vec![[0.0]],
-        context: vec![[0.0]],
-        stream: stream(5),
-    }];
-    let task = task(&spec, &problems);
+    let spec = MppiSpec::new(MppiSettings::new(&system.controls(), 100, 1)).expect("settings");
+    let problems = [MppiProblem::new([0.0; 2], &[[0.0]], &[[0.0]], stream(5))];
+    let planning = Planning::of(&system, Huge, spec);
     let backends = std::iter::once(host()).chain(gpu().map(Backend::Gpu));
     for backend in backends {
-        let result = backend.mppi(&system, &Huge, &task).expect("it runs").swap_remove(0);
+        let result = improve(&backend, &planning, &task(&problems)).swap_remove(0);
         let infinite = result.costs.iter().filter(|cost| cost.is_infinite()).count();
         assert_eq!(infinite, result.non_finite as usize, "{}", backend.name());
         assert!((1..100).contains(&infinite));

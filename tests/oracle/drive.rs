@@ -3,9 +3,9 @@
 use reachcast::backend::Backend;
 use reachcast::cost::{CostMap, GoalCost, Grid};
 use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Purpose, Sigma, Stream,
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Planning, Purpose, Sigma, Stream,
 };
-use reachcast::system::DiffDrive;
+use reachcast::system::{DiffDrive, System};
 
 use super::oracle::{differences, truth};
 
@@ -29,16 +29,14 @@ fn cost() -> GoalCost {
 }
 
 /// A problem that starts in the middle of the map, or on its way across a border.
-fn problem(number: u32) -> MppiProblem<3, 2, 3> {
+fn problem(number: u32) -> MppiProblem {
     let starts = [[0.31, 0.23, 0.5], [1.83, 1.17, 0.1], [0.63, 1.31, 1.5], [-0.93, -0.53, -2.3]];
     let start = starts[number as usize];
     let wave = |t: u32| (0.3 * (t + 5 * number) as f32).sin();
-    MppiProblem {
-        start,
-        plan: (0..HORIZON).map(|t| [1.2 + 0.5 * wave(t), 1.5 * wave(2 * t)]).collect(),
-        context: (0..HORIZON).map(|t| [1.5 + 0.1 * wave(t), 0.4, 3.0 - 0.05 * t as f32]).collect(),
-        stream: Stream::new(11, Purpose::ControlNoise, number),
-    }
+    let plan: Vec<_> = (0..HORIZON).map(|t| [1.2 + 0.5 * wave(t), 1.5 * wave(2 * t)]).collect();
+    let goal = |t: u32| [1.5 + 0.1 * wave(t), 0.4, 3.0 - 0.05 * t as f32];
+    let context: Vec<_> = (0..HORIZON).map(goal).collect();
+    MppiProblem::new(start, &plan, &context, Stream::new(11, Purpose::ControlNoise, number))
 }
 
 /// What is wrong with the plans of `backend`, against f64 and, for an adapter, against `host`.
@@ -46,31 +44,28 @@ pub(crate) fn disagreement(backend: &Backend, host: &Backend) -> Result<(), Stri
     let (system, cost) = (system(), cost());
     let settings = MppiSettings {
         temperature: 20.0,
-        sigma: Sigma::PerControl([0.8, 2.0]),
+        sigma: Sigma::PerControl(vec![0.8, 2.0]),
         noise_cost: true,
-        ..MppiSettings::new(&system, 70, HORIZON)
+        ..MppiSettings::new(&system.controls(), 70, HORIZON)
     };
-    let spec = MppiSpec::new(settings).expect("settings");
+    let spec = MppiSpec::new(settings.clone()).expect("settings");
+    let planning = Planning::of(&system, cost.clone(), spec);
     let problems: Vec<_> = (0..4).map(problem).collect();
-    let task = MppiTask {
-        spec: &spec,
-        problems: &problems,
-        iteration: 2,
-        value: None,
-        disturbance: None,
-        costs: CostQuery::Each,
+    let task = MppiTask { problems: &problems, iteration: 2, costs: CostQuery::Each };
+    let run = |backend: &Backend| {
+        let program = backend.prepare_plans(&planning).map_err(|e| e.to_string())?;
+        program.improve(&task).map_err(|e| e.to_string())
     };
-    let run = |backend: &Backend| backend.mppi(&system, &cost, &task).map_err(|e| e.to_string());
-    let scales = (settings.temperature, settings.bounds);
     for (number, (result, host)) in run(backend)?.iter().zip(&run(host)?).enumerate() {
-        let truth = truth((&system, &cost), &task, number);
+        let truth = truth((&system, &cost), &planning, (&problems[number], 2));
         let largest = truth.costs.iter().copied().fold(1.0, f64::max);
         for (cost, truth) in host.costs.iter().zip(&truth.costs) {
             if (f64::from(*cost) - truth).abs() > 1e-5 * largest {
                 return Err(format!("problem {number}: the host has {cost}, f64 {truth}"));
             }
         }
-        differences(&truth, result, host, scales).map_err(|e| format!("problem {number}: {e}"))?;
+        differences(&truth, result, host, &settings)
+            .map_err(|e| format!("problem {number}: {e}"))?;
     }
     Ok(())
 }

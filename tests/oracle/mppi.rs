@@ -1,29 +1,32 @@
 //! MPPI in f64, one sample after the other, and how far an adapter may lie from it.
 
+use std::array::from_fn;
+
 use nalgebra::DMatrix;
 use reachcast::cost::{Cost, CostMap};
-use reachcast::rollout::{MppiResult, MppiTask, Sigma};
+use reachcast::rollout::{MppiProblem, MppiResult, MppiSettings, Planning, Sigma};
 use reachcast::system::System;
 
-/// What a problem gives in f64; controls are those of `task.controls`, in f32.
-pub(crate) struct Truth<const NU: usize> {
+/// What a problem gives in f64; controls are those of [`Planning::controls`], in f32.
+pub(crate) struct Truth {
     pub(crate) costs: Vec<f64>,
-    pub(crate) plan: Vec<[f64; NU]>,
+    /// `[H, controls]`.
+    pub(crate) plan: Vec<f64>,
     pub(crate) effective_samples: f64,
     pub(crate) mean: f64,
 }
 
 /// `lambda Sigma^-1`, if noise costs.
-fn penalty<const NX: usize, const NU: usize, const NC: usize>(
-    task: &MppiTask<'_, NX, NU, NC>,
-) -> Option<DMatrix<f64>> {
-    let settings = task.spec.settings();
-    let sigma = match settings.sigma {
-        Sigma::PerControl(sigma) => {
-            DMatrix::from_fn(NU, NU, |i, j| if i == j { f64::from(sigma[i]).powi(2) } else { 0.0 })
-        }
-        Sigma::Covariance(rows) => DMatrix::from_fn(NU, NU, |i, j| f64::from(rows[i][j])),
-    };
+fn penalty(planning: &Planning) -> Option<DMatrix<f64>> {
+    let settings = planning.spec.settings();
+    let count = planning.spec.controls();
+    let sigma =
+        match &settings.sigma {
+            Sigma::PerControl(sigma) => DMatrix::from_fn(count, count, |i, j| {
+                if i == j { f64::from(sigma[i]).powi(2) } else { 0.0 }
+            }),
+            Sigma::Covariance(rows) => DMatrix::from_fn(count, count, |i, j| f64::from(rows[i][j])),
+        };
     let inverse = sigma.try_inverse()? * f64::from(settings.temperature);
     settings.noise_cost.then_some(inverse)
 }
@@ -50,40 +53,39 @@ fn charged(map: &CostMap, [x, y]: [f64; 2]) -> f64 {
 /// The cost of a sample.
 fn cost_of<S, C, const NX: usize, const NU: usize, const NC: usize>(
     (system, cost): (&S, &C),
-    task: &MppiTask<'_, NX, NU, NC>,
-    number: usize,
-    controls: &[[f32; NU]],
+    planning: &Planning,
+    problem: &MppiProblem,
+    controls: &[f32],
 ) -> f64
 where
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
-    let problem = &task.problems[number];
-    let penalty = penalty(task);
-    let mut x = problem.start.map(f64::from);
+    let penalty = penalty(planning);
+    let mut x: [f64; NX] = from_fn(|i| f64::from(problem.start[i]));
     let mut total = 0.0;
-    for (t, u) in controls.iter().enumerate() {
+    for (t, u) in controls.as_chunks::<NU>().0.iter().enumerate() {
         let u = u.map(f64::from);
-        let value = task.value.map(|term| term.network.forward(&x)[0]);
-        let push = task.disturbance.map(|asked| asked.network.forward(&x));
-        total += cost.stage(x, u, problem.context[t].map(f64::from));
+        let value = planning.value.as_ref().map(|term| term.network.forward(&x)[0]);
+        let push = planning.disturbance.as_ref().map(|asked| asked.network.forward(&x));
+        total += cost.stage(x, u, from_fn(|i| f64::from(problem.context[t * NC + i])));
         if let Some((map, place)) = cost.map(x) {
             total += charged(map, place);
         }
         if let Some(penalty) = &penalty {
-            let nominal = problem.plan[t].map(f64::from);
+            let nominal: [f64; NU] = from_fn(|i| f64::from(problem.plan[t * NU + i]));
             for i in 0..NU {
                 for j in 0..NU {
                     total += nominal[i] * penalty[(i, j)] * (u[j] - nominal[j]);
                 }
             }
         }
-        if let (Some(term), Some(value)) = (task.value, value) {
+        if let (Some(term), Some(value)) = (&planning.value, value) {
             let short = f64::max(0.0, f64::from(term.threshold) - value);
             total += f64::from(term.weight) * short * short;
         }
         x = system.step(x, u);
-        if let (Some(asked), Some(push)) = (task.disturbance, push) {
+        if let (Some(asked), Some(push)) = (&planning.disturbance, push) {
             for ((state, scale), push) in asked.entries.iter().zip(push) {
                 x[*state] += f64::from(*scale) * push;
             }
@@ -92,26 +94,27 @@ where
     total
 }
 
-/// The result of problem `number`, all samples of which have finite costs.
+/// The result of `problem` in an iteration, all samples of which have finite costs.
 pub(crate) fn truth<S, C, const NX: usize, const NU: usize, const NC: usize>(
     plant: (&S, &C),
-    task: &MppiTask<'_, NX, NU, NC>,
-    number: usize,
-) -> Truth<NU>
+    planning: &Planning,
+    (problem, iteration): (&MppiProblem, u32),
+) -> Truth
 where
     S: System<NX, NU>,
     C: Cost<NX, NU, NC>,
 {
-    let settings = task.spec.settings();
-    let controls: Vec<_> = (0..settings.samples).map(|k| task.controls(number, k)).collect();
-    let costs: Vec<f64> = controls.iter().map(|u| cost_of(plant, task, number, u)).collect();
+    let settings = planning.spec.settings();
+    let samples = 0..settings.samples;
+    let controls: Vec<_> = samples.map(|k| planning.controls(problem, iteration, k)).collect();
+    let costs: Vec<f64> = controls.iter().map(|u| cost_of(plant, planning, problem, u)).collect();
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
     let raw = |cost: &f64| (-(cost - least) / f64::from(settings.temperature)).exp();
     let weights: Vec<f64> = costs.iter().map(raw).collect();
     let sum: f64 = weights.iter().sum();
-    let mut plan = vec![[0.0; NU]; settings.horizon as usize];
+    let mut plan = vec![0.0; problem.plan.len()];
     for (weight, controls) in weights.iter().zip(&controls) {
-        for (mean, u) in plan.iter_mut().flatten().zip(controls.iter().flatten()) {
+        for (mean, u) in plan.iter_mut().zip(controls) {
             *mean += weight / sum * f64::from(*u);
         }
     }
@@ -125,12 +128,14 @@ where
 /// A GPU may contract products and adds up in another order, each of which changes rounding by a
 /// small factor: it may lie 8 times as far from f64 as the host's worst sample does. The floors are
 /// those of f32 sums of these lengths: 1e-6 of the largest cost, 1e-5 of a control's range.
-pub(crate) fn differences<const NU: usize>(
-    truth: &Truth<NU>,
-    result: &MppiResult<NU>,
-    host: &MppiResult<NU>,
-    (temperature, bounds): (f32, [[f32; 2]; NU]),
+pub(crate) fn differences(
+    truth: &Truth,
+    result: &MppiResult,
+    host: &MppiResult,
+    settings: &MppiSettings,
 ) -> Result<(), String> {
+    let MppiSettings { temperature, bounds, .. } = settings;
+    let temperature = *temperature;
     let apart = |a: &[f32]| -> f64 {
         let gaps = a.iter().zip(&truth.costs).map(|(a, b)| (f64::from(*a) - b).abs());
         gaps.fold(0.0, f64::max)
@@ -157,14 +162,13 @@ pub(crate) fn differences<const NU: usize>(
     let relative = 8.0 * band / f64::from(temperature) + 1e-5;
     let samples = truth.effective_samples;
     within("effective samples", result.effective_samples, samples, relative * samples)?;
-    for t in 0..truth.plan.len() {
-        for (i, [low, high]) in bounds.into_iter().enumerate() {
-            let range = f64::from(high - low);
-            let own = (f64::from(host.plan[t][i]) - truth.plan[t][i]).abs();
-            let band = 8.0 * own + (1e-5 + 2.0 * band / f64::from(temperature)) * range;
-            let what = format!("control {i} of step {t}");
-            within(&what, f64::from(result.plan[t][i]), truth.plan[t][i], band)?;
-        }
+    for (i, wanted) in truth.plan.iter().enumerate() {
+        let [low, high] = bounds[i % bounds.len()];
+        let range = f64::from(high - low);
+        let own = (f64::from(host.plan[i]) - wanted).abs();
+        let band = 8.0 * own + (1e-5 + 2.0 * band / f64::from(temperature)) * range;
+        let what = format!("control {} of step {}", i % bounds.len(), i / bounds.len());
+        within(&what, f64::from(result.plan[i]), *wanted, band)?;
     }
     Ok(())
 }

@@ -50,6 +50,16 @@ impl Inputs {
         self.sources.extend(rows.map(Source::Row));
         self
     }
+
+    /// The tape of `graph`, its outputs in `rows`; what lies between is in rows from `first_own` on.
+    pub(super) fn tape(&self, graph: &Graph, rows: &[usize], first_own: usize) -> Tape {
+        Tape::new(&[graph], &self.sources, rows, first_own)
+    }
+
+    /// The row of the steps taken.
+    pub(super) fn step(&self) -> usize {
+        self.layout.step()
+    }
 }
 
 /// A model's formulas as tapes.
@@ -108,7 +118,7 @@ impl InterpretedFormula {
     /// `first_own` on.
     pub(super) fn new(graph: &Graph, inputs: &Inputs, to: usize, first_own: usize) -> Self {
         let outputs: Vec<usize> = (to..to + graph.outputs.len()).collect();
-        let tape = Tape::new(&[graph], &inputs.sources, &outputs, first_own);
+        let tape = inputs.tape(graph, &outputs, first_own);
         Self { tape, layout: inputs.layout }
     }
 

@@ -188,32 +188,6 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
         }
     }
 
-    /// The outputs for the first `lanes` trajectories of the groups `x`, the first `outputs`
-    /// entries of `u`.
-    pub(super) fn forward_some<const N: usize, const NX: usize, const NU: usize>(
-        &mut self,
-        x: &[[Lanes<N>; NX]],
-        lanes: usize,
-        u: &mut [[Lanes<N>; NU]],
-        outputs: usize,
-    ) {
-        for granule in 0..lanes.div_ceil(GRANULE) {
-            let (first, at) = (granule * GRANULE, place::<K>(granule, NX));
-            for (feature, x) in x[first / N].iter().enumerate() {
-                self.inputs[at + feature * K::BLOCK..][..GRANULE]
-                    .copy_from_slice(&x.0[first % N..][..GRANULE]);
-            }
-        }
-        self.layers::<N>(lanes);
-        for granule in 0..lanes.div_ceil(GRANULE) {
-            let (first, at) = (granule * GRANULE, place::<K>(granule, outputs));
-            for (feature, u) in u[first / N].iter_mut().take(outputs).enumerate() {
-                u.0[first % N..][..GRANULE]
-                    .copy_from_slice(&self.inputs[at + feature * K::BLOCK..][..GRANULE]);
-            }
-        }
-    }
-
     /// All layers, from `inputs` back to `inputs`; activations by groups of `N`.
     fn layers<const N: usize>(&mut self, lanes: usize) {
         for layer in &self.network.layers {

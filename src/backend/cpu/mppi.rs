@@ -1,14 +1,13 @@
-//! MPPI problems cut into units for the threads, merged in order.
+//! MPPI problems cut into units for the threads, their tallies put together in order.
+
+use std::ops::Range;
 
 use super::Cpu;
 use super::dispatch::run;
 use super::mppi_rollout::MppiRollout;
+use super::planning::PreparedPlanning;
 use super::spread::spread;
-use crate::backend::softmin::Partial;
-use crate::cost::Cost;
-use crate::error::Result;
-use crate::rollout::{CostQuery, MppiResult, MppiTask};
-use crate::system::System;
+use crate::rollout::{CostQuery, MppiTask, Partial, PlanTally};
 
 /// Samples of a unit: the softmin is merged unit by unit, so the bits depend on it. Half of the
 /// study's 500 samples, so that two threads share one problem.
@@ -16,72 +15,50 @@ const UNIT: u32 = 256;
 /// Most memory of the partials of the problems that are improved at a time, bytes.
 const PARTIAL_BYTES: usize = 64 << 20;
 
-impl Cpu {
-    /// See [`crate::backend::Backend::mppi`].
-    pub(in crate::backend) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
+impl PreparedPlanning {
+    /// See [`crate::backend::PlanProgram::tally`]; tallies go to `sink` in order.
+    pub(in crate::backend) fn tally(
         &self,
-        system: &S,
-        cost: &C,
-        task: &MppiTask<'_, NX, NU, NC>,
-    ) -> Result<Vec<MppiResult<NU>>>
-    where
-        S: System<NX, NU>,
-        C: Cost<NX, NU, NC>,
-    {
-        let settings = task.spec.settings();
-        let units = settings.samples.div_ceil(UNIT) as usize;
-        let bytes = units * settings.horizon as usize * size_of::<[f64; NU]>();
-        let most = (PARTIAL_BYTES / bytes).max(1);
-        let mut results = Vec::with_capacity(task.problems.len());
+        cpu: &Cpu,
+        task: &MppiTask<'_>,
+        samples: Range<u32>,
+        sink: &mut dyn FnMut(Vec<PlanTally>),
+    ) {
+        let units = (samples.end - samples.start).div_ceil(UNIT) as usize;
+        let spec = &self.planning.spec;
+        let bytes = units * spec.horizon() * spec.controls() * size_of::<f64>();
+        let most = (PARTIAL_BYTES / bytes.max(1)).max(1);
         for problems in task.problems.chunks(most) {
-            results.extend(self.improve(system, cost, &MppiTask { problems, ..*task }));
+            sink(self.at_a_time(cpu, &MppiTask { problems, ..*task }, samples.clone()));
         }
-        Ok(results)
     }
 
-    /// The results of all problems of `task` at a time.
-    fn improve<S, C, const NX: usize, const NU: usize, const NC: usize>(
-        &self,
-        system: &S,
-        cost: &C,
-        task: &MppiTask<'_, NX, NU, NC>,
-    ) -> Vec<MppiResult<NU>>
-    where
-        S: System<NX, NU>,
-        C: Cost<NX, NU, NC>,
-    {
-        let value = task.value.map(|value| self.packed(value.network));
-        let disturbance = task.disturbance.map(|asked| self.packed(asked.network));
-        let samples = task.spec.settings().samples;
+    /// The tallies of all problems of `task` at a time.
+    fn at_a_time(&self, cpu: &Cpu, task: &MppiTask<'_>, samples: Range<u32>) -> Vec<PlanTally> {
+        let count = (samples.end - samples.start) as usize;
+        let units = samples.clone().step_by(UNIT as usize);
+        let units: Vec<Range<u32>> =
+            units.map(|first| first..(first + UNIT).min(samples.end)).collect();
         let mut costs = match task.costs {
             CostQuery::Summary => Vec::new(),
-            CostQuery::Each => vec![0.0; task.problems.len() * samples as usize],
+            CostQuery::Each => vec![0.0; task.problems.len() * count],
         };
-        let units = samples.div_ceil(UNIT);
-        let unit_of = |number: usize| {
-            let first = (number as u32 % units) * UNIT;
-            (number / units as usize, first..(first + UNIT).min(samples))
-        };
-        let count = task.problems.len() * units as usize;
-        let outs = cut(&mut costs, samples as usize, count).into_iter();
-        let parts: Vec<Partial<NU>> = spread(&self.pool, outs, |number, costs| {
-            let (problem, samples) = unit_of(number);
-            let networks = [value.as_deref(), disturbance.as_deref()];
-            let unit = MppiRollout { system, cost, task, networks, problem, samples, costs };
-            run(self.instructions, unit)
+        let outs = cut(&mut costs, count, task.problems.len() * units.len()).into_iter();
+        let parts: Vec<Partial> = spread(&cpu.pool, outs, |number, costs| {
+            let problem = (&task.problems[number / units.len()], task.iteration);
+            let samples = units[number % units.len()].clone();
+            let with = cpu.instructions;
+            run(with, MppiRollout { prepared: self, with, problem, samples, costs })
         });
-        let merged = parts.chunks(units as usize).zip(task.problems).enumerate();
-        let results = merged.map(|(number, (parts, problem))| {
-            let settings = task.spec.settings();
-            let mut all = Partial::none(settings.horizon as usize);
-            parts.iter().for_each(|part| all.merge(part, settings.temperature));
-            let costs = match task.costs {
-                CostQuery::Summary => Vec::new(),
-                CostQuery::Each => costs[number * samples as usize..][..samples as usize].to_vec(),
-            };
-            all.finish(samples, &problem.plan, &settings.bounds, costs)
-        });
-        results.collect()
+        let mut tallies = vec![PlanTally::default(); task.problems.len()];
+        for (number, part) in parts.into_iter().enumerate() {
+            let (problem, unit) = (number / units.len(), &units[number % units.len()]);
+            let first = (unit.start - samples.start) as usize;
+            let mine = costs.chunks(count).nth(problem);
+            let costs = mine.map_or(&[][..], |mine| &mine[first..][..unit.len()]);
+            tallies[problem].add(unit.start, part, costs.to_vec());
+        }
+        tallies
     }
 }
 

@@ -5,67 +5,56 @@ use std::ops::Range;
 
 use super::dispatch::Unit;
 use super::kernel::Kernel;
-use super::mlp::{Evaluator, Packed};
+use super::mlp::Evaluator;
 use super::mppi_update::Softmin;
+use super::planning::PreparedPlanning;
 use super::tile::is_finite;
-use crate::backend::softmin::Partial;
-use crate::cost::{Cost, CostMap};
-use crate::real::simd::Body;
-use crate::real::{Lanes, Real, Vector, load_rows, store_rows};
-use crate::rollout::{HUGE, MppiProblem, MppiSpec, MppiTask, Noise, Stream};
-use crate::system::System;
+use crate::real::simd::{Body, Formulas, Instructions};
+use crate::real::{Lanes, Vector};
+use crate::rollout::{Disturbance, HUGE, MppiProblem, Noise, Partial, Stream, ValueTerm};
+use crate::tile::{Aligned, Frame, Stages};
 
 /// Consecutive samples of a problem for one thread; twin: `shaders/mppi_rollout.wgsl`.
 #[derive(Debug)]
-pub(super) struct MppiRollout<'a, S, C, const NX: usize, const NU: usize, const NC: usize> {
-    /// The system.
-    pub(super) system: &'a S,
-    /// The cost.
-    pub(super) cost: &'a C,
-    /// The task.
-    pub(super) task: &'a MppiTask<'a, NX, NU, NC>,
-    /// The value network and that of the disturbance, packed for the kernel.
-    pub(super) networks: [Option<&'a Packed>; 2],
-    /// Which problem.
-    pub(super) problem: usize,
+pub(super) struct MppiRollout<'a> {
+    /// What is planned for.
+    pub(super) prepared: &'a PreparedPlanning,
+    /// The instructions of the formulas.
+    pub(super) with: Instructions,
+    /// The problem, and the number of the iteration.
+    pub(super) problem: (&'a MppiProblem, u32),
     /// Which samples.
     pub(super) samples: Range<u32>,
     /// Where their costs go, if they are wanted.
     pub(super) costs: Option<&'a mut [f32]>,
 }
 
-impl<S, C, const NX: usize, const NU: usize, const NC: usize> Unit
-    for MppiRollout<'_, S, C, NX, NU, NC>
-where
-    S: System<NX, NU>,
-    C: Cost<NX, NU, NC>,
-{
-    type Output = Partial<NU>;
+impl Unit for MppiRollout<'_> {
+    type Output = Partial;
 
     const DRAWS: bool = true;
 
-    fn run<K: Kernel, const N: usize>(self, kernel: K) -> Partial<NU> {
-        let settings = self.task.spec.settings();
-        let horizon = settings.horizon as usize;
-        let mut softmin = Softmin::<N, NU>::new(horizon, settings.temperature);
-        let count = (self.samples.end - self.samples.start) as usize;
-        // Networks want wide tiles, plain rollouts stay in the registers of one group.
-        let networked = self.networks.iter().any(Option::is_some);
-        let width = if networked { count.next_multiple_of(N) } else { N };
-        let mut tile = Tile::<K, N, NX, NU>::new(kernel, self.task.spec, self.networks, width);
-        let Self { task, problem, samples, mut costs, .. } = self;
-        let asked = (task, &task.problems[problem]);
+    fn run<K: Kernel, const N: usize>(self, kernel: K) -> Partial {
+        let Self { prepared, with, problem, samples, mut costs } = self;
+        let spec = &prepared.planning.spec;
+        let length = spec.horizon() * spec.controls();
+        let mut softmin = Softmin::<N>::new(length, spec.settings().temperature);
+        let count = (samples.end - samples.start) as usize;
+        // Networks and tapes want wide tiles, plain rollouts stay in the registers of one group.
+        let width = if prepared.by_the_step() { count.next_multiple_of(N) } else { N };
+        let mut tile = Tile::<K, N>::new((kernel, with), prepared, width);
         for first in samples.clone().step_by(width) {
             let live = width.min((samples.end - first) as usize);
-            tile.draw(asked, first, live);
-            tile.roll((self.system, self.cost), asked, live);
-            for (group, (cost, controls)) in tile.groups(live).enumerate() {
+            tile.draw(problem, first, live);
+            tile.roll(problem.0, live);
+            for group in 0..live.div_ceil(N) {
                 let at = first + (group * N) as u32;
                 let live = N.min((samples.end - at) as usize);
-                softmin.add(kernel, cost, controls, at, live);
+                let (cost, controls) = tile.group(group);
+                softmin.add(kernel, &cost, controls, at, live);
                 if let Some(costs) = &mut costs {
                     let out = &mut costs[(at - samples.start) as usize..][..live];
-                    write(cost, out);
+                    write(&cost, out);
                 }
             }
         }
@@ -81,136 +70,132 @@ fn write<const N: usize>(cost: &Lanes<N>, out: &mut [f32]) {
 }
 
 /// Samples in lockstep, in groups of lanes.
-struct Tile<'a, K, const N: usize, const NX: usize, const NU: usize> {
+struct Tile<'a, K, const N: usize> {
     kernel: K,
-    horizon: usize,
+    with: Instructions,
+    prepared: &'a PreparedPlanning,
     /// Value network, disturbance network.
     networks: [Option<Evaluator<'a, K>>; 2],
     normals: Vec<Lanes<N>>,
-    /// Noise, then controls, `[groups, H]`.
-    controls: Vec<[Lanes<N>; NU]>,
-    states: Vec<[Lanes<N>; NX]>,
-    costs: Vec<Lanes<N>>,
-    values: Vec<[Lanes<N>; 1]>,
-    pushes: Vec<[Lanes<N>; NX]>,
+    /// Noise, then controls, `[groups, H, controls, N]`.
+    controls: Aligned,
+    /// States and costs.
+    frame: Frame,
 }
 
-impl<'a, K: Kernel, const N: usize, const NX: usize, const NU: usize> Tile<'a, K, N, NX, NU> {
+impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
     /// Room for `width` samples.
     fn new(
-        kernel: K,
-        spec: &MppiSpec<NU>,
-        networks: [Option<&'a Packed>; 2],
+        (kernel, with): (K, Instructions),
+        prepared: &'a PreparedPlanning,
         width: usize,
     ) -> Self {
-        let groups = width.div_ceil(N);
-        let horizon = spec.settings().horizon as usize;
+        let spec = &prepared.planning.spec;
         let zero = Lanes([0.0; N]);
-        let evaluator = |network: Option<&'a Packed>| {
-            network.map(|network| Evaluator::new(network, kernel, width))
-        };
+        let networks = prepared
+            .networks
+            .each_ref()
+            .map(|network| network.as_ref().map(|network| Evaluator::new(network, kernel, width)));
         Self {
             kernel,
-            horizon,
-            networks: networks.map(evaluator),
+            with,
+            prepared,
+            networks,
             normals: vec![zero; spec.noise().room()],
-            controls: vec![[zero; NU]; groups * horizon],
-            states: vec![[zero; NX]; groups],
-            costs: vec![zero; groups],
-            values: vec![[zero]; groups],
-            pushes: vec![[zero; NX]; groups],
+            controls: Aligned::zeros(width * spec.horizon() * spec.controls()),
+            frame: Frame::new(prepared.layout, width),
         }
     }
 
+    /// Controls of a sample.
+    fn length(&self) -> usize {
+        self.prepared.planning.spec.horizon() * self.prepared.planning.spec.controls()
+    }
+
     /// Draws the noise of the samples `first..first + live`.
-    fn draw<const NC: usize>(
-        &mut self,
-        (task, problem): (&MppiTask<'_, NX, NU, NC>, &MppiProblem<NX, NU, NC>),
-        first: u32,
-        live: usize,
-    ) {
-        let groups = self.controls.chunks_mut(self.horizon).take(live.div_ceil(N));
-        for (group, controls) in groups.enumerate() {
-            self.kernel.call(Draw::<K, N, NU> {
+    fn draw(&mut self, (problem, iteration): (&MppiProblem, u32), first: u32, live: usize) {
+        let length = self.length();
+        let (controls, _) = self.controls.all_mut().as_chunks_mut::<N>();
+        for (group, out) in controls.chunks_mut(length).take(live.div_ceil(N)).enumerate() {
+            self.kernel.call(Draw::<K, N> {
                 kernel: PhantomData,
-                noise: task.spec.noise(),
-                source: (problem.stream, task.iteration),
+                noise: self.prepared.planning.spec.noise(),
+                source: (problem.stream, iteration),
                 first: first + (group * N) as u32,
                 normals: &mut self.normals,
-                out: controls,
+                out,
             });
         }
     }
 
     /// Rolls the first `live` samples out and adds up their costs.
-    fn roll<S, C, const NC: usize>(
-        &mut self,
-        (system, cost): (&S, &C),
-        (task, problem): (&MppiTask<'_, NX, NU, NC>, &MppiProblem<NX, NU, NC>),
-        live: usize,
-    ) where
-        S: System<NX, NU>,
-        C: Cost<NX, NU, NC>,
-    {
-        let groups = live.div_ceil(N);
-        self.states[..groups].fill(problem.start.map(Lanes::lit));
-        self.costs[..groups].fill(Lanes([0.0; N]));
+    fn roll(&mut self, problem: &MppiProblem, live: usize) {
+        for (row, number) in self.frame.states().zip(&problem.start) {
+            self.frame.row_mut(row).fill(*number);
+        }
+        self.frame.row_mut(self.prepared.total).fill(0.0);
+        let horizon = self.prepared.planning.spec.horizon();
         let networked = self.networks.iter().any(Option::is_some);
-        let stride = if networked { 1 } else { self.horizon };
-        for t in (0..self.horizon).step_by(stride) {
-            self.evaluate(task, live);
-            for group in 0..groups {
-                self.kernel.call(Advance::<K, S, C, N, NX, NU, NC> {
-                    kernel: PhantomData,
-                    system,
-                    cost,
-                    spec: task.spec,
-                    problem,
-                    steps: t..t + stride,
-                    x: &mut self.states[group],
-                    total: &mut self.costs[group],
-                    controls: &mut self.controls[group * self.horizon..][..self.horizon],
-                });
-                self.kernel.call(Networks {
-                    task,
-                    value: &self.values[group][0],
-                    push: &self.pushes[group],
-                    x: &mut self.states[group],
-                    total: &mut self.costs[group],
-                });
+        let stride = if networked { 1 } else { horizon };
+        for t in (0..horizon).step_by(stride) {
+            self.evaluate(live);
+            self.advance(problem, t..t + stride, live);
+            if networked {
+                self.with.call(Said { prepared: self.prepared, frame: &mut self.frame, live });
             }
         }
     }
 
     /// Evaluates the networks at the states.
-    fn evaluate<const NC: usize>(&mut self, task: &MppiTask<'_, NX, NU, NC>, live: usize) {
-        let [value, disturbance] = &mut self.networks;
-        if let Some(value) = value {
-            value.forward_some(&self.states, live, &mut self.values, 1);
-        }
-        if let (Some(disturbance), Some(asked)) = (disturbance, &task.disturbance) {
-            let outputs = asked.entries.len();
-            disturbance.forward_some(&self.states, live, &mut self.pushes, outputs);
+    fn evaluate(&mut self, live: usize) {
+        let sinks = [self.prepared.value.clone(), self.prepared.pushes.clone()];
+        for (network, sink) in self.networks.iter_mut().zip(sinks) {
+            if let Some(network) = network {
+                let states = self.frame.states();
+                network.forward(&mut self.frame, [states, sink], live);
+            }
         }
     }
 
-    /// Cost and controls of the first `live` samples, group by group.
-    fn groups(&self, live: usize) -> impl Iterator<Item = (&Lanes<N>, &[[Lanes<N>; NU]])> {
-        self.costs.iter().zip(self.controls.chunks(self.horizon)).take(live.div_ceil(N))
+    /// Takes the first `live` samples through the stages `steps`.
+    fn advance(&mut self, problem: &MppiProblem, steps: Range<usize>, live: usize) {
+        let spec = &self.prepared.planning.spec;
+        let stages = Stages {
+            frame: &mut self.frame,
+            total: self.prepared.total,
+            controls: self.controls.all_mut(),
+            group: N,
+            lanes: live,
+            steps,
+            first_step: problem.first_step,
+            plan: &problem.plan,
+            context: &problem.context,
+            bounds: &spec.settings().bounds,
+            penalty: spec.penalty(),
+        };
+        self.prepared.stages.advance(self.with, stages);
+    }
+
+    /// Costs and controls of a group.
+    fn group(&self, group: usize) -> (Lanes<N>, &[[f32; N]]) {
+        let length = self.length();
+        let costs = &self.frame.row(self.prepared.total)[group * N..];
+        let (controls, _) = self.controls.all().as_chunks::<N>();
+        (Vector::load(costs), &controls[group * length..][..length])
     }
 }
 
 /// The noise of a group.
-struct Draw<'a, K, const N: usize, const NU: usize> {
+struct Draw<'a, K, const N: usize> {
     kernel: PhantomData<K>,
-    noise: &'a Noise<NU>,
+    noise: &'a Noise,
     source: (Stream, u32),
     first: u32,
     normals: &'a mut [Lanes<N>],
-    out: &'a mut [[Lanes<N>; NU]],
+    out: &'a mut [[f32; N]],
 }
 
-impl<K: Kernel, const N: usize, const NU: usize> Body for Draw<'_, K, N, NU> {
+impl<K: Kernel, const N: usize> Body for Draw<'_, K, N> {
     type Output = ();
 
     #[inline(always)]
@@ -219,136 +204,33 @@ impl<K: Kernel, const N: usize, const NU: usize> Body for Draw<'_, K, N, NU> {
     }
 }
 
-/// Some steps of a group: noise becomes controls, states and costs move on.
-struct Advance<'a, K, S, C, const N: usize, const NX: usize, const NU: usize, const NC: usize> {
-    kernel: PhantomData<K>,
-    system: &'a S,
-    cost: &'a C,
-    spec: &'a MppiSpec<NU>,
-    problem: &'a MppiProblem<NX, NU, NC>,
-    steps: Range<usize>,
-    x: &'a mut [Lanes<N>; NX],
-    total: &'a mut Lanes<N>,
-    controls: &'a mut [[Lanes<N>; NU]],
-}
-
-impl<K, S, C, const N: usize, const NX: usize, const NU: usize, const NC: usize> Body
-    for Advance<'_, K, S, C, N, NX, NU, NC>
-where
-    K: Kernel,
-    S: System<NX, NU>,
-    C: Cost<NX, NU, NC>,
-{
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for at in (0..N).step_by(K::Vector::WIDTH) {
-            let mut x: [K::Vector; NX] = load_rows(self.x, at);
-            let mut total = K::Vector::load(&self.total.0[at..]);
-            for t in self.steps.clone() {
-                let controls = &mut self.controls[t];
-                let plan = lit(&self.problem.plan[t]);
-                let u = bounded(load_rows(controls, at), &plan, &self.spec.settings().bounds);
-                store_rows(u, controls, at);
-                total = total + self.cost.stage(x, u, lit(&self.problem.context[t]));
-                if let Some(penalty) = self.spec.penalty() {
-                    total = total + noise_cost(penalty, &self.problem.plan[t], &u);
-                }
-                if let Some((map, place)) = self.cost.map(x) {
-                    total = total + map_cost(map, place);
-                }
-                x = self.system.step(x, u);
-            }
-            store_rows(x, self.x, at);
-            total.store(&mut self.total.0[at..]);
-        }
-    }
-}
-
-/// Numbers that are the same for all samples.
-#[inline(always)]
-fn lit<V: Vector, const R: usize>(numbers: &[f32; R]) -> [V; R] {
-    let mut vectors = [V::lit(0.0); R];
-    for (vector, number) in vectors.iter_mut().zip(numbers) {
-        *vector = V::lit(*number);
-    }
-    vectors
-}
-
-/// The plan with noise, within its bounds.
-#[inline(always)]
-fn bounded<V: Vector, const NU: usize>(
-    noise: [V; NU],
-    plan: &[V; NU],
-    bounds: &[[f32; 2]; NU],
-) -> [V; NU] {
-    let mut u = noise;
-    for i in 0..NU {
-        let [low, high] = bounds[i];
-        u[i] = (plan[i] + noise[i]).clamp(V::lit(low), V::lit(high));
-    }
-    u
-}
-
-/// `lambda plan' Sigma^-1 (u - plan)`.
-#[inline(always)]
-fn noise_cost<V: Vector, const NU: usize>(
-    penalty: &[[f32; NU]; NU],
-    plan: &[f32; NU],
-    u: &[V; NU],
-) -> V {
-    let mut cost = V::lit(0.0);
-    for i in 0..NU {
-        let mut row = 0.0;
-        for j in 0..NU {
-            row += penalty[j][i] * plan[j];
-        }
-        cost = cost + V::lit(row) * (u[i] - V::lit(plan[i]));
-    }
-    cost
-}
-
-/// 2^23: added to a whole number below it, it leaves that number in the mantissa. A conversion to
-/// an integer takes more instructions, for the sake of numbers that no integer holds.
-const WHOLE: f32 = 8_388_608.0;
-/// The mantissa.
-const WHOLE_MASK: u32 = 0x7f_ffff;
-
-/// The costs of the cells at `place`; of NaN, whose mantissa is above any cell's number, that of the
-/// last cell, one of the border.
-#[inline(always)]
-fn map_cost<V: Vector>(map: &CostMap, place: [V; 2]) -> V {
-    let cells = map.cells();
-    // Lets the compiler leave out the test of each index.
-    assert!(!cells.is_empty(), "a map has cells");
-    let number = map.cell(place) + V::lit(WHOLE);
-    number.each(|number| cells[((number.to_bits() & WHOLE_MASK) as usize).min(cells.len() - 1)])
-}
-
 /// What the networks, evaluated at the state before the step, add to cost and state.
-struct Networks<'a, const N: usize, const NX: usize, const NU: usize, const NC: usize> {
-    task: &'a MppiTask<'a, NX, NU, NC>,
-    value: &'a Lanes<N>,
-    push: &'a [Lanes<N>; NX],
-    x: &'a mut [Lanes<N>; NX],
-    total: &'a mut Lanes<N>,
+struct Said<'a> {
+    prepared: &'a PreparedPlanning,
+    frame: &'a mut Frame,
+    live: usize,
 }
 
-impl<const N: usize, const NX: usize, const NU: usize, const NC: usize> Body
-    for Networks<'_, N, NX, NU, NC>
-{
-    type Output = ();
-
+impl Formulas for Said<'_> {
     #[inline(always)]
-    fn run(self) {
-        if let Some(term) = &self.task.value {
-            let short = (Lanes::lit(term.threshold) - *self.value).max(Lanes::lit(0.0));
-            *self.total = *self.total + Lanes::lit(term.weight) * (short * short);
+    fn run<V: Vector>(self) {
+        let Self { prepared: PreparedPlanning { planning, total, value, pushes, .. }, .. } = self;
+        let mut add = |row: usize, more: &dyn Fn(&Frame, usize) -> V| {
+            for at in (0..self.live).step_by(V::WIDTH) {
+                let sum = V::load(&self.frame.row(row)[at..]) + more(self.frame, at);
+                sum.store(&mut self.frame.row_mut(row)[at..]);
+            }
+        };
+        if let Some(ValueTerm { weight, threshold, .. }) = planning.value {
+            add(*total, &|frame, at| {
+                let short = V::lit(threshold) - V::load(&frame.row(value.start)[at..]);
+                let short = short.max(V::lit(0.0));
+                V::lit(weight) * (short * short)
+            });
         }
-        if let Some(disturbance) = &self.task.disturbance {
-            for ((state, scale), push) in disturbance.entries.iter().zip(self.push) {
-                self.x[*state] = self.x[*state] + Lanes::lit(*scale) * *push;
+        if let Some(Disturbance { entries, .. }) = &planning.disturbance {
+            for ((state, scale), push) in entries.iter().zip(pushes.clone()) {
+                add(*state, &|frame, at| V::lit(*scale) * V::load(&frame.row(push)[at..]));
             }
         }
     }

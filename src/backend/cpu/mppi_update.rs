@@ -2,37 +2,39 @@
 
 use super::kernel::Kernel;
 use super::tile::is_finite;
-use crate::backend::softmin::Partial;
 use crate::real::simd::Body;
 use crate::real::{Lanes, Real, per_lane};
-use crate::rollout::HUGE;
+use crate::rollout::{HUGE, Partial};
 
 /// Lanes that are summed on their own, whatever the instructions: samples that lie this far apart
 /// share one, so that the bits do not depend on the lanes per group.
 const SHARES: usize = 32;
 
 /// Weighted sums of the samples seen so far; twin: `shaders/mppi_update.wgsl`.
-pub(super) struct Softmin<const N: usize, const NU: usize> {
+pub(super) struct Softmin<const N: usize> {
     temperature: f32,
     /// Groups take turns.
-    sets: Vec<Sums<N, NU>>,
+    sets: Vec<Sums<N>>,
+    /// Samples so far.
+    count: u32,
     turn: usize,
 }
 
 /// The samples of each lane, weighted against the smallest cost among them.
-struct Sums<const N: usize, const NU: usize> {
+struct Sums<const N: usize> {
     least: Lanes<N>,
     best: [u32; N],
     weight: Lanes<N>,
     squares: Lanes<N>,
     cost: Lanes<N>,
     non_finite: [u32; N],
-    controls: Vec<[Lanes<N>; NU]>,
+    /// `[H, controls]`.
+    controls: Vec<Lanes<N>>,
 }
 
-impl<const N: usize, const NU: usize> Softmin<N, NU> {
-    /// No sample yet, for plans of `horizon` steps.
-    pub(super) fn new(horizon: usize, temperature: f32) -> Self {
+impl<const N: usize> Softmin<N> {
+    /// No sample yet, for plans of `length` controls in all.
+    pub(super) fn new(length: usize, temperature: f32) -> Self {
         let zero = Lanes([0.0; N]);
         let sums = || Sums {
             least: Lanes([HUGE; N]),
@@ -41,9 +43,9 @@ impl<const N: usize, const NU: usize> Softmin<N, NU> {
             squares: zero,
             cost: zero,
             non_finite: [0; N],
-            controls: vec![[zero; NU]; horizon],
+            controls: vec![zero; length],
         };
-        Self { temperature, sets: (0..SHARES / N).map(|_| sums()).collect(), turn: 0 }
+        Self { temperature, sets: (0..SHARES / N).map(|_| sums()).collect(), count: 0, turn: 0 }
     }
 
     /// Adds the first `live` samples of a group; the first of them has the number `first`.
@@ -51,10 +53,11 @@ impl<const N: usize, const NU: usize> Softmin<N, NU> {
         &mut self,
         kernel: K,
         cost: &Lanes<N>,
-        controls: &[[Lanes<N>; NU]],
+        controls: &[[f32; N]],
         first: u32,
         live: usize,
     ) {
+        self.count += live as u32;
         let sums = &mut self.sets[self.turn];
         let temperature = self.temperature;
         kernel.call(Add { sums, temperature, cost, controls, first, live });
@@ -62,8 +65,8 @@ impl<const N: usize, const NU: usize> Softmin<N, NU> {
     }
 
     /// All lanes together.
-    pub(super) fn finish(self) -> Partial<NU> {
-        let all = |part: fn(&Sums<N, NU>) -> [f32; N]| gather(&self.sets, part);
+    pub(super) fn finish(self) -> Partial {
+        let all = |part: fn(&Sums<N>) -> [f32; N]| gather(&self.sets, part);
         let least = all(|sums| sums.least.0);
         let smallest = least.into_iter().fold(HUGE, f32::min);
         let mut scale = [0.0_f32; SHARES];
@@ -73,16 +76,15 @@ impl<const N: usize, const NU: usize> Softmin<N, NU> {
         }
         let weighed =
             |values: [f32; SHARES]| f64::from(tree(per_lane!(SHARES, i => values[i] * scale[i])));
-        let horizon = self.sets[0].controls.len();
-        let controls = (0..horizon).map(|t| {
-            std::array::from_fn(|i| weighed(gather(&self.sets, |sums| sums.controls[t][i].0)))
-        });
+        let length = self.sets[0].controls.len();
+        let controls = (0..length).map(|i| weighed(gather(&self.sets, |sums| sums.controls[i].0)));
         let best = self.sets.iter().flat_map(|sums| sums.least.0.into_iter().zip(sums.best));
         let best = best.filter(|(cost, _)| *cost == smallest).map(|(_, best)| best).min();
         let non_finite = self.sets.iter().flat_map(|sums| sums.non_finite).sum();
         let squares = all(|sums| sums.squares.0);
         let weight = weighed(all(|sums| sums.weight.0));
         Partial {
+            count: self.count,
             least: if weight > 0.0 { smallest } else { f32::INFINITY },
             best: best.filter(|best| *best != u32::MAX).unwrap_or(0),
             weight,
@@ -95,10 +97,7 @@ impl<const N: usize, const NU: usize> Softmin<N, NU> {
 }
 
 /// The lanes of all sets, one after the other.
-fn gather<const N: usize, const NU: usize>(
-    sets: &[Sums<N, NU>],
-    part: impl Fn(&Sums<N, NU>) -> [f32; N],
-) -> [f32; SHARES] {
+fn gather<const N: usize>(sets: &[Sums<N>], part: impl Fn(&Sums<N>) -> [f32; N]) -> [f32; SHARES] {
     let mut all = [0.0; SHARES];
     for (out, sums) in all.chunks_mut(N).zip(sets) {
         out.copy_from_slice(&part(sums));
@@ -119,16 +118,16 @@ fn tree(mut terms: [f32; SHARES]) -> f32 {
 }
 
 /// Adds a group to the sums of its lanes.
-struct Add<'a, const N: usize, const NU: usize> {
-    sums: &'a mut Sums<N, NU>,
+struct Add<'a, const N: usize> {
+    sums: &'a mut Sums<N>,
     temperature: f32,
     cost: &'a Lanes<N>,
-    controls: &'a [[Lanes<N>; NU]],
+    controls: &'a [[f32; N]],
     first: u32,
     live: usize,
 }
 
-impl<const N: usize, const NU: usize> Body for Add<'_, N, NU> {
+impl<const N: usize> Body for Add<'_, N> {
     type Output = ();
 
     #[inline(always)]
@@ -150,9 +149,7 @@ impl<const N: usize, const NU: usize> Body for Add<'_, N, NU> {
         sums.cost = sums.cost + finite;
         sums.non_finite = per_lane!(N, i => sums.non_finite[i] + u32::from(i < live && !counts[i]));
         for (sum, u) in sums.controls.iter_mut().zip(self.controls) {
-            for i in 0..NU {
-                sum[i] = sum[i] * keep + weight * u[i];
-            }
+            *sum = *sum * keep + weight * Lanes(*u);
         }
     }
 }

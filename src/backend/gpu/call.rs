@@ -1,7 +1,7 @@
 //! A call whose kernels are given as text: buffers, bound kernels, submissions.
 
 use super::batch::Batch;
-use super::buffer::{Buffer, Pool, Use};
+use super::buffer::{Buffer, Use};
 use super::compose::{Access, Kernel, Slot};
 use super::device::Device;
 use super::flight::Flight;
@@ -31,11 +31,6 @@ impl<'a> Call<'a> {
     /// The device.
     pub(super) fn device(&self) -> &Device {
         &self.flight.device
-    }
-
-    /// Where buffers come from.
-    pub(super) fn pool(&self) -> &Pool {
-        self.flight.pool
     }
 
     /// A storage buffer.

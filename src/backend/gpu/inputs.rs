@@ -1,12 +1,10 @@
-//! What the host sends with a submission: one buffer, one write.
-
-use std::ops::Range;
+//! What the host sends with a submission of rollouts.
 
 use super::batch::Batch;
-use super::buffer::{Buffer, Pool, Use};
+use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
-use super::params::Params;
+use super::upload::Upload;
 use crate::error::{Error, Result};
 use crate::rollout::{Region, RolloutSpec, Starts, Tightening};
 
@@ -26,65 +24,40 @@ pub(super) struct InputSizes {
     pub(super) dispatches: usize,
 }
 
-/// The parameters of the model, the schedule, the region or listed starts, then the parameters of
-/// each dispatch, as the host has them and on the device.
-pub(super) struct Inputs {
-    buffer: Buffer,
-    bytes: Vec<u8>,
-    values: Range<usize>,
-    schedule: Range<usize>,
-    region: Range<usize>,
-    blocks: Range<usize>,
-    /// The device has what lies before.
-    changed: usize,
-}
+/// Parts of the upload: the parameters of the model, the schedule, the region or listed starts.
+const VALUES: usize = 0;
+const SCHEDULE: usize = 1;
+const REGION: usize = 2;
+
+/// What the host sends with a submission of rollouts.
+pub(super) struct Inputs(Upload);
 
 impl Inputs {
     /// Room for `sizes`.
     pub(super) fn new(device: &Device, pool: &Pool, sizes: InputSizes) -> Self {
-        let mut end = 0;
-        let mut part = |bytes: usize| {
-            let start = end;
-            // Parts begin at the largest alignment that an adapter may ask for, and none is empty.
-            end = (start + bytes.max(VECTOR_BYTES)).next_multiple_of(Params::PITCH);
-            start..start + bytes.max(VECTOR_BYTES)
-        };
-        let values = part(VECTOR_BYTES * sizes.values);
-        let schedule = part(VECTOR_BYTES * sizes.steps);
-        let region = part(VECTOR_BYTES * sizes.region);
-        let blocks = part(Params::PITCH * sizes.dispatches);
-        let buffer = pool.take(device, Use::Inputs, end as u64);
-        Self { buffer, bytes: vec![0; end], values, schedule, region, blocks, changed: 0 }
+        let parts = [sizes.values, sizes.steps, sizes.region].map(|vectors| VECTOR_BYTES * vectors);
+        Self(Upload::new(device, pool, &parts, sizes.dispatches))
     }
 
     /// What a kernel sees of it in `slot`; `None` for any other.
     pub(super) fn binding(&self, slot: Slot) -> Option<wgpu::BufferBinding<'_>> {
-        let part = match slot {
-            Slot::Params => self.blocks.start..self.blocks.start + Params::SIZE.get() as usize,
-            Slot::Values => self.values.clone(),
-            Slot::Schedule => self.schedule.clone(),
-            Slot::Region => self.region.clone(),
-            _ => return None,
-        };
-        Some(self.buffer.part(part.start as u64, part.len() as u64))
+        match slot {
+            Slot::Params => Some(self.0.params()),
+            Slot::Values => Some(self.0.part(VALUES)),
+            Slot::Schedule => Some(self.0.part(SCHEDULE)),
+            Slot::Region => Some(self.0.part(REGION)),
+            _ => None,
+        }
     }
 
     /// Bytes of it.
     pub(super) fn size(&self) -> u64 {
-        self.bytes.len() as u64
-    }
-
-    /// Sets the numbers of `part` from the number `at` on.
-    fn put(&mut self, part: &Range<usize>, at: usize, numbers: &[f32]) {
-        let start = part.start + size_of::<f32>() * at;
-        let bytes: &[u8] = bytemuck::cast_slice(numbers);
-        self.bytes[start..start + bytes.len()].copy_from_slice(bytes);
-        self.changed = self.changed.min(part.start);
+        self.0.size()
     }
 
     /// Sets the parameters of the model.
     pub(super) fn set_values(&mut self, values: &[f32]) {
-        self.put(&self.values.clone(), 0, values);
+        self.0.put(VALUES, 0, values);
     }
 
     /// Sets the schedule, per step: discount, and what both margins lose. The discount is multiplied
@@ -101,7 +74,7 @@ impl Inputs {
         let losses = tightening.target.iter().zip(&tightening.constraint);
         let mut discount = 1.0;
         for (step, (&target, &constraint)) in losses.enumerate() {
-            self.put(&self.schedule.clone(), 4 * step, &[discount, target, constraint, 0.0]);
+            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, 0.0]);
             discount *= spec.gamma;
         }
         Ok(())
@@ -119,7 +92,7 @@ impl Inputs {
                     [ball.center[i], ball.radius, varies, 0.0]
                 }
             };
-            self.put(&self.region.clone(), 4 * i, &vector);
+            self.0.put(REGION, 4 * i, &vector);
         }
     }
 
@@ -132,19 +105,14 @@ impl Inputs {
             // Past its end, a list repeats its last start.
             let row = list.row((first as usize + column).min(list.len() - 1));
             for (quad, numbers) in row.chunks(4).enumerate() {
-                self.put(&self.region.clone(), 4 * (quad * columns + column), numbers);
+                self.0.put(REGION, 4 * (quad * columns + column), numbers);
             }
         }
     }
 
     /// Writes what changed, and the parameters of `batch`, before the next submission.
     pub(super) fn write(&mut self, device: &Device, batch: &Batch<'_>) {
-        let blocks = batch.blocks();
-        let end = self.blocks.start + blocks.len();
-        self.bytes[self.blocks.start..end].copy_from_slice(blocks);
-        let start = self.changed.min(self.blocks.start);
-        self.buffer.write_at(device, start as u64, &self.bytes[start..end]);
-        self.changed = self.blocks.start;
+        self.0.write(device, batch);
     }
 }
 

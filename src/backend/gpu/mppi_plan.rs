@@ -17,6 +17,11 @@ const BUSY_GROUPS: u32 = 1024;
 const PHILOX_TRIPS: u64 = 10;
 /// Operations of one number of the noise: its part in a block of Philox and in a pair of normals.
 const NOISE_FLOPS: u64 = 100;
+/// Most dispatches of a submission, without those of a step that is under way.
+pub(super) const DISPATCHES: u64 = 1024;
+/// Bytes that an upload holds besides its problems: parameters of dispatches and of the model, and
+/// what parts are rounded up by.
+const OTHER_BYTES: u64 = 1 << 19;
 /// Knots of a spline that a dispatch draws before its first step.
 const WINDOW: u64 = 4;
 
@@ -29,8 +34,10 @@ pub(super) struct Size<'a> {
     pub(super) controls: usize,
     /// Numbers of context per stage.
     pub(super) contexts: usize,
-    /// Cells of the cost's map, which lie in front of the contexts; 0 without one.
+    /// Cells of the cost's map; 0 without one.
     pub(super) cells: usize,
+    /// Parameters of the model.
+    pub(super) values: usize,
     /// Steps of a plan.
     pub(super) horizon: u32,
     /// Samples of each problem.
@@ -44,6 +51,24 @@ pub(super) struct Size<'a> {
 }
 
 impl Size<'_> {
+    /// Bytes that the host sends for `problems` problems: parameters of the model, streams, starts,
+    /// plans, contexts.
+    pub(super) fn parts(&self, problems: u64) -> [u64; 5] {
+        let stages = 4 * problems * u64::from(self.horizon);
+        [
+            16 * self.values.div_ceil(4) as u64,
+            16 * problems,
+            4 * problems * self.states as u64,
+            stages * self.controls as u64,
+            stages * self.contexts as u64,
+        ]
+    }
+
+    /// Layers of all networks.
+    fn layers(&self) -> u64 {
+        self.networks.into_iter().flatten().map(|mlp| mlp.layers().len() as u64).sum()
+    }
+
     /// Operations of one step of one sample: formulas, noise and networks.
     pub(super) fn step_flops(&self) -> u64 {
         let networks = self.networks.into_iter().flatten().map(network_flops).sum::<u64>();
@@ -84,10 +109,12 @@ impl MppiPlan {
         let parameters = networks().map(|mlp| 16 * parameter_quads(mlp) as u64).max().unwrap_or(0);
         let columns = most_columns(size, binding, limit);
         let cells = 4 * size.cells as u64;
-        let problems = (binding.saturating_sub(cells) / problem_row_bytes(size))
-            .min((MEMORY_BYTES / 4).saturating_sub(cells) / problem_bytes(size))
+        // One upload holds them all, beside the parameters of the dispatches.
+        let upload = (MEMORY_BYTES / 4).min(adapter.max_buffer_bytes);
+        let problems = (binding / problem_row_bytes(size))
+            .min(upload.saturating_sub(OTHER_BYTES) / problem_bytes(size))
             .min(size.problems.max(1) as u64);
-        if columns == 0 || problems == 0 || parameters > binding {
+        if columns == 0 || problems == 0 || parameters.max(cells) > binding {
             return Err(too_large(adapter, binding));
         }
         let unit = u64::from(WORKGROUP);
@@ -114,6 +141,16 @@ impl MppiPlan {
             update_steps: update_steps(size, rounds)?.min(timely),
             timely_steps: timely,
         })
+    }
+}
+
+impl MppiPlan {
+    /// Most dispatches of a submission.
+    pub(super) fn dispatches(&self, size: &Size<'_>) -> u64 {
+        let rollouts = u64::from(size.horizon.div_ceil(self.rollout_steps));
+        let updates = u64::from(size.horizon.div_ceil(self.update_steps));
+        let all = 1 + rollouts * (1 + size.layers()) + updates;
+        all.min(DISPATCHES + size.layers() + 1)
     }
 }
 
@@ -152,8 +189,7 @@ fn problem_row_bytes(size: &Size<'_>) -> u64 {
 
 /// Bytes of a problem in all of them: stream, start, plan and contexts.
 fn problem_bytes(size: &Size<'_>) -> u64 {
-    let stage = (size.controls + size.contexts) as u64;
-    16 + 4 * size.states as u64 + 4 * u64::from(size.horizon) * stage
+    size.parts(1)[1..].iter().sum()
 }
 
 /// Samples of each thread of the update: a function of the samples alone, so that a plan does not
@@ -237,8 +273,20 @@ mod tests {
 
     fn size(controls: usize, horizon: u32, samples: u32, problems: usize) -> Size<'static> {
         let networks = [None; 2];
-        let (states, contexts, cells, flops) = (12, 8, 0, 300);
-        Size { states, controls, contexts, cells, horizon, samples, problems, flops, networks }
+        let (states, contexts, cells, values, flops) = (12, 8, 0, 6, 300);
+        let sizes = Size {
+            states,
+            controls,
+            contexts,
+            cells,
+            values,
+            horizon,
+            samples,
+            problems,
+            flops,
+            networks,
+        };
+        sizes
     }
 
     fn planned(adapter: &Adapter, size: &Size<'_>) -> Result<MppiPlan> {
@@ -287,12 +335,13 @@ mod tests {
     }
 
     #[test]
-    fn a_map_takes_room_from_the_problems() {
-        // Contexts of 640 bytes for each problem, behind the cells: room for ten.
-        let cells = ((1 << 22) - 10 * 640) / 4;
-        let size = Size { cells, ..size(3, 20, 64, 100) };
+    fn an_upload_holds_its_problems_and_fits_a_buffer() {
+        // A race's problem takes 16 + 48 + 20 * (12 + 32) bytes.
+        let size = size(3, 20, 64, 100_000);
         let plan = planned(&Adapter::made_up(1 << 22), &size).expect("a plan that fits");
-        assert_eq!(plan.problems, 10);
+        let parts: u64 = size.parts(u64::from(plan.problems)).iter().sum();
+        assert!((1000..=(1 << 22) / 944).contains(&plan.problems), "{plan:?}");
+        assert!(parts + 256 * plan.dispatches(&size) <= 1 << 22, "{plan:?}");
     }
 
     fn check(size: &Size<'_>, plan: &MppiPlan, binding: u64) {
@@ -335,7 +384,7 @@ mod tests {
         assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
         let mapped = Size { cells: 1 << 25, ..size(3, 20, 500, 1) };
         let mapped = planned(&Adapter::made_up(1 << 27), &mapped);
-        assert!(mapped.expect_err("no room for contexts").to_string().contains("the map"));
+        assert!(mapped.expect_err("no room for the map").to_string().contains("the map"));
         let wide = planned(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));
         assert!(wide.expect_err("too wide").to_string().contains("65 controls"));
         let long = most_steps(4, |steps| steps * MAX_TRIPS * 2);

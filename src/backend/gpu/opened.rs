@@ -1,13 +1,16 @@
 //! An opened adapter: its device, and what is kept on it between calls.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::buffer::Pool;
 use super::device::Device;
 use super::flight::Flight;
 use super::kernel::{Edit, Pipelines};
+use super::mppi_program::PlanProgram;
+use super::mppi_source::PlanSource;
 use super::plan::NetworkKernels;
 use super::program::Program;
+use super::recent::Recent;
 use super::source::Source;
 use super::timing::Clock;
 use crate::error::Result;
@@ -29,8 +32,8 @@ pub(super) struct Opened {
     pub(super) pipelines: Arc<Pipelines>,
     pub(super) pool: Pool,
     pub(super) setup: Setup,
-    /// The one that was used last stands last.
-    programs: Mutex<Vec<Arc<Program>>>,
+    programs: Recent<Arc<Program>>,
+    plan_programs: Recent<Arc<PlanProgram>>,
 }
 
 impl Opened {
@@ -40,8 +43,14 @@ impl Opened {
             Some(edit) => Pipelines::edited(Arc::clone(edit)),
             None => Pipelines::new(&device),
         };
-        let (pipelines, pool) = (Arc::new(pipelines), Pool::default());
-        Self { device, pipelines, pool, setup, programs: Mutex::default() }
+        Self {
+            device,
+            pipelines: Arc::new(pipelines),
+            pool: Pool::default(),
+            setup,
+            programs: Recent::new(KEPT),
+            plan_programs: Recent::new(KEPT),
+        }
     }
 
     /// The same device, changed by `change`, which leaves kernels and buffers as they are.
@@ -56,7 +65,8 @@ impl Opened {
             pipelines: Arc::clone(&self.pipelines),
             pool: self.pool.clone(),
             setup,
-            programs: Mutex::default(),
+            programs: Recent::new(KEPT),
+            plan_programs: Recent::new(KEPT),
         }
     }
 
@@ -82,24 +92,35 @@ impl Opened {
         flight: &Flight<'_>,
         source: &Arc<Source>,
     ) -> Result<Arc<Program>> {
-        let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
-        let program = match programs.iter().position(|program| program.is(source)) {
-            Some(at) => programs.remove(at),
-            None => {
+        self.programs.get(
+            |program| program.is(source),
+            || {
                 let on = (&flight.device, &self.pool);
-                Arc::new(Program::new(on, &self.pipelines, source, self.setup.networks)?)
-            }
-        };
-        programs.push(Arc::clone(&program));
-        if programs.len() > KEPT {
-            programs.remove(0);
-        }
-        Ok(program)
+                Program::new(on, &self.pipelines, source, self.setup.networks).map(Arc::new)
+            },
+        )
+    }
+
+    /// What is planned for by `source` on this device, prepared before or now, for the call of
+    /// `flight`.
+    pub(super) fn plan_program(
+        &self,
+        flight: &Flight<'_>,
+        source: &Arc<PlanSource>,
+    ) -> Result<Arc<PlanProgram>> {
+        self.plan_programs.get(
+            |program| program.is(source),
+            || {
+                let on = (&flight.device, &self.pool);
+                Ok(Arc::new(PlanProgram::new(on, &self.pipelines, source)))
+            },
+        )
     }
 
     /// Lets go of all buffers that no call uses.
     pub(super) fn clear(&self) {
-        self.programs.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        self.programs.clear();
+        self.plan_programs.clear();
         self.pool.clear();
     }
 }

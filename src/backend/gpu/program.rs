@@ -1,6 +1,6 @@
 //! A plant prepared on a device: its kernels, and the buffers of its calls.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::attempt::Attempt;
 use super::buffer::Pool;
@@ -9,21 +9,22 @@ use super::device::Device;
 use super::flight::Flight;
 use super::kernel::Pipelines;
 use super::plan::{NetworkKernels, Plan, Size, Work};
+use super::recent::Recent;
 use super::source::Source;
 use super::workspace::{Shape, Workspace};
 use crate::error::Result;
 
 /// Workspaces that are kept: one for each thread and shape that calls take turns with.
-const KEPT: usize = 4;
+pub(super) const KEPT: usize = 4;
 /// Largest workspace that is kept, bytes: beyond it, binding its buffers anew is nothing beside the
 /// work, and the pool keeps them.
-const KEPT_BYTES: u64 = 8 << 20;
+pub(super) const KEPT_BYTES: u64 = 8 << 20;
 
 /// A plant prepared on a device.
 pub(super) struct Program {
     source: Arc<Source>,
     compiled: Compiled,
-    kept: Mutex<Vec<Workspace>>,
+    kept: Recent<Workspace>,
 }
 
 impl Program {
@@ -38,7 +39,7 @@ impl Program {
         networks: NetworkKernels,
     ) -> Result<Self> {
         let compiled = Compiled::new(on, pipelines, source, networks)?;
-        Ok(Self { source: Arc::clone(source), compiled, kept: Mutex::default() })
+        Ok(Self { source: Arc::clone(source), compiled, kept: Recent::new(KEPT) })
     }
 
     /// Whether it is the plant of `source`.
@@ -76,24 +77,15 @@ impl Program {
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if the driver refuses a kernel.
     pub(super) fn take(&self, flight: &Flight<'_>, shape: Shape) -> Result<Workspace> {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(at) = kept.iter().position(|workspace| workspace.shape == shape) {
-            return Ok(kept.remove(at));
-        }
-        drop(kept);
+        let kept = self.kept.take(|workspace| workspace.shape == shape);
         let network = self.source.network.as_deref();
-        Workspace::new(flight, (&self.compiled, network), shape)
+        kept.map_or_else(|| Workspace::new(flight, (&self.compiled, network), shape), Ok)
     }
 
     /// Keeps `workspace` for a later call.
     pub(super) fn keep(&self, workspace: Workspace) {
-        if workspace.size() > KEPT_BYTES {
-            return;
-        }
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.push(workspace);
-        if kept.len() > KEPT {
-            kept.remove(0);
+        if workspace.size() <= KEPT_BYTES {
+            self.kept.keep(workspace);
         }
     }
 }

@@ -4,19 +4,19 @@
 //! not change results: what goes on on the same adapter gives the bits that it would have given.
 
 use std::cell::Cell;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::adapter::Gpu;
 use super::attempt::Attempt;
 use super::job::Subject;
+use super::mppi_source::PlanSource;
 use super::opened::Opened;
 use super::{deviation, mppi, reach_avoid};
 use crate::backend::cpu::Cpu;
 use crate::backend::{Action, Event, MeasureSink, PairSink};
-use crate::cost::Cost;
 use crate::error::{Error, Fault, Result};
-use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, PairMeasure, ReachAvoidTask};
-use crate::system::System;
+use crate::rollout::{DeviationTask, Farthest, MppiTask, PairMeasure, PlanTally, ReachAvoidTask};
 
 /// Who makes an attempt.
 enum Runner<'a> {
@@ -109,32 +109,30 @@ pub(super) fn deviation(
     Ok(farthest)
 }
 
-/// See [`crate::backend::Backend::mppi`].
-pub(super) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
+/// See [`crate::backend::PlanProgram::tally`].
+pub(super) fn tally(
     gpu: &Gpu,
-    system: &S,
-    cost: &C,
-    task: &MppiTask<'_, NX, NU, NC>,
-) -> Result<Vec<MppiResult<NU>>>
-where
-    S: System<NX, NU>,
-    C: Cost<NX, NU, NC>,
-{
-    let mut results = Vec::with_capacity(task.problems.len());
+    source: &Arc<PlanSource>,
+    (task, samples): (&MppiTask<'_>, Range<u32>),
+    sink: &mut dyn FnMut(Vec<PlanTally>),
+) -> Result<()> {
     gpu.persevere("problems", 0, |runner, progress| {
         let task = MppiTask { problems: &task.problems[progress.next.get() as usize..], ..*task };
-        let sink = &mut |more: Vec<MppiResult<NU>>| {
+        let sink = &mut |more: Vec<PlanTally>| {
             progress.next.set(progress.next.get() + more.len() as u64);
-            results.extend(more);
+            sink(more);
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                mppi::mppi((opened, attempt), (system, cost), &task, sink)
+                mppi::tally((opened, attempt), source, (&task, samples.clone()), sink)
             }
-            Runner::Cpu(cpu) => cpu.mppi(system, cost, &task).map(sink),
+            Runner::Cpu(cpu) => {
+                let prepared = cpu.prepare_plans(&source.planning);
+                prepared.tally(cpu, &task, samples.clone(), sink);
+                Ok(())
+            }
         }
-    })?;
-    Ok(results)
+    })
 }
 
 impl Gpu {

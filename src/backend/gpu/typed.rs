@@ -9,11 +9,10 @@ use super::source::Source;
 use super::traffic::Count;
 use crate::backend::cpu::Cpu;
 use crate::backend::{MeasureSink, PairSink};
-use crate::cost::Cost;
 use crate::error::Result;
 use crate::model::{Controller, Model};
 use crate::policy::Policy;
-use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, Plant, ReachAvoidTask};
+use crate::rollout::{DeviationTask, Farthest, Plant, ReachAvoidTask};
 use crate::system::System;
 
 impl Gpu {
@@ -64,20 +63,6 @@ impl Gpu {
         self.opened().device.counters.add(Count::Text);
         let source = Source::new(&model, &controller)?;
         Ok((self.sources.shared(source), model.values()))
-    }
-
-    /// See [`crate::backend::Backend::mppi`].
-    pub(in crate::backend) fn mppi<S, C, const NX: usize, const NU: usize, const NC: usize>(
-        &self,
-        system: &S,
-        cost: &C,
-        task: &MppiTask<'_, NX, NU, NC>,
-    ) -> Result<Vec<MppiResult<NU>>>
-    where
-        S: System<NX, NU>,
-        C: Cost<NX, NU, NC>,
-    {
-        recover::mppi(self, system, cost, task)
     }
 }
 

@@ -101,7 +101,7 @@ fn recovery_steers_to_ball_then_cell_then_gate() {
         refused: false,
     };
     let none = vec![false; cells.len()];
-    let planned = [x, at(0.11, -0.7, 0.0, 0.6)];
+    let planned = [x, at(0.11, -0.7, 0.0, 0.6)].map(Vec::from);
     let close = |hybrid: &Hybrid<'_>, standing: &Standing, expected: [f32; 3]| {
         let point = hybrid.recovery_point(&x, standing, &planned);
         let off = point.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
@@ -147,7 +147,7 @@ fn the_gate_is_flown_fast_where_that_counts() {
     let mut gate = at(0.1, -0.05, 0.0, 0.2);
     gate[9] = 0.3;
     assert!(course.system.target(gate) < 0.0);
-    let speed = |pilot: &Hybrid<'_>, x| pilot.fast_problem(0, &race(0, x)).context[0][6];
+    let speed = |pilot: &Hybrid<'_>, x| pilot.fast_problem(0, &race(0, x)).context[6];
     assert_eq!(first_step(&course, &[gate])[0].tier, Some(Tier::Target));
     let pilot = hybrid(&course, 1);
     assert_eq!([speed(&pilot, gate), speed(&pilot, INSIDE)], [0.7, 0.5]);
@@ -161,24 +161,24 @@ fn the_gate_is_flown_fast_where_that_counts() {
 fn the_first_plan_in_the_target_and_the_next() {
     let mut course = Course::new();
     let plan = |course: &Course| hybrid(course, 1).fast_problem(0, &race(0, INSIDE)).plan;
-    assert_eq!(plan(&course), [[-1.0, -0.6, 0.0]; 10]);
+    assert_eq!(plan(&course), [[-1.0, -0.6, 0.0]; 10].as_flattened());
     course.race.hybrid.first_plan = FirstPlan::Zero;
-    assert_eq!(plan(&course), [[0.0; 3]; 10]);
+    assert_eq!(plan(&course), [0.0; 30]);
     course.race.hybrid.first_plan = FirstPlan::Policy;
     // The model of the plan: another gain, and an opponent that does not move.
     let model = DroneRace { ego_gain: 2.0, ..course.system };
     let mut x = INSIDE;
-    for (t, u) in plan(&course).into_iter().enumerate() {
-        assert_eq!(course.policy.control(x).map(|u: f32| u.clamp(-1.0, 1.0)), u, "step {t}");
-        x = model.step(x, u);
+    for (t, u) in plan(&course).as_chunks().0.iter().enumerate() {
+        assert_eq!(course.policy.control(x).map(|u: f32| u.clamp(-1.0, 1.0)), *u, "step {t}");
+        x = model.step(x, *u);
         x[6..].copy_from_slice(&INSIDE[6..]);
     }
     let mut pilot = hybrid(&course, 1);
     let control = pilot.decide(0, &[race(0, INSIDE)]).unwrap()[0].control;
     let kept = pilot.races[0].plan.clone().unwrap();
-    assert_eq!(kept[0], control);
+    assert_eq!(kept[..3], control);
     let next = pilot.fast_problem(1, &race(0, INSIDE)).plan;
-    assert_eq!((&next[..9], next[9]), (&kept[1..], [0.0; 3]));
+    assert_eq!((&next[..27], &next[27..]), (&kept[3..], &[0.0; 3][..]));
 }
 
 #[test]

@@ -97,7 +97,7 @@ pub enum Slot {
     Streams = 17,
     /// `plans`: nominal controls, `[problems, H, NU]`.
     Plans = 18,
-    /// `contexts`: the cells of the cost's map, then what the cost wants to know, `[problems, H, NC]`.
+    /// `contexts`: what the cost wants to know, `[problems, H, NC]`.
     Contexts = 19,
     /// `starts`: `[problems, NX]`.
     Starts = 20,
@@ -115,6 +115,8 @@ pub enum Slot {
     Partials = 26,
     /// `values`: the parameters of the model, in vectors of 4.
     Values = 27,
+    /// `cells`: the costs of the cells of a map.
+    Cells = 28,
 }
 
 impl Kernel {
@@ -160,7 +162,7 @@ impl Kernel {
     }
 
     /// What the kernel binds, for a plant driven by a network or by a formula; for MPPI, where the
-    /// noise is independent and no network takes part.
+    /// noise is independent, and neither context, map nor network takes part.
     pub fn bindings(self, network: bool) -> Vec<(Slot, Access)> {
         use Access::{Read, ReadWrite, Uniform};
         use Slot as S;
@@ -204,7 +206,6 @@ impl Kernel {
             Self::MppiRollout => &[
                 (S::Streams, Read),
                 (S::Plans, Read),
-                (S::Contexts, Read),
                 (S::State, ReadWrite),
                 (S::Totals, ReadWrite),
             ],

@@ -15,6 +15,6 @@ pub use layers::Fused;
 pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;
-pub(super) use mppi::{map_of, tile_steps};
+pub(super) use mppi::tile_steps;
 pub use plant::PlantText;
 pub(super) use plant::layer_kernel;

@@ -1,15 +1,14 @@
-//! The text of the MPPI kernels: recorded dynamics, cost, controls and noise of one task.
-
-use std::array::from_fn;
+//! The text of the MPPI kernels: dynamics, cost, controls and noise of one planning.
 
 use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
-use crate::cost::{Cost, CostMap};
+use super::physics_glue::{Outline, physics_glue};
+use crate::backend::physics::{Function, Part, Role};
 use crate::formula::wgsl::{CHOICES, function};
 use crate::formula::{Expr, Graph, record};
+use crate::model::StageCost;
 use crate::real::Real;
-use crate::rollout::{Disturbance, MppiSpec, MppiTask, NoiseShape, SPLINE_SUPPORT, ValueTerm};
-use crate::system::System;
+use crate::rollout::{Disturbance, MppiSpec, NoiseShape, Planning, SPLINE_SUPPORT, ValueTerm};
 
 const NOISE: &str = include_str!("../../../../shaders/noise.wgsl");
 const INDEPENDENT: &str = include_str!("../../../../shaders/noise_independent.wgsl");
@@ -31,51 +30,59 @@ pub(in super::super) fn tile_steps(controls: usize) -> usize {
     (TILE_TERMS / controls).max(1)
 }
 
-/// The texts of the kernels for one system, cost and setting of the noise; what changes from call
-/// to call (problems, number of samples, iteration, temperature of the weights) is not part of it.
+/// The texts of the kernels for one model, cost and setting of the noise; what changes from call to
+/// call (problems, number of samples, iteration, temperature of the weights) is not part of it, nor
+/// are the values of parameters, the weights of networks and the cells of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MppiText {
-    states: usize,
-    controls: usize,
+    outline: Outline,
+    /// Step, stage, and cell of a map.
+    functions: Vec<Function>,
     /// What both kernels that draw noise need.
     noise: String,
     /// What the rollout needs besides.
-    rollout: String,
+    charge: String,
     /// Tables and networks that are bound besides those of every task.
     noise_table: Option<(Slot, Access)>,
-    networks: Vec<(Slot, Access)>,
+    rollout_tables: Vec<(Slot, Access)>,
 }
 
 impl MppiText {
-    /// Records dynamics, cost, controls and noise of `task`.
-    pub fn new<S, C, const NX: usize, const NU: usize, const NC: usize>(
-        system: &S,
-        cost: &C,
-        task: &MppiTask<'_, NX, NU, NC>,
-    ) -> Self
-    where
-        S: System<NX, NU>,
-        C: Cost<NX, NU, NC>,
-    {
-        let value = task.value.map(|_| (Slot::Value, Access::Read));
-        let push = task.disturbance.map(|_| (Slot::Push, Access::Read));
+    /// Prints the formulas of model, cost, controls and noise of `planning`.
+    pub fn new(planning: &Planning) -> Self {
+        let Planning { model, cost, spec, value, disturbance } = planning;
+        let outline = Outline {
+            states: model.states.len(),
+            controls: model.controls.len(),
+            parameters: model.parameters.len(),
+            period: model.period.unwrap_or(0.0),
+            contexts: cost.contexts,
+            driver: None,
+        };
+        let contexts = [0, cost.contexts];
+        let mut functions = vec![
+            Function::of(model, Role::Step, &model.step, [0, 0]),
+            Function::of(model, Role::Stage, &cost.stage, contexts),
+        ];
+        let cell = cost.map.iter().map(|map| Function::of(model, Role::Cell, &map.cell, [0, 0]));
+        functions.extend(cell);
+        let (states, tables) = (outline.states, rollout_tables(planning, &functions));
         Self {
-            states: NX,
-            controls: NU,
-            noise: noise_text(task.spec),
-            rollout: [
-                recorded_step::<_, NX, NU>(system),
-                charge_text::<_, NX, NU, NC>(cost, task.spec),
-                value_text(task.value.as_ref()),
-                push_text::<NX>(task.disturbance.as_ref()),
+            outline,
+            functions,
+            noise: noise_text(spec),
+            charge: [
+                charge_text(cost, spec),
+                value_text(value.as_ref()),
+                push_text(states, disturbance.as_ref()),
             ]
             .concat(),
-            noise_table: match task.spec.noise().shape() {
+            noise_table: match spec.noise().shape() {
                 NoiseShape::Independent => None,
                 NoiseShape::Colored { .. } => Some((Slot::Carry, Access::ReadWrite)),
                 NoiseShape::Spline { .. } => Some((Slot::Spline, Access::Read)),
             },
-            networks: value.into_iter().chain(push).collect(),
+            rollout_tables: tables,
         }
     }
 
@@ -86,7 +93,7 @@ impl MppiText {
             list.extend(self.noise_table);
         }
         if kernel == Kernel::MppiRollout {
-            list.extend(&self.networks);
+            list.extend(&self.rollout_tables);
         }
         list
     }
@@ -96,14 +103,15 @@ impl MppiText {
     /// # Panics
     /// For any other kernel.
     pub fn compose(&self, kernel: Kernel) -> String {
-        let state = state_glue(self.states);
+        let Outline { states, controls, .. } = self.outline;
+        let state = state_glue(states);
         let parts = match kernel {
             Kernel::MppiStart => {
-                vec![loader("start_of", "State", ("starts", 0), self.states), state]
+                vec![loader("start_of", "State", "starts", states), state]
             }
-            Kernel::MppiRollout => vec![state, self.noise.clone(), self.rollout.clone()],
+            Kernel::MppiRollout => vec![state, self.noise.clone(), self.rollout()],
             Kernel::MppiUpdate => {
-                vec![FINITE.to_owned(), self.noise.clone(), update_text(self.controls)]
+                vec![FINITE.to_owned(), self.noise.clone(), update_text(controls)]
             }
             other => panic!("{other:?} is not a kernel of MPPI"),
         };
@@ -112,30 +120,70 @@ impl MppiText {
             Kernel::MppiRollout => ROLLOUT,
             _ => UPDATE,
         };
-        let sizes = constants(self.states, self.controls);
+        let sizes = constants(states, controls);
         let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts, vec![body.to_owned()]].concat().join("\n")
     }
+
+    /// Operations of the formulas for one step: a line of the text is one.
+    pub(in super::super) fn operations(&self) -> u64 {
+        self.compose(Kernel::MppiRollout).lines().count() as u64
+    }
+
+    /// What the rollout calls besides the noise.
+    fn rollout(&self) -> String {
+        let contexts = self.outline.contexts;
+        let mut text = String::new();
+        if contexts > 0 {
+            text += &format!("alias Context = array<f32, {contexts}>;\n");
+            text += &storage(Slot::Contexts, "contexts");
+            text += &loader("context_at", "Context", "contexts", contexts);
+        }
+        let functions: Vec<&Function> = self.functions.iter().collect();
+        [text, physics_glue(&self.outline, &functions), self.charge.clone()].concat()
+    }
+}
+
+/// What the rollout binds besides what every one does.
+fn rollout_tables(planning: &Planning, functions: &[Function]) -> Vec<(Slot, Access)> {
+    let Planning { cost, value, disturbance, .. } = planning;
+    let reads = functions.iter().any(|function| function.reads(Part::Parameters));
+    let read = |slot| (slot, Access::Read);
+    let mut tables = vec![];
+    tables.extend((cost.contexts > 0).then_some(read(Slot::Contexts)));
+    tables.extend(cost.map.as_ref().map(|_| read(Slot::Cells)));
+    tables.extend(value.as_ref().map(|_| read(Slot::Value)));
+    tables.extend(disturbance.as_ref().map(|_| read(Slot::Push)));
+    tables.extend(reads.then_some((Slot::Values, Access::Constant)));
+    tables
+}
+
+/// A table of numbers that kernels read.
+fn storage(slot: Slot, name: &str) -> String {
+    format!("@group(0) @binding({}) var<storage, read> {name}: array<f32>;\n", slot as u32)
 }
 
 /// The generator, the shape of the noise and the controls that it makes of a plan.
-fn noise_text<const NU: usize>(spec: &MppiSpec<NU>) -> String {
+fn noise_text(spec: &MppiSpec) -> String {
+    let controls = spec.controls();
     let noise = spec.noise();
     let antithetic = noise.antithetic();
     let (shape, recorded) = match noise.shape() {
         NoiseShape::Independent => (INDEPENDENT, String::new()),
-        NoiseShape::Colored { keep, fresh } => (COLORED, recorded_recurrence::<NU>(*keep, *fresh)),
-        NoiseShape::Spline { .. } => (SPLINE, recorded_mixture::<NU>()),
+        NoiseShape::Colored { keep, fresh } => {
+            (COLORED, recorded_recurrence(controls, *keep, *fresh))
+        }
+        NoiseShape::Spline { .. } => (SPLINE, recorded_mixture(controls)),
     };
     [
         format!("const ANTITHETIC: bool = {antithetic};\n"),
         RNG.to_owned(),
         recorded_pair(),
         NOISE.to_owned(),
-        draw(NU),
+        draw(controls),
         recorded,
         shape.to_owned(),
-        loader("plan_at", "Control", ("plans", 0), NU),
+        loader("plan_at", "Control", "plans", controls),
         recorded_control(spec),
     ]
     .join("\n")
@@ -157,165 +205,103 @@ fn draw(controls: usize) -> String {
     text + &format!("    return Control({});\n}}\n", all.join(", "))
 }
 
-/// A function that loads row `row` of a table of rows of `length` numbers, which `ahead` others
-/// precede.
-fn loader(name: &str, kind: &str, (table, ahead): (&str, usize), length: usize) -> String {
-    let alias = if kind == "Context" {
-        format!("alias Context = array<f32, {length}>;\n")
-    } else {
-        String::new()
-    };
+/// A function that loads row `row` of a table of rows of `length` numbers.
+fn loader(name: &str, kind: &str, table: &str, length: usize) -> String {
     let all: Vec<String> = (0..length).map(|i| format!("{table}[at + {i}u]")).collect();
-    let ahead = if ahead > 0 { format!("{ahead}u + ") } else { String::new() };
     format!(
-        "{alias}fn {name}(row: u32) -> {kind} {{\n    let at = {ahead}row * {length}u;\n    \
+        "fn {name}(row: u32) -> {kind} {{\n    let at = row * {length}u;\n    \
          return {kind}({});\n}}\n",
         all.join(", ")
     )
 }
 
 /// `recurrence`: the next of correlated numbers.
-fn recorded_recurrence<const NU: usize>(keep: f32, fresh: f32) -> String {
-    let graph = record(2 * NU, |both| {
-        let next = |i: usize| Expr::lit(keep) * both[i] + Expr::lit(fresh) * both[NU + i];
-        (0..NU).map(next).collect()
+fn recorded_recurrence(count: usize, keep: f32, fresh: f32) -> String {
+    let graph = record(2 * count, |both| {
+        let next = |i: usize| Expr::lit(keep) * both[i] + Expr::lit(fresh) * both[count + i];
+        (0..count).map(next).collect()
     });
-    let arguments = [("before", "Control", NU), ("fresh", "Control", NU)];
-    both("recurrence", "recorded_recurrence", &arguments, ("Control", NU), &graph)
+    let arguments = [("before", "Control", count), ("fresh", "Control", count)];
+    both("recurrence", "recorded_recurrence", &arguments, ("Control", count), &graph)
 }
 
 /// `mixture`: the weighted sum of four knots.
-fn recorded_mixture<const NU: usize>() -> String {
-    let graph = record(SPLINE_SUPPORT * (1 + NU), |inputs| {
+fn recorded_mixture(count: usize) -> String {
+    let graph = record(SPLINE_SUPPORT * (1 + count), |inputs| {
         let (weights, knots) = inputs.split_at(SPLINE_SUPPORT);
         let mixed = |i: usize| {
             weights
                 .iter()
                 .enumerate()
-                .fold(Expr::lit(0.0), |sum, (knot, &weight)| sum + weight * knots[knot * NU + i])
+                .fold(Expr::lit(0.0), |sum, (knot, &weight)| sum + weight * knots[knot * count + i])
         };
-        (0..NU).map(mixed).collect()
+        (0..count).map(mixed).collect()
     });
-    let knot = |name| (name, "Control", NU);
+    let knot = |name| (name, "Control", count);
     let weights = ("weights", "array<f32, 4>", SPLINE_SUPPORT);
     let arguments = [weights, knot("a"), knot("b"), knot("c"), knot("d")];
-    both("mixture", "recorded_mixture", &arguments, ("Control", NU), &graph)
+    both("mixture", "recorded_mixture", &arguments, ("Control", count), &graph)
 }
 
 /// `control_at`: the plan, its noise added, clipped.
-fn recorded_control<const NU: usize>(spec: &MppiSpec<NU>) -> String {
-    let (factor, bounds) = (spec.noise().factor(), spec.settings().bounds);
-    let graph = record(2 * NU, |inputs| {
-        let (plan, z) = inputs.split_at(NU);
+fn recorded_control(spec: &MppiSpec) -> String {
+    let (count, bounds) = (spec.controls(), &spec.settings().bounds);
+    let graph = record(2 * count, |inputs| {
+        let (plan, z) = inputs.split_at(count);
         let control = |i: usize| {
-            let own = Expr::lit(factor[i][i]) * z[i];
+            let factor = spec.noise().factor(i);
+            let own = Expr::lit(factor[i]) * z[i];
             let noise = (0..i)
-                .filter(|&j| factor[i][j] != 0.0)
-                .fold(own, |sum, j| sum + Expr::lit(factor[i][j]) * z[j]);
+                .filter(|&j| factor[j] != 0.0)
+                .fold(own, |sum, j| sum + Expr::lit(factor[j]) * z[j]);
             let [low, high] = bounds[i].map(Expr::lit);
             (plan[i] + noise).clamp(low, high)
         };
-        (0..NU).map(control).collect()
+        (0..count).map(control).collect()
     });
-    let arguments = [("nominal", "Control", NU), ("z", "Control", NU)];
-    both("control_at", "recorded_control", &arguments, ("Control", NU), &graph)
+    let arguments = [("nominal", "Control", count), ("z", "Control", count)];
+    both("control_at", "recorded_control", &arguments, ("Control", count), &graph)
 }
 
-/// `advance`: the dynamics.
-fn recorded_step<S, const NX: usize, const NU: usize>(system: &S) -> String
-where
-    S: System<NX, NU>,
-{
-    let graph = record(NX + NU, |inputs| {
-        system.step(from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i])).to_vec()
-    });
-    let arguments = [("x", "State", NX), ("u", "Control", NU)];
-    both("advance", "plant_step", &arguments, ("State", NX), &graph)
-}
-
-/// `charge` and the contexts that it wants: the cost so far with that of a stage and of its place
+/// `charge`: the cost so far with that of a stage, of its noise where noise costs, and of its place
 /// on the map where there is one.
-fn charge_text<C, const NX: usize, const NU: usize, const NC: usize>(
-    cost: &C,
-    spec: &MppiSpec<NU>,
-) -> String
-where
-    C: Cost<NX, NU, NC>,
-{
-    let cells = map_of(cost).map_or(0, |map| map.cells().len());
-    let contexts = loader("context_at", "Context", ("contexts", cells), NC);
-    if cells == 0 {
-        return [recorded_charge("charge", cost, spec), contexts].concat();
+fn charge_text(cost: &StageCost, spec: &MppiSpec) -> String {
+    let context = if cost.contexts > 0 { "context_at(stage), " } else { "" };
+    let mut text = String::new();
+    let mut sum = format!("total + staged(x, u, {context}t)");
+    if let Some(penalty) = spec.penalty() {
+        text += &recorded_noise_cost(penalty, spec.controls());
+        sum = format!("({sum}) + noise_cost(nominal, u)");
     }
-    let constants = format!("const CELLS: u32 = {cells}u;\n");
-    let staged = recorded_charge("charge_stage", cost, spec);
-    [constants, staged, contexts, recorded_cell(cost), MAP.to_owned()].concat()
+    if let Some(map) = &cost.map {
+        text += &format!("const CELLS: u32 = {}u;\n", map.map.cells().len());
+        text += &storage(Slot::Cells, "cells");
+        text += MAP;
+        sum = format!("({sum}) + map_cost(x, t)");
+    }
+    text + &format!(
+        "fn charge(total: f32, x: State, u: Control, stage: u32, nominal: Control, t: u32) -> f32 \
+         {{\n    return {sum};\n}}\n"
+    )
 }
 
-/// The map of a cost.
-pub(in super::super) fn map_of<C, const NX: usize, const NU: usize, const NC: usize>(
-    cost: &C,
-) -> Option<&CostMap>
-where
-    C: Cost<NX, NU, NC>,
-{
-    cost.map([0.0_f32; NX]).map(|(map, _)| map)
-}
-
-/// `cell_at`: the number of the map's cell at a state.
-fn recorded_cell<C, const NX: usize, const NU: usize, const NC: usize>(cost: &C) -> String
-where
-    C: Cost<NX, NU, NC>,
-{
-    let looked_up = |x: &[Expr]| cost.map::<Expr>(from_fn(|i| x[i])).map(|(map, at)| map.cell(at));
-    let graph = record(NX, |x| looked_up(x).into_iter().collect());
-    both("cell_at", "map_cell", &[("x", "State", NX)], ("f32", 1), &graph)
-}
-
-/// The function `name`: the cost so far with that of a stage, and of its noise where noise costs.
-fn recorded_charge<C, const NX: usize, const NU: usize, const NC: usize>(
-    name: &str,
-    cost: &C,
-    spec: &MppiSpec<NU>,
-) -> String
-where
-    C: Cost<NX, NU, NC>,
-{
-    let graph = record(1 + NX + NU + NC + NU, |inputs| {
-        let (total, rest) = (inputs[0], &inputs[1..]);
-        let u: [Expr; NU] = from_fn(|i| rest[NX + i]);
-        let plan: [Expr; NU] = from_fn(|i| rest[NX + NU + NC + i]);
-        let context = from_fn(|i| rest[NX + NU + i]);
-        let staged = total + cost.stage(from_fn(|i| rest[i]), u, context);
-        vec![match spec.penalty() {
-            None => staged,
-            Some(penalty) => staged + noise_cost(penalty, &plan, &u),
-        }]
+/// `noise_cost`: `lambda plan' Sigma^-1 (u - plan)`.
+fn recorded_noise_cost(penalty: &[f32], count: usize) -> String {
+    let graph = record(2 * count, |inputs| {
+        let (plan, u) = inputs.split_at(count);
+        let row = |i: usize| {
+            (0..count)
+                .fold(Expr::lit(0.0), |row, j| row + Expr::lit(penalty[j * count + i]) * plan[j])
+        };
+        let cost = |cost, i: usize| cost + row(i) * (u[i] - plan[i]);
+        vec![(0..count).fold(Expr::lit(0.0), cost)]
     });
-    let arguments = [
-        ("total", "f32", 1),
-        ("x", "State", NX),
-        ("u", "Control", NU),
-        ("context", "Context", NC),
-        ("nominal", "Control", NU),
-    ];
-    both(name, "stage_cost", &arguments, ("f32", 1), &graph)
-}
-
-/// `lambda plan' Sigma^-1 (u - plan)`.
-fn noise_cost<const NU: usize>(
-    penalty: &[[f32; NU]; NU],
-    plan: &[Expr; NU],
-    u: &[Expr; NU],
-) -> Expr {
-    (0..NU).fold(Expr::lit(0.0), |cost, i| {
-        let row = (0..NU).fold(Expr::lit(0.0), |row, j| row + Expr::lit(penalty[j][i]) * plan[j]);
-        cost + row * (u[i] - plan[i])
-    })
+    let arguments = [("nominal", "Control", count), ("u", "Control", count)];
+    both("noise_cost", "recorded_noise_cost", &arguments, ("f32", 1), &graph)
 }
 
 /// `charge_value`: the cost so far with the penalty on the value.
-fn value_text(term: Option<&ValueTerm<'_>>) -> String {
+fn value_text(term: Option<&ValueTerm>) -> String {
     let Some(term) = term else {
         return "fn charge_value(column: u32, total: f32) -> f32 {\n    return total;\n}\n".into();
     };
@@ -333,21 +319,21 @@ fn value_text(term: Option<&ValueTerm<'_>>) -> String {
 }
 
 /// `disturb`: the state pushed by the disturbance.
-fn push_text<const NX: usize>(disturbance: Option<&Disturbance<'_>>) -> String {
+fn push_text(states: usize, disturbance: Option<&Disturbance>) -> String {
     let head = "fn disturb(column: u32, x: State) -> State {\n";
     let Some(disturbance) = disturbance else {
         return format!("{head}    return x;\n}}\n");
     };
     let outputs = disturbance.entries.len();
-    let graph = record(NX + outputs, |inputs| {
-        let mut x = inputs[..NX].to_vec();
-        for ((state, scale), push) in disturbance.entries.iter().zip(&inputs[NX..]) {
+    let graph = record(states + outputs, |inputs| {
+        let mut x = inputs[..states].to_vec();
+        for ((state, scale), push) in disturbance.entries.iter().zip(&inputs[states..]) {
             x[*state] = x[*state] + Expr::lit(*scale) * *push;
         }
         x
     });
-    let arguments = [("x", "State", NX), ("d", "Push", outputs)];
-    let recorded = both("pushed", "recorded_push", &arguments, ("State", NX), &graph);
+    let arguments = [("x", "State", states), ("d", "Push", outputs)];
+    let recorded = both("pushed", "recorded_push", &arguments, ("State", states), &graph);
     let slot = Slot::Push as u32;
     let mut text = format!(
         "alias Push = array<f32, {outputs}>;\n{recorded}\

@@ -16,6 +16,8 @@ pub(super) struct Outline {
     pub(super) parameters: usize,
     /// Seconds between two steps; 0 where the model does not say.
     pub(super) period: f32,
+    /// Numbers of context that the cost of a stage takes; 0 where there is no cost.
+    pub(super) contexts: usize,
     /// The network that drives, if one does.
     pub(super) driver: Option<Driver>,
 }
@@ -47,7 +49,7 @@ impl Driver {
 }
 
 /// `functions` as recorded and what calls them: `advance`, `target_at`, `constraint_at`,
-/// `control_of`, `observed`, `acted`, all of them given the number of the step.
+/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, all of them given the number of the step.
 pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String {
     let reads = |part| functions.iter().any(|function| function.reads(part));
     let mut glue = String::new();
@@ -95,6 +97,9 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Role::Control => ("control_of", "x: State", "Control", true),
         Role::Observe => ("observed", "x: State", "Inputs", true),
         Role::Act => ("acted", "x: State, said: Outputs", "Control", true),
+        Role::Stage if outline.contexts == 0 => ("staged", "x: State, u: Control", "f32", false),
+        Role::Stage => ("staged", "x: State, u: Control, context: Context", "f32", false),
+        Role::Cell => ("cell_at", "x: State", "f32", false),
     };
     let said = outline.driver.as_ref().map_or(0, |driver| driver.outputs);
     // A single number is an f32 to the recorded function, and an array to the kernel.
@@ -106,6 +111,7 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Part::State => array("x", outline.states),
         Part::Control => array("u", outline.controls),
         Part::Said => array("said", said),
+        Part::Context => array("context", outline.contexts),
         Part::Parameters => "parameters()".to_owned(),
         Part::Seconds => "seconds_at(t)".to_owned(),
         Part::Step => "f32(t)".to_owned(),

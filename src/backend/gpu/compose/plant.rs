@@ -46,6 +46,7 @@ impl PlantText {
                 controls: model.controls.len(),
                 parameters: model.parameters.len(),
                 period: model.period.unwrap_or(0.0),
+                contexts: 0,
                 driver: controller.network().map(Driver::new),
             },
             physics,

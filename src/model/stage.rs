@@ -1,0 +1,110 @@
+//! What a stage of a plan costs, as data.
+
+use std::array::from_fn;
+use std::fmt;
+use std::sync::Arc;
+
+use super::Model;
+use super::recorded::recorded_with;
+use crate::cost::{Cost, CostMap};
+use crate::error::{Error, Result};
+use crate::formula::{Expr, Graph};
+use crate::system::System;
+use crate::tile::{CompiledStages, NativeStages};
+
+/// What a stage of a plan costs.
+///
+/// Its formulas take the inputs of the model, as [`Model::inputs`] counts them; the stage also the
+/// contexts, behind them.
+#[derive(Clone)]
+pub struct StageCost {
+    /// The cost of a stage, a single output; lower is better.
+    pub stage: Graph,
+    /// Numbers that the stage wants to know besides, one row for each stage of a problem.
+    pub contexts: usize,
+    /// What a map charges besides.
+    pub map: Option<MapCost>,
+    /// System and cost as compiled, where they are written in Rust.
+    pub(crate) native: Option<Arc<dyn NativeStages>>,
+}
+
+/// A map, and where a state lies on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapCost {
+    /// The map.
+    pub map: Arc<CostMap>,
+    /// The number of the cell, [`CostMap::cell`] of the place, of the inputs of the model.
+    pub cell: Graph,
+}
+
+impl fmt::Debug for StageCost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { stage, contexts, map, native } = self;
+        let cells = map.as_ref().map(|map| map.map.cells().len());
+        f.debug_struct("StageCost")
+            .field("nodes", &stage.nodes.len())
+            .field("contexts", contexts)
+            .field("cells", &cells)
+            .field("compiled", &native.is_some())
+            .finish()
+    }
+}
+
+impl StageCost {
+    /// The cost of a stage of `system`: recorded, and compiled together with its dynamics.
+    ///
+    /// ```
+    /// use reachcast::cost::Quadratic;
+    /// use reachcast::model::StageCost;
+    /// use reachcast::system::DoubleIntegrator;
+    /// let weights = Quadratic { state: [1.0, 0.1], control: [0.01], obstacle: None };
+    /// let cost = StageCost::of(DoubleIntegrator::default(), weights);
+    /// assert_eq!(cost.contexts, 3, "a reference for both states and the control");
+    /// ```
+    pub fn of<S, C, const NX: usize, const NU: usize, const NC: usize>(system: S, cost: C) -> Self
+    where
+        S: System<NX, NU> + Send + Sync + 'static,
+        C: Cost<NX, NU, NC> + Send + Sync + 'static,
+    {
+        let stage = |x: &[Expr], u: &[Expr], context: &[Expr]| {
+            vec![cost.stage(from_fn(|i| x[i]), from_fn(|i| u[i]), from_fn(|i| context[i]))]
+        };
+        let stage = recorded_with(&system, NC, stage);
+        let map = cost.map([0.0_f32; NX]).map(|(map, _)| MapCost {
+            map: Arc::new(map.clone()),
+            cell: recorded_with(&system, 0, |x, _, _| {
+                let place = cost.map::<Expr>(from_fn(|i| x[i]));
+                place.into_iter().map(|(map, place)| map.cell(place)).collect()
+            }),
+        });
+        let native = Some(Arc::new(CompiledStages { system, cost }) as Arc<dyn NativeStages>);
+        Self { stage, contexts: NC, map, native }
+    }
+
+    /// The same without its compiled form, as if it were given as text: for benches of the two.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn as_text(self) -> Self {
+        Self { native: None, ..self }
+    }
+
+    /// Refuses a cost whose formulas are not of the inputs of `model`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with both numbers.
+    pub(crate) fn check(&self, model: &Model) -> Result<()> {
+        let cell = self.map.as_ref().map(|map| ("map", &map.cell, 0));
+        for (name, graph, more) in [("stage", &self.stage, self.contexts)].into_iter().chain(cell) {
+            let (inputs, outputs) = (model.inputs() + more, graph.outputs.len());
+            if (graph.inputs, outputs) != (inputs, 1) {
+                let has = graph.inputs;
+                let text = format!(
+                    "the {name} takes {has} inputs and gives {outputs} numbers; {inputs} and one \
+                     are needed"
+                );
+                return Err(Error::invalid("cost", text));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,170 @@
+//! The stages of sampled plans: noise becomes controls, costs add up, states move on.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::compiled::{Blocks, load, store};
+use super::{Frame, GRANULE};
+use crate::cost::{Cost, CostMap};
+use crate::real::Vector;
+use crate::real::simd::{Formulas, Instructions};
+use crate::system::System;
+
+/// A system and a cost whose formulas are evaluated for the samples of a tile.
+pub(crate) trait NativeStages: fmt::Debug + Send + Sync {
+    /// Takes the samples through some stages.
+    fn advance(&self, with: Instructions, stages: Stages<'_>);
+}
+
+/// Some stages of the samples of a tile.
+#[derive(Debug)]
+pub(crate) struct Stages<'a> {
+    /// The states, and the cost so far in the row `total`.
+    pub(crate) frame: &'a mut Frame,
+    /// Number of that row.
+    pub(crate) total: usize,
+    /// Noise, then controls, `[groups, H, controls, group]`.
+    pub(crate) controls: &'a mut [f32],
+    /// Samples of a group, a multiple of a vector.
+    pub(crate) group: usize,
+    /// Samples that count; the others are computed along.
+    pub(crate) lanes: usize,
+    /// Which stages.
+    pub(crate) steps: Range<usize>,
+    /// Number of the step of a closed loop that the plan starts at.
+    pub(crate) first_step: u32,
+    /// The nominal plan, `[H, controls]`.
+    pub(crate) plan: &'a [f32],
+    /// What the cost wants to know, `[H, contexts]`.
+    pub(crate) context: &'a [f32],
+    /// Bounds of each control.
+    pub(crate) bounds: &'a [[f32; 2]],
+    /// `lambda Sigma^-1` row by row, where noise costs.
+    pub(crate) penalty: Option<&'a [f32]>,
+}
+
+/// A control of the plan with its noise, within its bounds.
+#[inline(always)]
+pub(crate) fn clipped<V: Vector>(plan: f32, noise: V, [low, high]: [f32; 2]) -> V {
+    (V::lit(plan) + noise).clamp(V::lit(low), V::lit(high))
+}
+
+/// `lambda plan' Sigma^-1 (u - plan)`.
+#[inline(always)]
+pub(crate) fn noise_cost<V: Vector>(penalty: &[f32], plan: &[f32], u: impl Fn(usize) -> V) -> V {
+    let mut cost = V::lit(0.0);
+    for (i, nominal) in plan.iter().enumerate() {
+        let mut row = 0.0;
+        for (j, nominal) in plan.iter().enumerate() {
+            row += penalty[j * plan.len() + i] * nominal;
+        }
+        cost = cost + V::lit(row) * (u(i) - V::lit(*nominal));
+    }
+    cost
+}
+
+/// 2^23: added to a whole number below it, it leaves that number in the mantissa. A conversion to
+/// an integer takes more instructions, for the sake of numbers that no integer holds.
+const WHOLE: f32 = 8_388_608.0;
+/// The mantissa.
+const WHOLE_MASK: u32 = 0x7f_ffff;
+
+/// The costs of the cells of the numbers `cell`; of NaN, whose mantissa is above any cell's number,
+/// that of the last cell, one of the border.
+#[inline(always)]
+pub(crate) fn cell_cost<V: Vector>(map: &CostMap, cell: V) -> V {
+    let cells = map.cells();
+    // Lets the compiler leave out the test of each index.
+    assert!(!cells.is_empty(), "a map has cells");
+    let number = cell + V::lit(WHOLE);
+    number.each(|number| cells[((number.to_bits() & WHOLE_MASK) as usize).min(cells.len() - 1)])
+}
+
+/// A system and a cost as compiled.
+pub(crate) struct CompiledStages<S, C, const NX: usize, const NU: usize, const NC: usize> {
+    pub(crate) system: S,
+    pub(crate) cost: C,
+}
+
+impl<S, C, const NX: usize, const NU: usize, const NC: usize> fmt::Debug
+    for CompiledStages<S, C, NX, NU, NC>
+{
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "compiled stages of {NX} states, {NU} controls and {NC} contexts")
+    }
+}
+
+impl<S, C, const NX: usize, const NU: usize, const NC: usize> NativeStages
+    for CompiledStages<S, C, NX, NU, NC>
+where
+    S: System<NX, NU> + Send,
+    C: Cost<NX, NU, NC> + Send,
+{
+    fn advance(&self, with: Instructions, stages: Stages<'_>) {
+        with.call(Advance { formulas: self, stages });
+    }
+}
+
+/// The stages of all samples, a vector of them at a time: the states stay in registers.
+struct Advance<'a, S, C, const NX: usize, const NU: usize, const NC: usize> {
+    formulas: &'a CompiledStages<S, C, NX, NU, NC>,
+    stages: Stages<'a>,
+}
+
+impl<S, C, const NX: usize, const NU: usize, const NC: usize> Formulas
+    for Advance<'_, S, C, NX, NU, NC>
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let CompiledStages { system, cost } = self.formulas;
+        let Stages { frame, total, controls, group, lanes, steps, plan, context, .. } = self.stages;
+        let (bounds, penalty) = (self.stages.bounds.as_chunks::<NU>().0, self.stages.penalty);
+        let (plan, context) = (plan.as_chunks::<NU>().0, context.as_chunks::<NC>().0);
+        let [bounds] = bounds else { unreachable!("bounds of each control") };
+        let blocks = Blocks::new(frame, lanes);
+        let (states, totals) = (blocks.rows::<NX>(0), blocks.rows::<1>(total));
+        let length = plan.len() * NU * group;
+        for block in 0..blocks.length {
+            for at in (0..GRANULE).step_by(V::WIDTH) {
+                let mut x: [V; NX] = load(&states, block, at);
+                let [mut total]: [V; 1] = load(&totals, block, at);
+                let lane = block * GRANULE + at;
+                let rows = &mut controls[lane / group * length..][..length];
+                let lane = lane % group;
+                for t in steps.clone() {
+                    let rows = &mut rows[t * NU * group..][..NU * group];
+                    let (nominal, stage) = (&plan[t], &context[t]);
+                    let mut u = [V::lit(0.0); NU];
+                    for i in 0..NU {
+                        let place = &mut rows[i * group + lane..];
+                        u[i] = clipped(nominal[i], V::load(place), bounds[i]);
+                        u[i].store(place);
+                    }
+                    total = total + cost.stage(x, u, lit(stage));
+                    if let Some(penalty) = penalty {
+                        total = total + noise_cost(penalty, nominal, |i| u[i]);
+                    }
+                    if let Some((map, place)) = cost.map(x) {
+                        total = total + cell_cost(map, map.cell(place));
+                    }
+                    x = system.step(x, u);
+                }
+                store(x, &states, block, at);
+                store([total], &totals, block, at);
+            }
+        }
+    }
+}
+
+/// Numbers that are the same for all samples.
+#[inline(always)]
+fn lit<V: Vector, const R: usize>(numbers: &[f32; R]) -> [V; R] {
+    let mut vectors = [V::lit(0.0); R];
+    for (vector, number) in vectors.iter_mut().zip(numbers) {
+        *vector = V::lit(*number);
+    }
+    vectors
+}
