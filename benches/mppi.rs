@@ -12,14 +12,14 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::bench::data::{self, PLAN};
 use reachcast::config::{Config, Overrides, Profile};
-use reachcast::cost::{Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::model::Plant;
 use reachcast::policy::Mlp;
+use reachcast::race::{Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::rollout::{CostQuery, MppiProblem, MppiTask, Planning, Query, ValueTerm};
 use reachcast::scenario::global::{check_margins, slice_through};
 use reachcast::scenario::growth_batch::{Request, grow_each};
 use reachcast::scenario::{Context, Unwatched, tightened};
-use reachcast::system::{DroneRace, System};
+use reachcast::system::System;
 
 fn problems(count: u32) -> Vec<MppiProblem> {
     (0..count).map(|number| data::mppi_problem(1, number)).collect()

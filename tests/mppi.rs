@@ -18,12 +18,17 @@ use reachcast::cost::{
     RecoveryCost, Safety, SafetyCone,
 };
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::race::DroneRace;
+use reachcast::race::{
+    Fence, LaneCost, QuadraticCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    SafetyCone,
+};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
     Planning, Purpose, Sigma, Stream, ValueTerm,
 };
-use reachcast::system::{Axis, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, DoubleIntegrator, System};
 
 /// A chain of two integrators without any bound that matters: linear, so that the optimum of a
 /// quadratic cost is known.

@@ -23,6 +23,7 @@ use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
 use reachcast::formula::Function;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
     Ball, CostQuery, DeviationTask, Disturbance, MppiProblem, MppiSettings, MppiSpec, MppiTask,
@@ -30,7 +31,7 @@ use reachcast::rollout::{
     Region, RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, measure,
     pair_measures,
 };
-use reachcast::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, BangBang, DoubleIntegrator, System};
 
 /// Starts of each comparison.
 const BATCH: u64 = 96;

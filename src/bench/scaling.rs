@@ -9,9 +9,9 @@ use crate::backend::{Backend, Program};
 use crate::error::Result;
 use crate::model::Plant;
 use crate::policy::Mlp;
+use crate::race::system::DroneRace;
 use crate::rollout::{Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
 use crate::scenario::Watch;
-use crate::system::DroneRace;
 
 /// Sizes of the batches.
 pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];

@@ -7,12 +7,13 @@ use reachcast::backend::gpu::{Gpu, Injection, NetworkKernels};
 use reachcast::backend::{Action, Backend, Event};
 use reachcast::cost::Quadratic;
 use reachcast::policy::Activation;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     CostQuery, DeviationTask, Farthest, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask,
     PairControl, PairMeasure, Pairs, Planning, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec,
     Stream,
 };
-use reachcast::system::{DoubleIntegrator, DroneRace, System};
+use reachcast::system::{DoubleIntegrator, System};
 use reachcast::{Error, Fault, Result};
 
 use crate::{drawn, gpu, ramp, random_network, whole_box};

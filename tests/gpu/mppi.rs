@@ -10,12 +10,17 @@ use reachcast::cost::{
     RecoveryCost, Safety, SafetyCone,
 };
 use reachcast::policy::{Activation, Mlp};
+use reachcast::race::DroneRace;
+use reachcast::race::{
+    CenterlineCost, Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    SafetyCone,
+};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
     Planning, Purpose, Sigma, Stream, ValueTerm,
 };
-use reachcast::system::{DoubleIntegrator, DroneRace, System};
+use reachcast::system::{DoubleIntegrator, System};
 
 use crate::oracle::{differences, truth};
 use crate::{gpu, random_network};
