@@ -14,7 +14,7 @@ use reachcast::bench::data::{self, PLAN};
 use reachcast::config::{Config, Overrides, Profile};
 use reachcast::model::Plant;
 use reachcast::policy::Mlp;
-use reachcast::race::{Fence, RaceCost, RecoveryCost, Safety};
+use reachcast::race::{DroneRace, Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::rollout::{CostQuery, MppiProblem, MppiTask, Planning, Query, ValueTerm};
 use reachcast::scenario::global::{check_margins, slice_through};
 use reachcast::scenario::growth_batch::{Request, grow_each};

@@ -13,14 +13,10 @@ use std::sync::Arc;
 use common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
-use reachcast::cost::{
-    Cost, Fence, LaneCost, Obstacle, Quadratic, QuadraticCost, RaceCost, RaceReference,
-    RecoveryCost, Safety, SafetyCone,
-};
+use reachcast::cost::{Cost, Obstacle, Quadratic};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
-use reachcast::race::DroneRace;
 use reachcast::race::{
-    Fence, LaneCost, QuadraticCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    DroneRace, Fence, LaneCost, QuadraticCost, RaceCost, RaceReference, RecoveryCost, Safety,
     SafetyCone,
 };
 use reachcast::real::Real;

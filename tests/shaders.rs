@@ -17,11 +17,10 @@ use reachcast::backend::gpu::compose::{
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, Quadratic};
 use reachcast::model::{Controller, Law, Model};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
-use reachcast::race::{Cone, DroneRace};
-use reachcast::race::{Fence, RaceCost, RecoveryCost, Safety};
+use reachcast::race::{Cone, DroneRace, Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::real::Real;
 use reachcast::rollout::{Disturbance, MppiSettings, MppiSpec, NoiseKind, Planning, ValueTerm};
-use reachcast::system::{Axis, BangBang, Cone, DiffDrive, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, BangBang, DiffDrive, DoubleIntegrator, System};
 
 /// One state, one control: the recorded functions take and return plain numbers.
 #[derive(Clone)]

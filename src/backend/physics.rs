@@ -160,7 +160,8 @@ impl Function {
         let (mut at, mut place) = (0, vec![0; graph.inputs]);
         let (mut takes, mut arguments, mut taken) = (Vec::new(), Vec::new(), 0);
         for (part, length) in Part::ALL.into_iter().zip(lengths) {
-            let inputs = at..(at + length).min(graph.inputs);
+            let end = (at + length).min(graph.inputs);
+            let inputs = at.min(end)..end;
             at += length;
             let wanted = role.always(part) || read[inputs.clone()].contains(&true);
             if inputs.is_empty() || !wanted {

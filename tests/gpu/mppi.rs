@@ -5,14 +5,10 @@ use std::sync::Arc;
 
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
-use reachcast::cost::{
-    CenterlineCost, Cost, Fence, LaneCost, Obstacle, Quadratic, RaceCost, RaceReference,
-    RecoveryCost, Safety, SafetyCone,
-};
+use reachcast::cost::{Cost, Obstacle, Quadratic};
 use reachcast::policy::{Activation, Mlp};
-use reachcast::race::DroneRace;
 use reachcast::race::{
-    CenterlineCost, Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    CenterlineCost, DroneRace, Fence, LaneCost, RaceCost, RaceReference, RecoveryCost, Safety,
     SafetyCone,
 };
 use reachcast::real::Real;
