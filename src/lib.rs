@@ -7,24 +7,30 @@
 //! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
 
 pub mod backend;
+#[cfg(feature = "cli")]
 pub mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
 pub mod config;
 pub mod control;
 pub mod cost;
 pub mod digest;
 pub mod error;
+#[cfg(feature = "cli")]
 pub mod experiment;
 pub mod files;
 pub mod formula;
 pub mod model;
 pub mod policy;
 pub mod real;
+#[cfg(feature = "cli")]
 pub mod report;
 pub mod rollout;
 pub mod scenario;
 pub mod system;
 mod tile;
+#[cfg(feature = "cli")]
 pub mod train;
 
 pub use error::{Error, Fault, Result};

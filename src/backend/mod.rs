@@ -2,7 +2,12 @@
 
 pub mod cpu;
 mod event;
+#[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "absent.rs"]
+pub mod gpu;
+mod open;
 mod physics;
 mod program;
 mod softmin;
@@ -22,7 +27,7 @@ pub use event::{Action, Event, add_events};
 pub use physics::physics;
 pub use program::Program;
 
-/// The native CPU, or a GPU through wgpu.
+/// The native CPU, or a GPU through wgpu; in a build without the feature `gpu`, the CPU alone.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "a program has one, and passes it by reference")]
 pub enum Backend {

@@ -10,13 +10,13 @@ mod policy;
 mod progress;
 mod race;
 mod race_input;
-mod remembered;
 mod rollout;
 mod scenarios;
 mod stored;
 mod summary;
 mod sweep;
 mod train;
+mod values;
 
 use std::ffi::OsString;
 use std::io::Write;

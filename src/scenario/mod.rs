@@ -20,6 +20,7 @@ mod stored;
 pub(crate) mod tail;
 mod verify;
 
+#[cfg(feature = "cli")]
 pub(crate) use certify::provenance;
 pub use certify::{Tightened, certify, check_settings, hashes, tightened};
 pub use finding::{CheckReport, Figure, Finding};
