@@ -29,7 +29,10 @@ pub use program::Program;
 
 /// The native CPU, or a GPU through wgpu; in a build without the feature `gpu`, the CPU alone.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "a program has one, and passes it by reference")]
+#[cfg_attr(
+    feature = "gpu",
+    expect(clippy::large_enum_variant, reason = "a program has one, and passes it by reference")
+)]
 pub enum Backend {
     /// Lanes and threads on the host.
     Cpu(Cpu),
