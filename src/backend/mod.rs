@@ -10,14 +10,14 @@ pub mod gpu;
 mod open;
 mod physics;
 mod program;
+mod sink;
 mod softmin;
+mod task;
 
 use crate::cost::Cost;
 use crate::error::Result;
 use crate::policy::Policy;
-use crate::rollout::{
-    DeviationTask, Farthest, MppiResult, MppiTask, PairMeasure, Plant, ReachAvoidTask,
-};
+use crate::rollout::{DeviationTask, Farthest, MppiResult, MppiTask, Plant, ReachAvoidTask};
 use crate::system::System;
 
 use cpu::Cpu;
@@ -26,6 +26,7 @@ use gpu::Gpu;
 pub use event::{Action, Event, add_events};
 pub use physics::physics;
 pub use program::Program;
+pub use sink::{MeasureSink, PairSink};
 
 /// The native CPU, or a GPU through wgpu; in a build without the feature `gpu`, the CPU alone.
 #[derive(Debug)]
@@ -39,13 +40,6 @@ pub enum Backend {
     /// WGSL on an adapter.
     Gpu(Gpu),
 }
-
-/// Receives the measures of starts `first..first + values.len()`, in order of index; an error
-/// stops the batch.
-pub type MeasureSink<'a> = &'a mut dyn FnMut(u64, &[f32]) -> Result<()>;
-
-/// Receives the measures of pairs, like [`MeasureSink`].
-pub type PairSink<'a> = &'a mut dyn FnMut(u64, &[PairMeasure]) -> Result<()>;
 
 impl Backend {
     /// `cpu` or `gpu`.
