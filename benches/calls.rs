@@ -10,11 +10,12 @@ use reachcast::backend::gpu::compose::{Kernel, PlantText};
 use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
 use reachcast::model::{Controller, Model, Plant};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     Plant as TypedPlant, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream,
     Tightening,
 };
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{BangBang, DoubleIntegrator, System};
 
 /// A network from 12 states to 3 controls.
 fn network(width: usize, depth: usize) -> Mlp {

@@ -17,10 +17,10 @@ use reachcast::backend::cpu::Cpu;
 use reachcast::bench::data::{self, Data};
 use reachcast::bench::measure::{Protocol, measure};
 use reachcast::policy::Policy;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     CostQuery, MppiTask, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };
-use reachcast::system::DroneRace;
 
 use scalar::Damping;
 

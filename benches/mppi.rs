@@ -11,14 +11,15 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::bench::data::{self, PLAN};
 use reachcast::config::{Config, Overrides, Profile};
-use reachcast::cost::{Fence, RACE_CONTEXT, RaceCost, RecoveryCost, Safety};
 use reachcast::model::Plant;
 use reachcast::policy::Mlp;
+use reachcast::race::DroneRace;
+use reachcast::race::{Fence, RACE_CONTEXT, RaceCost, RecoveryCost, Safety};
 use reachcast::rollout::{CostQuery, MppiProblem, MppiSpec, MppiTask, Query, ValueTerm};
 use reachcast::scenario::global::{check_margins, slice_through};
 use reachcast::scenario::growth_batch::{Request, grow_each};
 use reachcast::scenario::{Context, Unwatched, tightened};
-use reachcast::system::{DroneRace, System};
+use reachcast::system::System;
 
 fn problems(count: u32) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
     (0..count).map(|number| data::mppi_problem(1, number)).collect()

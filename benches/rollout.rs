@@ -21,6 +21,7 @@ use reachcast::bench::data::{self, Data, HORIZON};
 use reachcast::bench::limits::multiply;
 use reachcast::model;
 use reachcast::policy::{Mlp, Policy};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts,
     Stream, Tightening,
@@ -28,7 +29,6 @@ use reachcast::rollout::{
 use reachcast::scenario::boundary::Boundary;
 use reachcast::scenario::settings::{Settings, SliceAxis};
 use reachcast::scenario::{Context, Unwatched, global, growth};
-use reachcast::system::DroneRace;
 
 use scalar::Damping;
 

@@ -2,7 +2,7 @@
 //! that they support.
 //!
 //! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
-//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`experiment`] and [`mod@bench`];
+//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`race`] and [`mod@bench`];
 //! [`report`]; the command line.
 //! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
 
@@ -17,12 +17,11 @@ pub mod control;
 pub mod cost;
 pub mod digest;
 pub mod error;
-#[cfg(feature = "cli")]
-pub mod experiment;
 pub mod files;
 pub mod formula;
 pub mod model;
 pub mod policy;
+pub mod race;
 pub mod real;
 #[cfg(feature = "cli")]
 pub mod report;
@@ -32,5 +31,8 @@ pub mod system;
 mod tile;
 #[cfg(feature = "cli")]
 pub mod train;
+
+#[doc(hidden)]
+pub use race as experiment;
 
 pub use error::{Error, Fault, Result};

@@ -8,8 +8,8 @@ mod command;
 use command::{Folder, document, done, reachcast, refused};
 use reachcast::config::Config;
 use reachcast::policy::Mlp;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{MppiSettings, MppiSpec, Sigma};
-use reachcast::system::DroneRace;
 use safetensors::tensor::{Dtype, TensorView};
 
 const RACE: &str = "configs/race.toml";

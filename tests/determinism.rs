@@ -6,11 +6,12 @@ use common::{cpu, race_policy, race_settings, settings};
 use reachcast::Error;
 use reachcast::backend::{Backend, Program};
 use reachcast::model::Plant;
+use reachcast::race::DroneRace;
 use reachcast::rollout::States;
 use reachcast::scenario::record::{GrowthOutcome, Record, Timing};
 use reachcast::scenario::settings::Settings;
 use reachcast::scenario::{Unwatched, certify, check, query};
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
+use reachcast::system::{BangBang, DoubleIntegrator};
 
 fn program<'a>(backend: &'a Backend, plant: &Plant) -> Program<'a> {
     backend.prepare(plant).expect("a program")

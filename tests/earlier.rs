@@ -7,9 +7,9 @@ mod command;
 use std::path::{Path, PathBuf};
 
 use command::{done, reachcast};
-use reachcast::experiment::record::RaceRecord;
-use reachcast::experiment::sweep::record::SweepRecord;
 use reachcast::files::read_npz;
+use reachcast::race::record::RaceRecord;
+use reachcast::race::sweep::record::SweepRecord;
 
 /// Results of version 0.1: certificates of `configs/smoke.toml` on the CPU and on lavapipe, three
 /// races of two controllers, a sweep of two points.

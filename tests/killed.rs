@@ -12,11 +12,12 @@ use std::time::{Duration, Instant};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use reachcast::experiment::record::RaceRecord;
-use reachcast::experiment::sweep::record::SweepRecord;
 use reachcast::files::{npz_bytes, read_npz};
 use reachcast::policy::Mlp;
-use reachcast::report::{html, race_html, sweep_html};
+use reachcast::race::record::RaceRecord;
+use reachcast::race::sweep::record::SweepRecord;
+use reachcast::race::{race_html, sweep_html};
+use reachcast::report::html;
 use reachcast::scenario::record::Record;
 use serde_json::{Value, json};
 

@@ -11,17 +11,19 @@ mod oracle;
 use common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
-use reachcast::cost::{
-    Cost, Fence, LaneCost, Obstacle, Quadratic, QuadraticCost, RACE_CONTEXT, RaceCost,
-    RaceReference, RecoveryCost, Safety, SafetyCone,
-};
+use reachcast::cost::{Cost, Obstacle, Quadratic};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::race::DroneRace;
+use reachcast::race::{
+    Fence, LaneCost, QuadraticCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    SafetyCone,
+};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
     Purpose, Sigma, Stream, ValueTerm,
 };
-use reachcast::system::{Axis, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, DoubleIntegrator, System};
 
 /// A chain of two integrators without any bound that matters: linear, so that the optimum of a
 /// quadratic cost is known.

@@ -22,13 +22,14 @@ use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
 use reachcast::formula::Function;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
     Ball, CostQuery, DeviationTask, Disturbance, MppiProblem, MppiSettings, MppiSpec, MppiTask,
     NON_FINITE, NoiseKind, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
     RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, measure, pair_measures,
 };
-use reachcast::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, BangBang, DoubleIntegrator, System};
 
 /// Starts of each comparison.
 const BATCH: u64 = 96;

@@ -10,6 +10,7 @@ use rand::{RngExt, SeedableRng};
 use reachcast::backend::{Backend, Program};
 use reachcast::model;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
     DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Purpose, Query,
@@ -17,7 +18,7 @@ use reachcast::rollout::{
 };
 use reachcast::scenario::settings::{Joint, Settings};
 use reachcast::scenario::{Context, Unwatched, certify, deviation, global};
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{BangBang, DoubleIntegrator, System};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::array::from_fn;
 

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant, SystemTime};
 
-use reachcast::experiment::judge::{Judge, verdict};
-use reachcast::experiment::record::RaceRecord;
 use reachcast::files::{Array, npz_bytes, read_npz};
-use reachcast::system::{DroneRace, System};
+use reachcast::race::DroneRace;
+use reachcast::race::judge::{Judge, verdict};
+use reachcast::race::record::RaceRecord;
+use reachcast::system::System;
 use tempfile::TempDir;
 
 /// A coarse slice, and balls that are small.

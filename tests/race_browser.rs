@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use chromium::{Scheme, browser, check_everywhere, measured, visit_for};
 use races::FRAMES;
-use reachcast::experiment::record::RaceRecord;
-use reachcast::report::race_html;
+use reachcast::race::race_html;
+use reachcast::race::record::RaceRecord;
 use serde_json::{Value, json};
 
 /// Phone, tablet and wide screen, in CSS pixels.

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use reachcast::experiment::record::RaceRecord;
+use reachcast::race::record::RaceRecord;
 use tempfile::TempDir;
 
 const CONFIG: &str = "configs/smoke.toml";

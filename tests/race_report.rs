@@ -6,9 +6,9 @@ mod races;
 
 use page::{assert_sound, attributes, cells, change_strings, drawing, escaped, figure, tags};
 use races::FRAMES;
-use reachcast::experiment::judge::Judge;
-use reachcast::experiment::record::{FrameRecord, RaceRecord};
-use reachcast::report::race_html;
+use reachcast::race::judge::Judge;
+use reachcast::race::race_html;
+use reachcast::race::record::{FrameRecord, RaceRecord};
 
 const FIGURES: [&str; 4] = ["figure-success", "figure-failures", "figure-tiers", "figure-race"];
 

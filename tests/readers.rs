@@ -14,13 +14,13 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed, TestRunner};
 use reachcast::backend::Event;
 use reachcast::config::{Config, Overrides};
-use reachcast::experiment::log::{RaceLog, StepLog, arrays, races};
-use reachcast::experiment::record::RaceRecord;
-use reachcast::experiment::sweep::Store;
-use reachcast::experiment::sweep::record::{PointResult, SweepRecord};
 use reachcast::files::{StateReader, npy_bytes, npz_bytes, read_npz};
 use reachcast::policy::Mlp;
 use reachcast::policy::import::{self, Request};
+use reachcast::race::log::{RaceLog, StepLog, arrays, races};
+use reachcast::race::record::RaceRecord;
+use reachcast::race::sweep::Store;
+use reachcast::race::sweep::record::{PointResult, SweepRecord};
 use reachcast::scenario::record::Record;
 use serde_json::json;
 

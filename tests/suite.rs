@@ -19,11 +19,12 @@ use reachcast::backend::Backend;
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid};
 use reachcast::formula::{Function, record};
 use reachcast::policy::Policy;
+use reachcast::race::{Cone, DroneRace};
 use reachcast::real::{Lanes, Real};
 use reachcast::rollout::{
     Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening, normal_pair,
 };
-use reachcast::system::{Axis, Cone, DiffDrive, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{Axis, DiffDrive, DoubleIntegrator, System};
 
 /// Inputs of every formula: twelve states and three controls of the race; others use the first.
 const INPUTS: usize = 15;

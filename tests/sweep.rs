@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
-use reachcast::experiment::record::RaceRecord;
-use reachcast::experiment::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
+use reachcast::race::record::RaceRecord;
+use reachcast::race::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
 use reachcast::scenario::bound::{required_scenarios, simple_scenarios};
 use reachcast::scenario::record::{GrowthOutcome, Record};
 use sweep_run::{CONFIG, Folder, command, done, message_of, record, sweep};

@@ -7,8 +7,8 @@ mod sweeps;
 
 use chromium::live::Live;
 use chromium::{browser, check_everywhere};
-use reachcast::experiment::sweep::record::SweepRecord;
-use reachcast::report::sweep_html;
+use reachcast::race::sweep::record::SweepRecord;
+use reachcast::race::sweep_html;
 use serde_json::{Value, json};
 
 /// Phone, tablet and wide screen, in CSS pixels.
@@ -111,8 +111,7 @@ fn uneven() -> SweepRecord {
         &[("samples", &["100", "20", "3000"]), ("noise", &["spline:4", "colored:12", "colored:3"])];
     let mut record = sweeps::race_grid(axes);
     for (index, point) in record.points.iter_mut().enumerate() {
-        let reachcast::experiment::sweep::record::PointResult::Race(race) = &mut point.result
-        else {
+        let reachcast::race::sweep::record::PointResult::Race(race) = &mut point.result else {
             panic!("a sweep of races");
         };
         race.effective_samples = (index != 4).then_some([100.0, 9.5, 21.0][index % 3]);

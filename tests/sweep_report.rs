@@ -5,9 +5,9 @@ mod page;
 mod sweeps;
 
 use page::{assert_sound, attributes, change_strings, drawing, escaped, figure, tags};
-use reachcast::experiment::judge::Judge;
-use reachcast::experiment::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
-use reachcast::report::sweep_html;
+use reachcast::race::judge::Judge;
+use reachcast::race::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
+use reachcast::race::sweep_html;
 use reachcast::scenario::record::GrowthOutcome;
 use sweeps::{Axes, certificate_grid, certificates, judged, race_grid, races};
 

@@ -15,13 +15,14 @@ use reachcast::backend::Backend;
 use reachcast::config::Config;
 use reachcast::formula::{Graph, Node, record};
 use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
+use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
     Plant, Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, reach_avoid,
 };
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
 use reachcast::train::device::{Device, floats};

@@ -10,8 +10,9 @@ use reachcast::backend::{Backend, Program};
 use reachcast::bench::data::{self, Data};
 use reachcast::model::{Controller, Model, Plant};
 use reachcast::policy::Policy;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
-use reachcast::system::{DroneRace, System};
+use reachcast::system::System;
 
 use crate::ratio;
 use crate::scalar::Damping;

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::cost::{Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, Safety};
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+use crate::race::cost::{Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, Safety};
+use crate::race::system::DroneRace;
 use crate::rollout::{
     MppiProblem, MppiSettings, MppiSpec, Purpose, Region, RolloutSpec, Sigma, Starts, Stream,
 };
-use crate::system::DroneRace;
 
 /// Steps of a rollout.
 pub const HORIZON: u32 = 30;

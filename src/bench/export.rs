@@ -6,12 +6,12 @@ use serde::Serialize;
 
 use super::data::{self, Data};
 use crate::backend::Backend;
-use crate::cost::RaceCost;
 use crate::error::Result;
 use crate::files::{Existing, Staged, check_room, json, npy_bytes};
 use crate::policy::Mlp;
+use crate::race::cost::RaceCost;
+use crate::race::system::DroneRace;
 use crate::rollout::{CostQuery, MppiTask, Plant, Query, ReachAvoidTask, Starts, Tightening};
-use crate::system::DroneRace;
 
 /// Starts whose measures are exported.
 const MEASURES: usize = 4096;

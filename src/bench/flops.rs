@@ -130,7 +130,8 @@ where
 mod tests {
     use super::*;
     use crate::policy::{Activation, Layer, OutputActivation};
-    use crate::system::{BangBang, DoubleIntegrator, DroneRace};
+    use crate::race::system::DroneRace;
+    use crate::system::{BangBang, DoubleIntegrator};
 
     /// The step of the race by hand: six positions of 2; three velocities of the ego of 4 (clip
     /// twice, scale, add); two of the opponent of 4, and one of 3; five products that make factors

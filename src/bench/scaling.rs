@@ -8,9 +8,10 @@ use super::record::ScalingRecord;
 use crate::backend::Backend;
 use crate::error::Result;
 use crate::policy::Mlp;
+use crate::race::system::DroneRace;
 use crate::rollout::{Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
 use crate::scenario::Watch;
-use crate::system::{DroneRace, System};
+use crate::system::System;
 
 /// Sizes of the batches.
 pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];

@@ -11,11 +11,12 @@ use crate::control::DriveBenchmark;
 use crate::cost::Cost;
 use crate::error::Result;
 use crate::policy::Mlp;
+use crate::race::system::DroneRace;
 use crate::rollout::{
     CostQuery, DeviationTask, Fold, MppiProblem, MppiSpec, MppiTask, PairControl, Pairs, Plant,
     Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, trajectory,
 };
-use crate::system::{DroneRace, System};
+use crate::system::System;
 
 /// Batches of rollouts: the scenarios of a certificate, and those that fill a machine.
 const BATCHES: [u64; 3] = [158, 4096, 65_536];

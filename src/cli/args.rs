@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::options::{Changes, Common, Keys, Replace};
-use super::sweep::SweepArguments;
 use crate::policy::{Activation, OutputActivation};
+use crate::race::command::sweep::SweepArguments;
 use crate::train::settings::Method;
 
 /// Batch rollouts and the probabilistic reach-avoid certificates that they support.
@@ -243,25 +243,25 @@ impl Command {
 
 /// What `race` is asked for.
 #[derive(Args, Clone, Debug)]
-pub(super) struct RaceArguments {
+pub(crate) struct RaceArguments {
     /// Configuration (TOML)
-    pub(super) config: PathBuf,
+    pub(crate) config: PathBuf,
     /// Controllers, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "all")]
-    pub(super) controllers: Vec<String>,
+    pub(crate) controllers: Vec<String>,
     /// Starts: how many to draw from race.start_box, or a file, .npy or .csv [default: race.starts]
     #[arg(long, value_name = "N|FILE")]
-    pub(super) starts: Option<String>,
+    pub(crate) starts: Option<String>,
     /// Runs of each controller, with the noise seeds SEED, SEED + 1, ...
     #[arg(long, value_name = "M", default_value_t = 1)]
-    pub(super) noise_seeds: u64,
+    pub(crate) noise_seeds: u64,
     /// Folder of the results [default: reachcast-race]
     #[arg(long, value_name = "DIR")]
-    pub(super) out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
-    pub(super) replace: Replace,
+    pub(crate) replace: Replace,
     #[command(flatten, next_help_heading = "Configuration")]
-    pub(super) changes: Changes,
+    pub(crate) changes: Changes,
 }
 
 /// What `bench` is asked for.

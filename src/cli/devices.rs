@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Device`] if there is none of that name or kind.
-pub(super) fn open(global: &Global) -> Result<Backend> {
+pub(crate) fn open(global: &Global) -> Result<Backend> {
     let Some(choice) = choice(global)? else { return cpu(global).map(Backend::Cpu) };
     match Gpu::open(&choice) {
         Ok(gpu) if global.common.fallback => Ok(Backend::Gpu(gpu.with_fallback(cpu(global)?))),
@@ -45,7 +45,7 @@ fn choice(global: &Global) -> Result<Option<Choice>> {
 }
 
 /// Says on standard error what failed on the adapter and was worked around.
-pub(super) fn note_events(global: &Global, backend: &Backend) {
+pub(crate) fn note_events(global: &Global, backend: &Backend) {
     if global.common.quiet {
         return;
     }
@@ -60,7 +60,7 @@ pub(super) fn note_events(global: &Global, backend: &Backend) {
 ///
 /// # Errors
 /// [`Error::Device`] if there is none of that name or kind.
-pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
+pub(crate) fn all(global: &Global) -> Result<Vec<Backend>> {
     if global.common.backend != BackendName::Auto || global.common.device.is_some() {
         return Ok(vec![open(global)?]);
     }
@@ -72,12 +72,12 @@ pub(super) fn all(global: &Global) -> Result<Vec<Backend>> {
 }
 
 /// The CPU with the threads asked for.
-pub(super) fn cpu(global: &Global) -> Result<Cpu> {
+pub(crate) fn cpu(global: &Global) -> Result<Cpu> {
     Cpu::new(global.common.threads.map(usize::from))
 }
 
 /// Threads that run the rollouts of `backend`, or that feed it.
-pub(super) fn threads(global: &Global) -> usize {
+pub(crate) fn threads(global: &Global) -> usize {
     let available = || std::thread::available_parallelism().map_or(1, usize::from);
     global.common.threads.map_or_else(available, usize::from)
 }
@@ -92,7 +92,7 @@ struct Listing {
 }
 
 /// Lists the processor and the adapters, and which one `--backend auto` takes.
-pub(super) fn list(global: &Global) -> Result<Outcome> {
+pub(crate) fn list(global: &Global) -> Result<Outcome> {
     let adapters = adapters();
     let count = threads(global);
     let plural = if count == 1 { "" } else { "s" };

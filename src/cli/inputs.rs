@@ -6,7 +6,7 @@ use crate::config::PolicySource;
 use crate::files::Inputs;
 
 /// The configuration at `config`, the policy's file if it has one, and `more`.
-pub(super) fn inputs(
+pub(crate) fn inputs(
     config: &Path,
     policy: &PolicySource,
     more: impl IntoIterator<Item = PathBuf>,

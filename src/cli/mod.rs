@@ -1,20 +1,17 @@
 //! The command line: reads arguments, runs a command, says what came of it by its exit code.
 
-mod args;
+pub(crate) mod args;
 mod bench;
 mod certify;
-mod devices;
-mod inputs;
-mod options;
+pub(crate) mod devices;
+pub(crate) mod inputs;
+pub(crate) mod options;
 mod policy;
-mod progress;
-mod race;
-mod race_input;
+pub(crate) mod progress;
 mod rollout;
 mod scenarios;
 mod stored;
 mod summary;
-mod sweep;
 mod train;
 mod values;
 
@@ -32,7 +29,7 @@ use options::Global;
 
 /// What a command that ran to its end came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Outcome {
+pub(crate) enum Outcome {
     /// All that was asked for.
     Done,
     /// The claim asked for was not obtained.
@@ -71,8 +68,8 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
-        Command::Race(asked) => race::run(global, asked),
-        Command::Sweep(asked) => sweep::run(global, asked),
+        Command::Race(asked) => crate::race::command::race::run(global, asked),
+        Command::Sweep(asked) => crate::race::command::sweep::run(global, asked),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
         Command::Policy(PolicyCommand::Inspect { file, config, .. }) => {
@@ -85,7 +82,11 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
 }
 
 /// Prints `value` as JSON with `--json`, nothing with `-q`, else `text`.
-fn report(global: &Global, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
+pub(crate) fn report(
+    global: &Global,
+    value: &impl Serialize,
+    text: impl FnOnce() -> String,
+) -> Result<()> {
     let text = match (global.common.json, global.common.quiet) {
         (true, _) => json("--json", value)?,
         (false, true) => return Ok(()),
@@ -111,6 +112,6 @@ fn plain(text: &str) -> String {
 }
 
 /// The folder that `path` lies in.
-fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new(""))
 }

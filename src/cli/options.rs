@@ -13,85 +13,85 @@ const MOST_THREADS: i64 = 1024;
 
 /// Options of every command; none of them changes a result on the CPU.
 #[derive(Args, Clone, Debug)]
-pub(super) struct Common {
+pub(crate) struct Common {
     /// Who runs the rollouts; `auto` takes a hardware GPU if there is one, else the CPU
     #[arg(long, global = true, value_enum, default_value_t = BackendName::Auto)]
-    pub(super) backend: BackendName,
+    pub(crate) backend: BackendName,
     /// The GPU adapter whose name contains this, as `devices` lists them
     #[arg(long, global = true, value_name = "NAME")]
-    pub(super) device: Option<String>,
+    pub(crate) device: Option<String>,
     /// Go on on the CPU where no adapter opens, or where it fails for good; it is reported
     #[arg(long, global = true)]
-    pub(super) fallback: bool,
+    pub(crate) fallback: bool,
     /// Threads of the CPU backend [default: as many as the processor runs at once]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
-    pub(super) threads: Option<u16>,
+    pub(crate) threads: Option<u16>,
     /// Print one JSON document on standard output and nothing else
     #[arg(long, global = true)]
-    pub(super) json: bool,
+    pub(crate) json: bool,
     /// Print errors only
     #[arg(short, long, global = true)]
-    pub(super) quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 /// What lies over the keys of a configuration.
 #[derive(Args, Clone, Debug, Default)]
-pub(super) struct Keys {
+pub(crate) struct Keys {
     /// Profile whose defaults count, instead of the configuration's
     #[arg(long, value_enum)]
-    pub(super) profile: Option<Profile>,
+    pub(crate) profile: Option<Profile>,
     /// Override a key of the configuration, for instance rollout.horizon=40; repeatable
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
-    pub(super) set: Vec<String>,
+    pub(crate) set: Vec<String>,
 }
 
 /// Everything that lies over a configuration with random numbers.
 #[derive(Args, Clone, Debug, Default)]
-pub(super) struct Changes {
+pub(crate) struct Changes {
     /// Seed of every random stream, instead of the configuration's
     #[arg(long, value_name = "N")]
-    pub(super) seed: Option<u64>,
+    pub(crate) seed: Option<u64>,
     #[command(flatten)]
-    pub(super) keys: Keys,
+    pub(crate) keys: Keys,
 }
 
 /// Whether results may take the place of others.
 #[derive(Args, Clone, Copy, Debug, Default)]
-pub(super) struct Replace {
+pub(crate) struct Replace {
     /// Replace what an earlier command left at that place
     #[arg(long)]
-    pub(super) overwrite: bool,
+    pub(crate) overwrite: bool,
 }
 
 /// What every command is told by its options, those that it does not have left out.
 #[derive(Clone, Debug)]
-pub(super) struct Global {
+pub(crate) struct Global {
     /// Options of every command.
-    pub(super) common: Common,
+    pub(crate) common: Common,
     /// What lies over the configuration.
-    pub(super) changes: Changes,
+    pub(crate) changes: Changes,
     /// Where the results go.
-    pub(super) out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// What becomes of results that are there.
-    pub(super) existing: Existing,
+    pub(crate) existing: Existing,
 }
 
 impl Global {
     /// What lies over a configuration file.
-    pub(super) fn overrides(&self) -> Overrides {
+    pub(crate) fn overrides(&self) -> Overrides {
         let Changes { seed, keys: Keys { profile, set } } = self.changes.clone();
         Overrides { profile, seed, set }
     }
 
     /// The folder of the results, `usual` unless another one was named.
-    pub(super) fn folder(&self, usual: &str) -> PathBuf {
+    pub(crate) fn folder(&self, usual: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| PathBuf::from(usual))
     }
 }
 
 impl Arguments {
     /// The options that are not of one command alone.
-    pub(super) fn global(&self) -> Global {
+    pub(crate) fn global(&self) -> Global {
         let (changes, out, replace) = self.command.options();
         let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
         Global { common: self.common.clone(), changes, out: out.cloned(), existing }
@@ -100,7 +100,7 @@ impl Arguments {
 
 /// The values of `--backend`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum BackendName {
+pub(crate) enum BackendName {
     /// A hardware GPU if there is one, else the CPU; never a software adapter
     Auto,
     /// The native CPU backend

@@ -37,7 +37,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A bar per stage with rate and time left, on a terminal and for work over a second.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(crate) struct Progress {
     begun: Instant,
     visible: bool,
     bar: Mutex<ProgressBar>,
@@ -45,7 +45,7 @@ pub(super) struct Progress {
 
 impl Progress {
     /// A bar for the command, and the end of the work at Ctrl-C.
-    pub(super) fn new(global: &Global) -> Self {
+    pub(crate) fn new(global: &Global) -> Self {
         // A second handler is refused: tests of this library may run commands side by side.
         let _ = ctrlc::set_handler(interrupt);
         Self {
@@ -56,12 +56,12 @@ impl Progress {
     }
 
     /// Takes the bar off the screen.
-    pub(super) fn finish(&self) {
+    pub(crate) fn finish(&self) {
         self.with_bar(|bar| bar.finish_and_clear());
     }
 
     /// [`Error::Interrupted`] once Ctrl-C was pressed.
-    pub(super) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         match INTERRUPTED.load(Ordering::Relaxed) {
             true => Err(Error::Interrupted),
             false => Ok(()),

@@ -6,7 +6,6 @@ mod layers;
 mod model;
 mod plant;
 mod profile;
-mod race;
 mod section;
 mod settings;
 #[cfg(test)]

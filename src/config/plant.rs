@@ -7,8 +7,9 @@ use super::settings::positive_f32;
 use crate::error::{Error, Result};
 use crate::model;
 use crate::policy::{Mlp, Policy};
+use crate::race::system::DroneRace;
 use crate::rollout::Plant;
-use crate::system::{Axis, BangBang, DoubleIntegrator, DroneRace, System};
+use crate::system::{Axis, BangBang, DoubleIntegrator, System};
 
 /// Work on a plant of any system and policy.
 pub trait Job {

@@ -1,16 +1,17 @@
 //! Defaults: the numbers of each profile for each system, from the published study of the race.
 
-use super::race::race;
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection, SystemSection,
 };
 use super::train;
 use super::value::{Constant, Coordinates, Named};
+use crate::race::defaults::race;
+use crate::race::system::{Cone, DroneRace};
 use crate::rollout::PairControl;
 use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
-use crate::system::{Axis, Cone, DoubleIntegrator, DroneRace, System};
+use crate::system::{Axis, DoubleIntegrator, System};
 
 /// Names of the systems that a configuration can ask for.
 pub(super) const SYSTEMS: [&str; 2] = ["drone-race", "double-integrator"];

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
-use crate::experiment::settings::RaceSettings;
+use crate::race::settings::RaceSettings;
+use crate::race::system::Cone;
 use crate::rollout::PairControl;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
-use crate::system::Cone;
 use crate::train::settings::TrainSettings;
 
 /// Intervals by state name, in state order.
@@ -84,7 +84,7 @@ impl Profile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SystemSection {
-    /// [`crate::system::DroneRace`].
+    /// [`crate::race::system::DroneRace`].
     DroneRace {
         /// Form of the collision cone.
         cone: Cone,

@@ -1,14 +1,13 @@
 //! Tests of the configuration: profiles, layers, unknown keys, and values out of range.
 
 use super::*;
-use crate::control::{BarrierForm, Widening};
-use crate::cost::{CenterlineCost, LaneCost, QuadraticCost, RaceCost, RecoveryCost};
-use crate::experiment::judge::Judge;
-use crate::experiment::settings::{
-    FirstPlan, PlanSettings, RaceSettings, RecoveryPoint, SigmaSetting,
-};
+use crate::race::barrier::{BarrierForm, Widening};
+use crate::race::cost::{CenterlineCost, LaneCost, QuadraticCost, RaceCost, RecoveryCost};
+use crate::race::judge::Judge;
+use crate::race::settings::{FirstPlan, PlanSettings, RaceSettings, RecoveryPoint, SigmaSetting};
+use crate::race::system::{Cone, DroneRace};
 use crate::scenario::settings::{BoundarySearch, Joint, Settings};
-use crate::system::{Cone, DoubleIntegrator, DroneRace, System};
+use crate::system::{DoubleIntegrator, System};
 
 const RACE: &str = "system.name = 'drone-race'\npolicy.file = 'race.safetensors'\n";
 const LINE: &str = "system.name = 'double-integrator'\npolicy.formula = 'bang-bang'\n";

@@ -3,15 +3,10 @@
 mod goal;
 mod map;
 mod quadratic;
-mod race;
 
 pub use goal::GoalCost;
 pub use map::{CostMap, Grid, MAX_CELLS};
 pub use quadratic::{Obstacle, Quadratic};
-pub use race::{
-    CenterlineCost, Fence, LaneCost, QuadraticCost, RACE_CONTEXT, RaceCost, RaceReference,
-    RecoveryCost, Safety, SafetyCone,
-};
 
 use crate::real::Real;
 
@@ -35,12 +30,12 @@ pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {
 
 /// `x^2`.
 #[inline(always)]
-fn square<R: Real>(x: R) -> R {
+pub(crate) fn square<R: Real>(x: R) -> R {
     x * x
 }
 
 /// `max(0, x)^2`.
 #[inline(always)]
-fn hinge<R: Real>(x: R) -> R {
+pub(crate) fn hinge<R: Real>(x: R) -> R {
     square(x.max(R::lit(0.0)))
 }

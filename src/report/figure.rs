@@ -3,21 +3,21 @@
 use super::text::escape;
 
 /// One figure; `drawing` is SVG, every other text is escaped here.
-pub(super) struct Figure {
+pub(crate) struct Figure {
     /// Anchor, unique in the page.
-    pub(super) id: &'static str,
+    pub(crate) id: &'static str,
     /// Title.
-    pub(super) title: String,
+    pub(crate) title: String,
     /// The drawing, or why there is none.
-    pub(super) drawing: Result<String, String>,
+    pub(crate) drawing: Result<String, String>,
     /// Swatches and what they stand for.
-    pub(super) legend: Vec<(Swatch, String)>,
+    pub(crate) legend: Vec<(Swatch, String)>,
     /// What the figure shows and how to read it.
-    pub(super) caption: String,
+    pub(crate) caption: String,
 }
 
 /// What a legend shows beside a name.
-pub(super) enum Swatch {
+pub(crate) enum Swatch {
     /// A line of these classes.
     Line(&'static str),
     /// An area of these classes.
@@ -44,7 +44,7 @@ impl Swatch {
 
 impl Figure {
     /// The figure as HTML.
-    pub(super) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let drawing = match &self.drawing {
             Ok(drawing) => drawing.clone(),
             Err(reason) => format!("<p class=\"empty\">{}</p>", escape(reason)),
@@ -67,18 +67,18 @@ impl Figure {
 }
 
 /// The state from which slice and growth start: a diamond with a halo.
-pub(super) fn diamond() -> String {
+pub(crate) fn diamond() -> String {
     "<path class=\"halo\" d=\"M0-7L6 0L0 7L-6 0Z\"/><path class=\"state\" d=\"M0-7L6 0L0 7L-6 0Z\"/>"
         .to_owned()
 }
 
 /// A failure.
-pub(super) fn cross(size: f64) -> String {
+pub(crate) fn cross(size: f64) -> String {
     let path = format!("M-{size}-{size}L{size} {size}M-{size} {size}L{size}-{size}");
     format!("<path class=\"halo thin\" d=\"{path}\"/><path class=\"bad-line\" d=\"{path}\"/>")
 }
 
 /// A success.
-pub(super) fn dot(size: f64) -> String {
+pub(crate) fn dot(size: f64) -> String {
     format!("<circle class=\"good\" r=\"{size}\"/>")
 }

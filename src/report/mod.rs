@@ -6,27 +6,21 @@
 //! neither the reader's light or dark setting nor a phone's width.
 
 mod contour;
-mod figure;
+pub(crate) mod figure;
 mod figures;
 mod html;
-mod losses;
-mod palette;
-mod plot;
-mod race;
-mod scale;
-mod sheet;
-mod shell;
+pub(crate) mod palette;
+pub(crate) mod plot;
+pub(crate) mod scale;
+pub(crate) mod sheet;
+pub(crate) mod shell;
 mod slice;
-mod sortable;
-mod span;
-mod sweep;
-mod table;
-mod text;
+pub(crate) mod sortable;
+pub(crate) mod span;
+pub(crate) mod table;
+pub(crate) mod text;
 mod train;
-mod verdicts;
 mod words;
 
 pub use html::html;
-pub use race::race_html;
-pub use sweep::sweep_html;
 pub use train::train_html;

@@ -3,7 +3,7 @@
 use super::span::Span;
 
 /// Steps of the scale on each side of zero.
-pub(super) const LEVELS: usize = 16;
+pub(crate) const LEVELS: usize = 16;
 
 /// Colours from next to zero to the end of the scale.
 type Stops = [[u8; 3]; 4];
@@ -16,7 +16,7 @@ const DARK_ABOVE: Stops = [[32, 48, 64], [32, 88, 136], [72, 156, 220], [190, 22
 /// Class of a value: `n1..` at or below zero, `p1..` above, `nf` where it is not finite.
 ///
 /// Steps are even in the square root of the value, so that small margins near zero show.
-pub(super) fn class(value: f64, limit: f64) -> String {
+pub(crate) fn class(value: f64, limit: f64) -> String {
     if !super::text::ordinary(value) {
         return "nf".to_owned();
     }
@@ -26,13 +26,13 @@ pub(super) fn class(value: f64, limit: f64) -> String {
 }
 
 /// Class of a value between `limits`, in even steps: `p1..`, one hue from light to strong.
-pub(super) fn even(value: f64, limits: Span) -> String {
+pub(crate) fn even(value: f64, limits: Span) -> String {
     let share = (value - limits.low) / limits.width();
     format!("p{}", ((share * LEVELS as f64).ceil() as usize).clamp(1, LEVELS))
 }
 
 /// The style rules of the scale, light first, then dark for screens.
-pub(super) fn rules() -> String {
+pub(crate) fn rules() -> String {
     format!(
         "{}\n@media screen and (prefers-color-scheme: dark) {{ {} }}\n",
         theme(LIGHT_BELOW, LIGHT_ABOVE),

@@ -21,7 +21,7 @@ const NAME: usize = 44;
 
 /// How the axes fill the plot.
 #[derive(Clone, Copy)]
-pub(super) enum Shape {
+pub(crate) enum Shape {
     /// All of the width, and this height.
     Free(f64),
     /// One unit as long across as upwards.
@@ -29,28 +29,28 @@ pub(super) enum Shape {
 }
 
 /// Name of an axis and whether its ticks draw lines across the plot.
-pub(super) struct Labels<'a> {
+pub(crate) struct Labels<'a> {
     /// Below the plot.
-    pub(super) x: &'a str,
+    pub(crate) x: &'a str,
     /// Left of the plot.
-    pub(super) y: &'a str,
+    pub(crate) y: &'a str,
     /// Whole numbers only along x, as for steps and rounds.
-    pub(super) whole: bool,
+    pub(crate) whole: bool,
 }
 
 /// Where ticks stand along an axis, ascending, and what they say.
-pub(super) type Ticks = Vec<(f64, String)>;
+pub(crate) type Ticks = Vec<(f64, String)>;
 
 /// An axis with ticks of its own, in place of round numbers.
-pub(super) struct Axis {
+pub(crate) struct Axis {
     /// What it covers.
-    pub(super) span: Span,
+    pub(crate) span: Span,
     /// Its ticks; a label that would touch the one before it is left out.
-    pub(super) ticks: Ticks,
+    pub(crate) ticks: Ticks,
 }
 
 /// A plot under construction.
-pub(super) struct Plot {
+pub(crate) struct Plot {
     id: String,
     x: Span,
     y: Span,
@@ -67,12 +67,12 @@ pub(super) struct Plot {
 
 impl Plot {
     /// An empty plot; `id` names its clip path and is unique in the page.
-    pub(super) fn new(id: &str, x: Span, y: Span, shape: Shape) -> Self {
+    pub(crate) fn new(id: &str, x: Span, y: Span, shape: Shape) -> Self {
         Self::across_width(id, x, y, shape, WIDTH)
     }
 
     /// An empty plot that is `outer` wide with its labels.
-    pub(super) fn across_width(id: &str, x: Span, y: Span, shape: Shape, outer: f64) -> Self {
+    pub(crate) fn across_width(id: &str, x: Span, y: Span, shape: Shape, outer: f64) -> Self {
         let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
         let room = |y: Span, height: f64| room(&round(y, height / 46.0));
         let (mut width, mut height) = (outer - MARGIN - room(y, 400.0), 0.0);
@@ -105,7 +105,7 @@ impl Plot {
     }
 
     /// An empty plot between two axes of their own; `right` is left free beside it.
-    pub(super) fn ticked(id: &str, axes: [Axis; 2], height: f64, [outer, right]: [f64; 2]) -> Self {
+    pub(crate) fn ticked(id: &str, axes: [Axis; 2], height: f64, [outer, right]: [f64; 2]) -> Self {
         let [x, y] = axes;
         let left = room(&y.ticks);
         let empty = Self::across_width(id, x.span, y.span, Shape::Free(height), outer);
@@ -124,22 +124,22 @@ impl Plot {
     }
 
     /// Where `x` lies across the plot.
-    pub(super) fn across(&self, x: f64) -> f64 {
+    pub(crate) fn across(&self, x: f64) -> f64 {
         self.left + self.width * (x - self.x.low) / self.x.width()
     }
 
     /// Where `y` lies down the plot.
-    pub(super) fn down(&self, y: f64) -> f64 {
+    pub(crate) fn down(&self, y: f64) -> f64 {
         MARGIN + self.height * (self.y.high - y) / self.y.width()
     }
 
     /// Length of a data distance across and down.
-    pub(super) fn lengths(&self, distance: f64) -> [f64; 2] {
+    pub(crate) fn lengths(&self, distance: f64) -> [f64; 2] {
         [distance * self.width / self.x.width(), distance * self.height / self.y.width()]
     }
 
     /// Path data through `points`; breaks where a point cannot be drawn.
-    pub(super) fn line(&self, points: impl IntoIterator<Item = [f64; 2]>) -> String {
+    pub(crate) fn line(&self, points: impl IntoIterator<Item = [f64; 2]>) -> String {
         let mut path = String::new();
         let mut pen = 'M';
         for [x, y] in points {
@@ -155,29 +155,29 @@ impl Plot {
     }
 
     /// Path data of a closed polygon.
-    pub(super) fn polygon(&self, points: impl IntoIterator<Item = [f64; 2]>) -> String {
+    pub(crate) fn polygon(&self, points: impl IntoIterator<Item = [f64; 2]>) -> String {
         self.line(points) + "Z"
     }
 
     /// Path data of a rectangle between two corners.
-    pub(super) fn rectangle(&self, [x0, y0, x1, y1]: [f64; 4]) -> String {
+    pub(crate) fn rectangle(&self, [x0, y0, x1, y1]: [f64; 4]) -> String {
         self.polygon([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     }
 
     /// Draws path data inside the axes.
-    pub(super) fn path(&mut self, class: &str, data: &str) {
+    pub(crate) fn path(&mut self, class: &str, data: &str) {
         if !data.is_empty() {
             self.clipped += &format!("<path class=\"{class}\" d=\"{data}\"/>");
         }
     }
 
     /// Draws a fragment in the units of the plot, inside the axes.
-    pub(super) fn fragment(&mut self, drawing: &str) {
+    pub(crate) fn fragment(&mut self, drawing: &str) {
         self.clipped += drawing;
     }
 
     /// Draws an ellipse with its half axes in plot units, inside the axes.
-    pub(super) fn ellipse(&mut self, class: &str, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) {
+    pub(crate) fn ellipse(&mut self, class: &str, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) {
         if ordinary(x) && ordinary(y) && ordinary(rx) && ordinary(ry) {
             self.clipped += &format!(
                 "<ellipse class=\"{class}\" cx=\"{}\" cy=\"{}\" rx=\"{}\" ry=\"{}\"/>",
@@ -190,19 +190,19 @@ impl Plot {
     }
 
     /// Puts a mark, drawn around the origin, at a point of the plot; nothing outside the axes.
-    pub(super) fn mark(&mut self, point: [f64; 2], drawing: &str) {
+    pub(crate) fn mark(&mut self, point: [f64; 2], drawing: &str) {
         let mark = self.placed(point, drawing);
         self.marks += &mark;
     }
 
     /// Puts a mark under the paths that are drawn after it.
-    pub(super) fn speck(&mut self, point: [f64; 2], drawing: &str) {
+    pub(crate) fn speck(&mut self, point: [f64; 2], drawing: &str) {
         let mark = self.placed(point, drawing);
         self.clipped += &mark;
     }
 
     /// Puts a mark right of the axes, at a height of the plot.
-    pub(super) fn beside(&mut self, down: f64, drawing: &str) {
+    pub(crate) fn beside(&mut self, down: f64, drawing: &str) {
         let (across, down) = (coordinate(self.left + self.width + 6.0), coordinate(down));
         self.marks += &format!("<g transform=\"translate({across} {down})\">{drawing}</g>");
     }
@@ -220,7 +220,7 @@ impl Plot {
     }
 
     /// A strip below the axes, `height` tall, drawn from its upper left corner, `width` wide.
-    pub(super) fn strip(&mut self, height: f64, draw: impl FnOnce(f64) -> String) {
+    pub(crate) fn strip(&mut self, height: f64, draw: impl FnOnce(f64) -> String) {
         let (left, top) = (coordinate(self.left), coordinate(MARGIN + self.height + FOOT));
         let drawing = draw(self.width);
         self.foot = format!("<g transform=\"translate({left} {top})\">{drawing}</g>");
@@ -228,7 +228,7 @@ impl Plot {
     }
 
     /// The whole drawing; `description` is read out in its place.
-    pub(super) fn finish(self, labels: &Labels, description: &str) -> String {
+    pub(crate) fn finish(self, labels: &Labels, description: &str) -> String {
         let [left, right] = [self.left, self.left + self.width].map(coordinate);
         let [top, bottom] = [MARGIN, MARGIN + self.height].map(coordinate);
         let [width, height] = [self.width, self.height].map(coordinate);
@@ -341,7 +341,7 @@ fn room(ticks: &Ticks) -> f64 {
 }
 
 /// A tick's value with a true minus sign.
-pub(super) fn label(tick: f64, decimals: usize) -> String {
+pub(crate) fn label(tick: f64, decimals: usize) -> String {
     // Zero comes out of the multiplication with a sign, now and then.
     let tick = if tick.abs() < 1e-12 { 0.0 } else { tick };
     let text = if tick != 0.0 && !(1e-4..1e6).contains(&tick.abs()) {
@@ -353,7 +353,7 @@ pub(super) fn label(tick: f64, decimals: usize) -> String {
 }
 
 /// A coordinate of the drawing, to a hundredth; far points are brought near, outside the axes.
-pub(super) fn coordinate(value: f64) -> String {
+pub(crate) fn coordinate(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value.clamp(-1e4, 1e4) };
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

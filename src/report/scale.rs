@@ -11,19 +11,19 @@ const LABEL: usize = 7;
 
 /// A scale: what it covers, in places.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     log: bool,
     span: Span,
 }
 
 impl Scale {
     /// Linear between two values.
-    pub(super) fn linear(low: f64, high: f64) -> Self {
+    pub(crate) fn linear(low: f64, high: f64) -> Self {
         Self { log: false, span: Span { low, high } }
     }
 
     /// Logarithmic if all values are positive, else from 0; `None` without values.
-    pub(super) fn log(values: &[f64]) -> Option<Self> {
+    pub(crate) fn log(values: &[f64]) -> Option<Self> {
         let span = Span::of(values.iter().copied())?;
         if span.low <= 0.0 {
             return Self::from_zero(values);
@@ -33,7 +33,7 @@ impl Scale {
     }
 
     /// Logarithmic if the values span more than a decade, else linear; `None` without values.
-    pub(super) fn fitting(values: &[f64]) -> Option<Self> {
+    pub(crate) fn fitting(values: &[f64]) -> Option<Self> {
         let span = Span::of(values.iter().copied())?;
         if span.low > 0.0 && span.high > 10.0 * span.low {
             return Self::log(values);
@@ -43,35 +43,35 @@ impl Scale {
     }
 
     /// From 0 to a little above the largest value; `None` without values.
-    pub(super) fn from_zero(values: &[f64]) -> Option<Self> {
+    pub(crate) fn from_zero(values: &[f64]) -> Option<Self> {
         let span = Span::of(values.iter().copied().chain([0.0]))?;
         let top = if span.high > 0.0 { span.high * (1.0 + EDGE) } else { 1.0 };
         (!values.is_empty()).then(|| Self::linear(span.low.min(0.0), top))
     }
 
     /// Whether it is logarithmic.
-    pub(super) fn is_log(self) -> bool {
+    pub(crate) fn is_log(self) -> bool {
         self.log
     }
 
     /// What it covers, in places.
-    pub(super) fn span(self) -> Span {
+    pub(crate) fn span(self) -> Span {
         self.span
     }
 
     /// Where `value` lies.
-    pub(super) fn place(self, value: f64) -> f64 {
+    pub(crate) fn place(self, value: f64) -> f64 {
         if self.log { value.log10() } else { value }
     }
 
     /// The axis with ticks at round values, about `parts` of them.
-    pub(super) fn axis(self, parts: f64) -> Axis {
+    pub(crate) fn axis(self, parts: f64) -> Axis {
         let values = if self.log { self.decades() } else { self.span.ticks(parts).0 };
         self.axis_at(values.into_iter().map(|value| (value, tick(value))))
     }
 
     /// The axis with a tick at each of the values.
-    pub(super) fn axis_at(self, values: impl IntoIterator<Item = (f64, String)>) -> Axis {
+    pub(crate) fn axis_at(self, values: impl IntoIterator<Item = (f64, String)>) -> Axis {
         let ticks =
             values.into_iter().map(|(value, text)| (self.place(value), shorten(&text, LABEL)));
         Axis { span: self.span, ticks: ticks.collect::<Ticks>() }

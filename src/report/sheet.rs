@@ -4,11 +4,11 @@ use super::plot::coordinate;
 use super::text::escape;
 
 /// Width of a drawing in its own units, about a phone's.
-pub(super) const WIDTH: f64 = 340.0;
+pub(crate) const WIDTH: f64 = 340.0;
 
 /// Where a text is held.
 #[derive(Clone, Copy)]
-pub(super) enum Anchor {
+pub(crate) enum Anchor {
     /// Its left end.
     Start,
     /// Its middle.
@@ -19,13 +19,13 @@ pub(super) enum Anchor {
 
 /// A drawing under construction.
 #[derive(Default)]
-pub(super) struct Sheet {
+pub(crate) struct Sheet {
     body: String,
 }
 
 impl Sheet {
     /// A text with its baseline at `y`.
-    pub(super) fn text(&mut self, class: &str, [x, y]: [f64; 2], anchor: Anchor, text: &str) {
+    pub(crate) fn text(&mut self, class: &str, [x, y]: [f64; 2], anchor: Anchor, text: &str) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -40,25 +40,25 @@ impl Sheet {
     }
 
     /// A rectangle between two corners, `[x0, y0, x1, y1]`.
-    pub(super) fn area(&mut self, class: &str, [x0, y0, x1, y1]: [f64; 4]) {
+    pub(crate) fn area(&mut self, class: &str, [x0, y0, x1, y1]: [f64; 4]) {
         let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(coordinate);
         self.path(class, &format!("M{x0} {y0}H{x1}V{y1}H{x0}Z"));
     }
 
     /// A line from top to bottom.
-    pub(super) fn upright(&mut self, class: &str, x: f64, [from, to]: [f64; 2]) {
+    pub(crate) fn upright(&mut self, class: &str, x: f64, [from, to]: [f64; 2]) {
         let data = format!("M{} {}V{}", coordinate(x), coordinate(from), coordinate(to));
         self.path(class, &data);
     }
 
     /// A line from left to right with a stroke across each end.
-    pub(super) fn whisker(&mut self, class: &str, [x0, x1]: [f64; 2], y: f64) {
+    pub(crate) fn whisker(&mut self, class: &str, [x0, x1]: [f64; 2], y: f64) {
         let [x0, x1, y, from, to] = [x0, x1, y, y - 3.0, y + 3.0].map(coordinate);
         self.path(class, &format!("M{x0} {from}V{to}M{x0} {y}H{x1}M{x1} {from}V{to}"));
     }
 
     /// A mark drawn around the origin.
-    pub(super) fn mark(&mut self, [x, y]: [f64; 2], drawing: &str) {
+    pub(crate) fn mark(&mut self, [x, y]: [f64; 2], drawing: &str) {
         let (x, y) = (coordinate(x), coordinate(y));
         self.body += &format!("<g transform=\"translate({x} {y})\">{drawing}</g>");
     }
@@ -68,7 +68,7 @@ impl Sheet {
     }
 
     /// The drawing, `height` tall; `description` is read out in its place.
-    pub(super) fn finish(self, height: f64, description: &str) -> String {
+    pub(crate) fn finish(self, height: f64, description: &str) -> String {
         format!(
             "<svg class=\"plot\" role=\"img\" aria-label=\"{}\" viewBox=\"0 0 {WIDTH} {}\">{}</svg>",
             escape(description),
@@ -79,7 +79,7 @@ impl Sheet {
 }
 
 /// Drawings side by side, each under a title of its own.
-pub(super) fn panels(panels: &[(String, String)]) -> String {
+pub(crate) fn panels(panels: &[(String, String)]) -> String {
     let panel = |(title, drawing): &(String, String)| {
         format!("<div class=\"panel\"><h4>{}</h4>{drawing}</div>", escape(title))
     };

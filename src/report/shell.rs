@@ -7,13 +7,13 @@ use crate::scenario::record::Provenance;
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
 /// The pattern of violated constraints, shared by all figures.
-pub(super) const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+pub(crate) const HATCH: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
     <pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
     <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern></defs></svg>\n";
 /// The style of panels of small drawings, for the pages that have them.
-pub(super) const SHEET_STYLE: &str = include_str!("sheet.css");
+pub(crate) const SHEET_STYLE: &str = include_str!("sheet.css");
 /// The patterns that tell classes and tiers apart without colour.
-pub(super) const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
+pub(crate) const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>\
     <pattern id=\"rising\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
     <path d=\"M-1.5 1.5L1.5-1.5M0 6L6 0M4.5 7.5L7.5 4.5\"/></pattern>\
     <pattern id=\"falling\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\">\
@@ -28,7 +28,7 @@ pub(super) const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>
 
 /// Which scripts a page allows to run.
 #[derive(Clone, Copy)]
-pub(super) enum Scripts {
+pub(crate) enum Scripts {
     /// None at all.
     None,
     /// Those in the page itself.
@@ -36,7 +36,7 @@ pub(super) enum Scripts {
 }
 
 /// The head of a document that loads nothing; `styles` follow the style of every page.
-pub(super) fn head(title: &str, styles: &str, scripts: Scripts) -> String {
+pub(crate) fn head(title: &str, styles: &str, scripts: Scripts) -> String {
     let scripts = match scripts {
         Scripts::None => "",
         Scripts::Own => "script-src 'unsafe-inline'; ",
@@ -54,17 +54,17 @@ pub(super) fn head(title: &str, styles: &str, scripts: Scripts) -> String {
 }
 
 /// An outcome that leads the page.
-pub(super) struct Headline {
+pub(crate) struct Headline {
     /// Whose, and of what.
-    pub(super) title: String,
+    pub(crate) title: String,
     /// The outcome.
-    pub(super) value: String,
+    pub(crate) value: String,
     /// What belongs to it, one sentence each.
-    pub(super) details: Vec<String>,
+    pub(crate) details: Vec<String>,
 }
 
 /// The card of a headline.
-pub(super) fn card(headline: &Headline) -> String {
+pub(crate) fn card(headline: &Headline) -> String {
     let details = headline.details.iter().map(|text| format!("<p>{}</p>", escape(text)));
     format!(
         "<section class=\"card claim\"><h2>{}</h2><p class=\"headline\">{}</p>{}</section>\n",
@@ -75,13 +75,13 @@ pub(super) fn card(headline: &Headline) -> String {
 }
 
 /// The foot of the page, with what it says of repeated runs.
-pub(super) fn footer(provenance: &Provenance, repeated: &str) -> String {
+pub(crate) fn footer(provenance: &Provenance, repeated: &str) -> String {
     let version = escape(&provenance.version);
     format!("<footer>Written by reachcast {version} from one record; {repeated}.</footer>\n")
 }
 
 /// What failed on the adapter and was worked around; nothing where nothing did.
-pub(super) fn failures(events: &[Event]) -> String {
+pub(crate) fn failures(events: &[Event]) -> String {
     if events.is_empty() {
         return String::new();
     }
@@ -96,7 +96,7 @@ pub(super) fn failures(events: &[Event]) -> String {
 }
 
 /// What has to be said beside the figures; nothing where there is nothing.
-pub(super) fn notes(notes: &[String]) -> String {
+pub(crate) fn notes(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();
     }
@@ -108,12 +108,12 @@ pub(super) fn notes(notes: &[String]) -> String {
 }
 
 /// The items of a list.
-pub(super) fn items(texts: &[String]) -> String {
+pub(crate) fn items(texts: &[String]) -> String {
     texts.iter().map(|text| format!("<li>{}</li>\n", escape(text))).collect()
 }
 
 /// The configuration, folded away.
-pub(super) fn configuration(provenance: &Provenance) -> String {
+pub(crate) fn configuration(provenance: &Provenance) -> String {
     let config = serde_json::to_string_pretty(&provenance.config).unwrap_or_default();
     format!(
         "<details><summary>Configuration with every default</summary>\n\

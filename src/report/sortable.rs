@@ -3,27 +3,27 @@
 use super::text::{escape, ordinary};
 
 /// Turns the headings of the table into buttons that sort it.
-pub(super) const SCRIPT: &str = include_str!("sortable.js");
+pub(crate) const SCRIPT: &str = include_str!("sortable.js");
 
 /// A cell: its text, and the number that it is sorted by.
-pub(super) struct Cell {
+pub(crate) struct Cell {
     text: String,
     value: Option<f64>,
 }
 
 impl Cell {
     /// A text, sorted as such.
-    pub(super) fn text(text: impl Into<String>) -> Self {
+    pub(crate) fn text(text: impl Into<String>) -> Self {
         Self { text: text.into(), value: None }
     }
 
     /// A number as it is written; one that cannot be drawn is sorted last.
-    pub(super) fn number(value: f64, text: impl Into<String>) -> Self {
+    pub(crate) fn number(value: f64, text: impl Into<String>) -> Self {
         Self { text: text.into(), value: Some(value).filter(|&value| ordinary(value)) }
     }
 
     /// A number where there is one, else a dash.
-    pub(super) fn optional(value: Option<f64>, write: impl Fn(f64) -> String) -> Self {
+    pub(crate) fn optional(value: Option<f64>, write: impl Fn(f64) -> String) -> Self {
         value.map_or_else(|| Self::text("–"), |value| Self::number(value, write(value)))
     }
 
@@ -36,7 +36,7 @@ impl Cell {
 
 /// How a column is sorted.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Order {
+pub(crate) enum Order {
     /// By number, what has none at the end.
     Number,
     /// By text.
@@ -44,13 +44,13 @@ pub(super) enum Order {
 }
 
 /// A column: its heading, its order, and a cell for each row.
-pub(super) struct Column {
+pub(crate) struct Column {
     /// Heading.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Order.
-    pub(super) order: Order,
+    pub(crate) order: Order,
     /// Cells.
-    pub(super) cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
 }
 
 impl Column {
@@ -61,7 +61,7 @@ impl Column {
 }
 
 /// The table, in a box of its own that scrolls; the first column names the rows.
-pub(super) fn sortable(title: &str, columns: &[Column]) -> String {
+pub(crate) fn sortable(title: &str, columns: &[Column]) -> String {
     let head: String = columns.iter().map(Column::heading).collect();
     let rows = columns.iter().map(|column| column.cells.len()).min().unwrap_or(0);
     let body: String = (0..rows).map(|row| format!("<tr>{}</tr>\n", cells(columns, row))).collect();

@@ -4,16 +4,16 @@ use super::text::ordinary;
 
 /// An interval of data.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Span {
+pub(crate) struct Span {
     /// Lower end.
-    pub(super) low: f64,
+    pub(crate) low: f64,
     /// Upper end.
-    pub(super) high: f64,
+    pub(crate) high: f64,
 }
 
 impl Span {
     /// The span of the values that can be drawn; `None` without any.
-    pub(super) fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub(crate) fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         values
             .into_iter()
             .filter(|&value| ordinary(value))
@@ -22,12 +22,12 @@ impl Span {
     }
 
     /// The smallest span that holds both.
-    pub(super) fn join(self, other: Self) -> Self {
+    pub(crate) fn join(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// Wider by `share` of its width on each side, and never empty.
-    pub(super) fn widened(self, share: f64) -> Self {
+    pub(crate) fn widened(self, share: f64) -> Self {
         let reach = share * (self.high - self.low);
         let least = 1e-6 * self.low.abs().max(self.high.abs()).max(1e-3);
         let reach = reach.max(if self.high - self.low > least { 0.0 } else { least });
@@ -35,17 +35,17 @@ impl Span {
     }
 
     /// High end minus low end.
-    pub(super) fn width(self) -> f64 {
+    pub(crate) fn width(self) -> f64 {
         self.high - self.low
     }
 
     /// At least `width` wide, about the same middle.
-    pub(super) fn stretched(self, width: f64) -> Self {
+    pub(crate) fn stretched(self, width: f64) -> Self {
         self.widened(((width / self.width() - 1.0) / 2.0).max(0.0))
     }
 
     /// Round values about `parts` to the span, and the decimals that tell them apart.
-    pub(super) fn ticks(self, parts: f64) -> (Vec<f64>, usize) {
+    pub(crate) fn ticks(self, parts: f64) -> (Vec<f64>, usize) {
         let rough = self.width() / parts;
         let power = 10.0_f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]

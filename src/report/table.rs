@@ -5,7 +5,7 @@ use super::words;
 use crate::scenario::record::{Claim, Record};
 
 /// A table in a box of its own that scrolls; the first row holds headings, cells are text.
-pub(super) fn table(title: &str, rows: &[Vec<String>]) -> String {
+pub(crate) fn table(title: &str, rows: &[Vec<String>]) -> String {
     let row = |cells: &Vec<String>, head: bool| {
         let cells = cells.iter().enumerate().map(|(index, cell)| {
             let cell = escape(cell);
@@ -31,14 +31,14 @@ pub(super) fn table(title: &str, rows: &[Vec<String>]) -> String {
 }
 
 /// A table of names and values.
-pub(super) fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
+pub(crate) fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
     let head = vec!["quantity".to_owned(), "value".to_owned()];
     let rows = pairs.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]);
     table(title, &std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }
 
 /// The claims side by side.
-pub(super) fn claims(record: &Record) -> String {
+pub(crate) fn claims(record: &Record) -> String {
     let growth = record.growth.claim.as_ref();
     let claims: Vec<&Claim> =
         [&record.deviation.claim, &record.global.claim].into_iter().chain(growth).collect();
@@ -69,7 +69,7 @@ pub(super) fn claims(record: &Record) -> String {
 }
 
 /// The tables of two or three columns.
-pub(super) fn narrow(record: &Record) -> String {
+pub(crate) fn narrow(record: &Record) -> String {
     [
         setting(record),
         deviation(record),
@@ -83,7 +83,7 @@ pub(super) fn narrow(record: &Record) -> String {
 }
 
 /// The tables that need the width of the page.
-pub(super) fn wide(record: &Record) -> String {
+pub(crate) fn wide(record: &Record) -> String {
     [constants(record), rounds(record), system(record)].concat()
 }
 
@@ -269,7 +269,7 @@ fn system(record: &Record) -> String {
 }
 
 /// The deviation bound step by step.
-pub(super) fn steps(record: &Record) -> String {
+pub(crate) fn steps(record: &Record) -> String {
     let deviation = &record.deviation;
     let exact = deviation.exact.as_deref();
     let mut head = vec!["step".to_owned(), "bound used".to_owned(), "largest seen".to_owned()];

@@ -16,12 +16,12 @@ enum Rounding {
 }
 
 /// Whether `value` is a number that can be drawn.
-pub(super) fn ordinary(value: f64) -> bool {
+pub(crate) fn ordinary(value: f64) -> bool {
     value.abs() < ORDINARY
 }
 
 /// `text` with the characters that mean something to HTML replaced.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -39,7 +39,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// The first characters of `text`, with an ellipsis where some were cut: for labels of figures.
-pub(super) fn shorten(text: &str, limit: usize) -> String {
+pub(crate) fn shorten(text: &str, limit: usize) -> String {
     if text.chars().count() <= limit {
         return text.to_owned();
     }
@@ -50,7 +50,7 @@ pub(super) fn shorten(text: &str, limit: usize) -> String {
 /// Each of `texts` in at most `limit` characters, different texts told apart: what all of them begin
 /// with is left out where their beginnings would look the same, and the place is added where that
 /// is not enough.
-pub(super) fn told_apart(texts: &[&str], limit: usize) -> Vec<String> {
+pub(crate) fn told_apart(texts: &[&str], limit: usize) -> Vec<String> {
     let cut = |skipped: usize| -> Vec<String> {
         let one = |text: &&str| match skipped {
             0 => shorten(text, limit),
@@ -88,27 +88,27 @@ fn common_beginning(texts: &[&str]) -> usize {
 }
 
 /// Four significant digits, to the nearest.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     rounded(value, Rounding::Nearest)
 }
 
 /// Four significant digits, never below `value`: for risks and bounds.
-pub(super) fn upper(value: f64) -> String {
+pub(crate) fn upper(value: f64) -> String {
     rounded(value, Rounding::Up)
 }
 
 /// Four significant digits, never above `value`: for certified radii and lower ends.
-pub(super) fn lower(value: f64) -> String {
+pub(crate) fn lower(value: f64) -> String {
     rounded(value, Rounding::Down)
 }
 
 /// `[low, high]`, rounded outwards.
-pub(super) fn interval([low, high]: [f64; 2]) -> String {
+pub(crate) fn interval([low, high]: [f64; 2]) -> String {
     format!("{} to {}", lower(low), upper(high))
 }
 
 /// A count with a comma after every third digit.
-pub(super) fn count(value: u64) -> String {
+pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut grouped = String::new();
     for (index, digit) in digits.chars().enumerate() {
@@ -121,32 +121,32 @@ pub(super) fn count(value: u64) -> String {
 }
 
 /// `value` if there is one, else a dash.
-pub(super) fn or_dash(value: Option<impl Display>) -> String {
+pub(crate) fn or_dash(value: Option<impl Display>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| value.to_string())
 }
 
 /// A share in percent; the sign stays on the line of its number.
-pub(super) fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     format!("{}\u{a0}%", number(100.0 * share))
 }
 
 /// An interval of shares in percent, rounded outwards.
-pub(super) fn percents(shares: [f64; 2]) -> String {
+pub(crate) fn percents(shares: [f64; 2]) -> String {
     format!("{}\u{a0}%", interval(shares.map(|share| 100.0 * share)))
 }
 
 /// A number with true minus signs, after which no line breaks.
-pub(super) fn minus(number: &str) -> String {
+pub(crate) fn minus(number: &str) -> String {
     number.replace('-', "−")
 }
 
 /// `noun` after its count, `nouns` unless there is one.
-pub(super) fn counted(count: usize, noun: &str, nouns: &str) -> String {
+pub(crate) fn counted(count: usize, noun: &str, nouns: &str) -> String {
     format!("{count} {}", if count == 1 { noun } else { nouns })
 }
 
 /// `a`, `a and b`, or `a, b and c`.
-pub(super) fn listed(items: &[String]) -> String {
+pub(crate) fn listed(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [only] => only.clone(),

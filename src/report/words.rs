@@ -6,7 +6,7 @@ use crate::scenario::record::{Claim, GrowthOutcome, Record};
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 
 /// Name and unit of a state, as `ego_x (m)`.
-pub(super) fn axis(record: &Record, state: usize) -> String {
+pub(crate) fn axis(record: &Record, state: usize) -> String {
     record
         .system
         .states
@@ -15,13 +15,13 @@ pub(super) fn axis(record: &Record, state: usize) -> String {
 }
 
 /// Name of a state.
-pub(super) fn name(record: &Record, state: usize) -> String {
+pub(crate) fn name(record: &Record, state: usize) -> String {
     let axis = record.system.states.get(state);
     axis.map_or_else(|| format!("state {state}"), |axis| axis.name.clone())
 }
 
 /// Unit of the Euclidean norm over the states that `counts` picks.
-pub(super) fn norm_unit(record: &Record, counts: impl Fn(usize) -> bool) -> String {
+pub(crate) fn norm_unit(record: &Record, counts: impl Fn(usize) -> bool) -> String {
     let mut units: Vec<&str> = Vec::new();
     for (state, axis) in record.system.states.iter().enumerate() {
         if counts(state) && !units.contains(&axis.unit.as_str()) {
@@ -32,27 +32,27 @@ pub(super) fn norm_unit(record: &Record, counts: impl Fn(usize) -> bool) -> Stri
 }
 
 /// Unit of the ball of local growth.
-pub(super) fn ball_unit(record: &Record) -> String {
+pub(crate) fn ball_unit(record: &Record) -> String {
     let varies = &record.growth.varies;
     norm_unit(record, |state| varies.get(state).copied().unwrap_or(true))
 }
 
 /// A claim beside the answer to the question whether it was obtained.
-pub(super) struct Verdict<'a> {
+pub(crate) struct Verdict<'a> {
     /// Short title.
-    pub(super) title: &'static str,
+    pub(crate) title: &'static str,
     /// Whether the claim was obtained.
-    pub(super) obtained: bool,
+    pub(crate) obtained: bool,
     /// The outcome in a few words.
-    pub(super) headline: String,
+    pub(crate) headline: String,
     /// What it means, in one sentence.
-    pub(super) detail: String,
+    pub(crate) detail: String,
     /// The claim, where one was made.
-    pub(super) claim: Option<&'a Claim>,
+    pub(crate) claim: Option<&'a Claim>,
 }
 
 /// The three claims in the order of the method.
-pub(super) fn verdicts(record: &Record) -> [Verdict<'_>; 3] {
+pub(crate) fn verdicts(record: &Record) -> [Verdict<'_>; 3] {
     [deviation(record), global(record), growth(record)]
 }
 
@@ -120,7 +120,7 @@ fn growth(record: &Record) -> Verdict<'_> {
 }
 
 /// How the steps of the deviation bound hold together.
-pub(super) fn joint(joint: Joint) -> &'static str {
+pub(crate) fn joint(joint: Joint) -> &'static str {
     match joint {
         Joint::FixedShape => "fixed shape from a pilot sample, one scalar (all steps at once)",
         Joint::Variables => "one decision variable per step (all steps at once)",
@@ -130,7 +130,7 @@ pub(super) fn joint(joint: Joint) -> &'static str {
 }
 
 /// How perturbed rollouts were driven.
-pub(super) fn control(control: PairControl) -> &'static str {
+pub(crate) fn control(control: PairControl) -> &'static str {
     match control {
         PairControl::Replay => "replay of the nominal rollout's controls",
         PairControl::ClosedLoop => "closed loop: the policy in feedback",
@@ -138,7 +138,7 @@ pub(super) fn control(control: PairControl) -> &'static str {
 }
 
 /// Which bound tightened the margins.
-pub(super) fn source(source: DeviationSource) -> &'static str {
+pub(crate) fn source(source: DeviationSource) -> &'static str {
     match source {
         DeviationSource::Scenario => "scenario bound",
         DeviationSource::Exact => "exact supremum of the linear system",
@@ -146,7 +146,7 @@ pub(super) fn source(source: DeviationSource) -> &'static str {
 }
 
 /// Where the centre of the ball was looked for.
-pub(super) fn boundary(boundary: BoundarySearch) -> &'static str {
+pub(crate) fn boundary(boundary: BoundarySearch) -> &'static str {
     match boundary {
         BoundarySearch::Slice => "a boundary cell of the slice",
         BoundarySearch::Rays => "bisection along many directions in the coordinates that vary",
@@ -154,7 +154,7 @@ pub(super) fn boundary(boundary: BoundarySearch) -> &'static str {
 }
 
 /// Where a state stands in the hierarchy.
-pub(super) fn tier(tier: u8) -> &'static str {
+pub(crate) fn tier(tier: u8) -> &'static str {
     match tier {
         0 => "0, in the target set",
         1 => "1, V_check is positive there",

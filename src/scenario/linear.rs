@@ -101,8 +101,9 @@ mod tests {
 
     use super::{exact_deviation, state_matrix};
     use crate::model::Model;
+    use crate::race::system::DroneRace;
     use crate::real::Real;
-    use crate::system::{Axis, DoubleIntegrator, DroneRace, System};
+    use crate::system::{Axis, DoubleIntegrator, System};
 
     /// The singular values worked out independently (`docs/method.md`, section 9).
     #[test]

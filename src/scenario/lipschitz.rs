@@ -140,7 +140,8 @@ fn length(vector: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::{MarginBox, MarginConstants, margins, sampled};
     use crate::model::Model;
-    use crate::system::{Cone, DoubleIntegrator, DroneRace};
+    use crate::race::system::{Cone, DroneRace};
+    use crate::system::DoubleIntegrator;
 
     /// Constants over the default box; sampled slopes must come to `share` of them, and no farther.
     fn over_default_box(model: &Model, varies: &[bool], share: f64) -> MarginConstants {

@@ -2,11 +2,9 @@
 
 mod diff_drive;
 mod double_integrator;
-mod drone_race;
 
 pub use diff_drive::{DiffDrive, Disc};
 pub use double_integrator::{BangBang, DoubleIntegrator};
-pub use drone_race::{Cone, DroneRace};
 
 use crate::real::Real;
 

@@ -7,13 +7,14 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Choice, Gpu};
 use reachcast::policy::Mlp;
+use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{PairControl, RolloutSpec};
 use reachcast::scenario::settings::{
     BoundarySearch, ConstantSettings, DeviationSettings, DeviationSource, GlobalSettings,
     GrowthSettings, Joint, Settings, SliceAxis,
 };
-use reachcast::system::{DoubleIntegrator, DroneRace, System};
+use reachcast::system::{DoubleIntegrator, System};
 use statrs::distribution::{Binomial, DiscreteCDF};
 use std::path::Path;
 

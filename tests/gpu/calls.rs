@@ -6,12 +6,13 @@ use reachcast::backend::gpu::{Gpu, Injection, NetworkKernels, Traffic};
 use reachcast::backend::{Backend, Program};
 use reachcast::model::Plant;
 use reachcast::policy::Activation;
+use reachcast::race::DroneRace;
 use reachcast::rollout::Plant as TypedPlant;
 use reachcast::rollout::{
     DeviationTask, PairControl, Pairs, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
     States, Stream,
 };
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
+use reachcast::system::{BangBang, DoubleIntegrator};
 use reachcast::{Error, Fault, Result};
 
 use crate::models::{Driver, VALUES};

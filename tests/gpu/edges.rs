@@ -2,11 +2,12 @@
 
 use reachcast::backend::gpu::Gpu;
 use reachcast::policy::Activation;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query,
     ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
 };
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
+use reachcast::system::{BangBang, DoubleIntegrator};
 
 use crate::systems::{Count, Idle};
 use crate::{

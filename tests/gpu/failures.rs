@@ -3,8 +3,9 @@
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Choice, Gpu, adapters};
 use reachcast::policy::Activation;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Tightening};
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace};
+use reachcast::system::{BangBang, DoubleIntegrator};
 use reachcast::{Error, Fault, Result};
 
 use crate::{drawn, gpu, race_policy, ramp, random_network, reach_avoid, whole_box};

@@ -7,11 +7,12 @@ use reachcast::backend::gpu::{Gpu, Injection, NetworkKernels};
 use reachcast::backend::{Action, Backend, Event};
 use reachcast::cost::Quadratic;
 use reachcast::policy::Activation;
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     CostQuery, DeviationTask, Farthest, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask,
     PairControl, PairMeasure, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Stream,
 };
-use reachcast::system::{DoubleIntegrator, DroneRace};
+use reachcast::system::DoubleIntegrator;
 use reachcast::{Error, Fault, Result};
 
 use crate::{drawn, gpu, ramp, random_network, whole_box};

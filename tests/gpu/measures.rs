@@ -2,10 +2,11 @@
 
 use reachcast::backend::gpu::{AdapterKind, Gpu};
 use reachcast::policy::{Activation, Policy};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     Fold, Plant, Query, ReachAvoidTask, RolloutSpec, Tightening, measure, trajectory,
 };
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::system::{BangBang, DoubleIntegrator, System};
 
 use crate::{band, drawn, each_way, gpu, measures, race_policy, ramp, random_network, whole_box};
 

@@ -4,17 +4,19 @@ use std::f32::consts::TAU;
 
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
-use reachcast::cost::{
-    CenterlineCost, Cost, Fence, LaneCost, Obstacle, Quadratic, RACE_CONTEXT, RaceCost,
-    RaceReference, RecoveryCost, Safety, SafetyCone,
-};
+use reachcast::cost::{Cost, Obstacle, Quadratic};
 use reachcast::policy::{Activation, Mlp};
+use reachcast::race::DroneRace;
+use reachcast::race::{
+    CenterlineCost, Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, RecoveryCost, Safety,
+    SafetyCone,
+};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
     Purpose, Sigma, Stream, ValueTerm,
 };
-use reachcast::system::{DoubleIntegrator, DroneRace, System};
+use reachcast::system::{DoubleIntegrator, System};
 
 use crate::oracle::{differences, truth};
 use crate::{gpu, random_network};

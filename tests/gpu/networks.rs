@@ -3,11 +3,11 @@
 use reachcast::Error;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::policy::{Activation, Mlp};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     DeviationTask, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask,
     RolloutSpec, Starts, Stream, Tightening,
 };
-use reachcast::system::DroneRace;
 
 use crate::measures::assert_close_to_f64;
 use crate::systems::Count;

@@ -4,12 +4,13 @@ use std::array::from_fn;
 
 use reachcast::backend::gpu::Gpu;
 use reachcast::policy::Policy;
+use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
     DeviationTask, Farthest, Fold, PairControl, PairMeasure, Pairs, Plant, Purpose, Region,
     RolloutSpec, Stream, Tightening, pair_measures,
 };
-use reachcast::system::{DroneRace, System};
+use reachcast::system::System;
 
 use crate::systems::{Idle, Reveal};
 use crate::{band, deviation, drawn, each_way, gpu, race_policy, ramp, whole_box};

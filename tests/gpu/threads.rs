@@ -6,11 +6,11 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::Injection;
 use reachcast::policy::{Activation, Mlp};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{
     DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Purpose, Query,
     ReachAvoidTask, RolloutSpec, Stream,
 };
-use reachcast::system::DroneRace;
 use reachcast::{Fault, Result};
 
 use crate::{drawn, gpu, ramp, random_network, whole_box};

@@ -2,8 +2,8 @@
 
 use reachcast::backend::gpu::{Gpu, KernelTime};
 use reachcast::policy::{Activation, Mlp};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec};
-use reachcast::system::DroneRace;
 
 use crate::{drawn, gpu, measures, ramp, random_network, whole_box};
 

@@ -9,7 +9,8 @@ use reachcast::formula::Graph;
 use reachcast::model::text::{Description, read};
 use reachcast::model::{Controller, Law, Model};
 use reachcast::policy::{Mlp, Policy};
-use reachcast::system::{BangBang, DoubleIntegrator, DroneRace, System};
+use reachcast::race::DroneRace;
+use reachcast::system::{BangBang, DoubleIntegrator, System};
 
 #[path = "../../examples/dubins.rs"]
 #[allow(dead_code, missing_docs, reason = "the example's own main is not called")]

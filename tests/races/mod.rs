@@ -1,8 +1,8 @@
 //! A race record for the tests of the page: realistic numbers from closed formulas, no race run.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
-use reachcast::experiment::judge::{FailureClass, Judge};
-use reachcast::experiment::record::{
+use reachcast::race::judge::{FailureClass, Judge};
+use reachcast::race::record::{
     AbsentRecord, CeilingRecord, ControllerRecord, FailureRecord, FilterRecord, FrameBall,
     FrameRecord, JudgedRecord, MetricsRecord, PairedRecord, PictureRecord, PublishedRecord,
     RACE_SCHEMA, RaceRecord, StartsRecord, TierRecord,

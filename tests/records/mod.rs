@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use reachcast::race::DroneRace;
 use reachcast::rollout::{PairControl, reach_avoid};
 use reachcast::scenario::record::{
     Claim, ConstantRecord, ConstantsRecord, DeviationRecord, GlobalRecord, GrowthOutcome,
@@ -12,7 +13,7 @@ use reachcast::scenario::record::{
     SampleRecord, SliceAxisRecord, SliceRecord, Spending, StateRecord, SystemRecord, Timing,
 };
 use reachcast::scenario::settings::{BoundarySearch, DeviationSource, Joint};
-use reachcast::system::{DoubleIntegrator, DroneRace, System};
+use reachcast::system::{DoubleIntegrator, System};
 
 const GAMMA: f64 = 0.95;
 const HORIZON: u32 = 30;

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use reachcast::experiment::sweep::record::SweepRecord;
+use reachcast::race::sweep::record::SweepRecord;
 use tempfile::TempDir;
 
 /// A coarse slice, and balls that are small.

@@ -1,9 +1,9 @@
 //! Sweep records for the tests of the page: plausible numbers from closed formulas, nothing run.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
-use reachcast::experiment::judge::{FailureClass, Judge};
-use reachcast::experiment::record::{CeilingRecord, FailureRecord, JudgedRecord, StartsRecord};
-use reachcast::experiment::sweep::record::{
+use reachcast::race::judge::{FailureClass, Judge};
+use reachcast::race::record::{CeilingRecord, FailureRecord, JudgedRecord, StartsRecord};
+use reachcast::race::sweep::record::{
     AxisRecord, CertificatePoint, LatencyRecord, PointRecord, PointResult, RacePoint, SWEEP_SCHEMA,
     SweepRecord,
 };

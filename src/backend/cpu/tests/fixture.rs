@@ -104,7 +104,7 @@ pub(super) fn race<P: Policy<12, 3>>(
     range: std::ops::Range<u64>,
     query: Query,
 ) -> Vec<f32> {
-    let (system, spec) = (crate::system::DroneRace::default(), spec());
+    let (system, spec) = (crate::race::system::DroneRace::default(), spec());
     let task = ReachAvoidTask {
         starts: race_starts(),
         range,

@@ -2,11 +2,12 @@
 
 use super::fixture::*;
 use crate::policy::{Activation, Mlp, OutputActivation, Policy};
+use crate::race::system::DroneRace;
 use crate::rollout::{
     DeviationTask, Farthest, Fold, PairControl, PairMeasure, Plant, Query, RolloutSpec, Tightening,
     measure, pair_measures, trajectory,
 };
-use crate::system::{DroneRace, System};
+use crate::system::System;
 
 /// Networks of odd widths with every activation.
 fn networks() -> Vec<Mlp> {

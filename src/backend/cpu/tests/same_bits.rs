@@ -5,11 +5,11 @@ use std::ops::Range;
 use super::fixture::*;
 use crate::error::Error;
 use crate::policy::{Activation, OutputActivation, Policy};
+use crate::race::system::DroneRace;
 use crate::rollout::{
     DeviationTask, Farthest, PairControl, PairMeasure, Plant, Query, ReachAvoidTask, Starts,
     Tightening,
 };
-use crate::system::DroneRace;
 
 /// How the starts `0..COUNT` are split into ranges.
 const COUNT: u64 = 400;

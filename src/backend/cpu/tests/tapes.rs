@@ -5,8 +5,9 @@ use rand::{RngExt, SeedableRng};
 
 use crate::backend::cpu::interpreted::InterpretedSystem;
 use crate::model::Model;
+use crate::race::system::DroneRace;
 use crate::real::simd::Instructions;
-use crate::system::{DiffDrive, DoubleIntegrator, DroneRace, System};
+use crate::system::{DiffDrive, DoubleIntegrator, System};
 use crate::tile::{Clock, CompiledSystem, Frame, Layout, NativeSystem};
 
 /// A frame of random states and controls, some of which are not finite.

@@ -1,0 +1,205 @@
+//! What races start from: a configuration with its networks, controllers, noise seeds and starts.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+
+use crate::backend::{Backend, Program};
+use crate::cli::folder_of;
+use crate::cli::inputs::inputs;
+use crate::config::{Config, Overrides, PolicySource};
+use crate::error::{Error, Result};
+use crate::files::{Inputs, StateReader};
+use crate::model::Plant;
+use crate::policy::Mlp;
+use crate::race::controller::{Name, World};
+use crate::race::settings::RaceSettings;
+use crate::race::system::DroneRace;
+use crate::rollout::{Purpose, Region, Starts, Stream};
+use crate::scenario::settings::Settings;
+use crate::system::System;
+
+/// Most starts that can be drawn.
+const MOST_STARTS: u64 = 1_000_000;
+/// Most noise seeds.
+const MOST_SEEDS: u64 = 1000;
+
+/// A configuration that has races, with everything that it names.
+pub(in crate::race::command) struct RaceInput {
+    /// The configuration.
+    pub(in crate::race::command) config: Config,
+    folder: PathBuf,
+    race: RaceSettings,
+    certificates: Settings,
+    system: DroneRace,
+    policy: PolicySource,
+    networks: Networks,
+}
+
+impl RaceInput {
+    /// Reads the configuration at `path`, with `overrides` over it, and the files that it names.
+    pub(in crate::race::command) fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
+        let config = Config::load(path, overrides)?;
+        let race = config.race.clone().ok_or_else(|| {
+            let problem = "only the system `drone-race` has races; certificates it has: `certify`, \
+                           `sweep --of certificate`";
+            Error::invalid(path.display().to_string(), problem)
+        })?;
+        let folder = folder_of(path).to_owned();
+        let policy = config.policy_source(&folder)?;
+        let networks = Networks::read(&race, &folder)?;
+        let certificates = config.settings(&DroneRace::default().states())?;
+        let (system, _) = config.race_plant(&policy)?;
+        Ok(Self { config, folder, race, certificates, system, policy, networks })
+    }
+
+    /// The files that this and the starts `asked` for were read from; the configuration is at `path`.
+    pub(in crate::race::command) fn inputs(&self, path: &Path, asked: Option<&str>) -> Inputs {
+        let named = &self.race.networks;
+        let networks = [&named.value, &named.disturbance, &named.ppo];
+        let networks = networks.into_iter().filter(|file| !file.is_empty());
+        let networks = networks.map(|file| self.folder.join(file));
+        inputs(path, &self.policy, networks.chain(self.starts_file(asked)))
+    }
+
+    /// The file of the starts `asked` for; none if they are drawn.
+    fn starts_file(&self, asked: Option<&str>) -> Option<PathBuf> {
+        match asked {
+            Some(text) if text.parse::<u64>().is_ok() => None,
+            Some(path) => Some(PathBuf::from(path)),
+            None => Some(self.folder.join(&self.race.starts)),
+        }
+    }
+
+    /// The plant under the policy.
+    pub(in crate::race::command) fn plant(&self) -> Result<Plant> {
+        self.config.plant(&self.policy)
+    }
+
+    /// What controllers are made of; `program` is the plant as prepared on `backend`.
+    pub(in crate::race::command) fn world<'a>(
+        &'a self,
+        backend: &'a Backend,
+        program: &'a Program<'a>,
+    ) -> Result<World<'a>> {
+        let (_, policy) = self.config.race_plant(&self.policy)?;
+        Ok(World {
+            backend,
+            program,
+            system: &self.system,
+            policy,
+            value: self.networks.value.as_ref(),
+            disturbance: self.networks.disturbance.as_ref(),
+            ppo: self.networks.ppo.as_ref(),
+            race: &self.race,
+            certificates: &self.certificates,
+        })
+    }
+
+    /// The starts: drawn, of a file, or those of the configuration; and where they come from.
+    pub(in crate::race::command) fn starts(
+        &self,
+        asked: Option<&str>,
+    ) -> Result<(Vec<[f32; 12]>, String)> {
+        if let Some(count) = asked.and_then(|text| text.parse::<u64>().ok()) {
+            return drawn(&self.race, count, self.config.seed);
+        }
+        let path = asked.map_or_else(|| self.folder.join(&self.race.starts), PathBuf::from);
+        let names = DroneRace::default().states().map(|axis| axis.name);
+        let starts = StateReader::open(&path, names.to_vec())?.rest()?.arrays();
+        // Its name alone: the same starts elsewhere are the same experiment.
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok((starts, name))
+    }
+}
+
+/// The noise seeds `seed`, `seed + 1`, ...
+pub(in crate::race::command) fn noise_seeds(seed: u64, count: u64) -> Result<Vec<u64>> {
+    if !(1..=MOST_SEEDS).contains(&count) {
+        let problem = format!("{count} is not within 1..={MOST_SEEDS}");
+        return Err(Error::invalid("--noise-seeds", problem));
+    }
+    Ok((0..count).map(|i| seed.wrapping_add(i)).collect())
+}
+
+/// The controllers of a list of names, each once, in its order.
+pub(in crate::race::command) fn names(list: &[String]) -> Result<Vec<Name>> {
+    let mut names = Vec::new();
+    for text in list {
+        let more = match text.as_str() {
+            "all" => Name::STUDY.to_vec(),
+            "ablations" => Name::ABLATIONS.to_vec(),
+            "improvements" => Name::IMPROVEMENTS.to_vec(),
+            _ => vec![name(text)?],
+        };
+        let new: Vec<Name> = more.into_iter().filter(|name| !names.contains(name)).collect();
+        names.extend(new);
+    }
+    Ok(names)
+}
+
+/// The controller of a name.
+pub(in crate::race::command) fn name(text: &str) -> Result<Name> {
+    let known = Name::value_variants();
+    known.iter().copied().find(|name| name.text() == text).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|name| name.text()).collect();
+        let distance = |name: &&&str| strsim::damerau_levenshtein(text, name);
+        let nearest = names.iter().min_by_key(distance).copied().unwrap_or_default();
+        let problem = format!(
+            "no controller `{text}`; did you mean `{nearest}`? There are all, ablations, improvements, \
+             {}",
+            names.join(", ")
+        );
+        Error::invalid("--controllers", problem)
+    })
+}
+
+/// The networks beside the policy.
+struct Networks {
+    value: Option<Mlp>,
+    disturbance: Option<Mlp>,
+    ppo: Option<Mlp>,
+}
+
+impl Networks {
+    /// Reads the files that the configuration in `folder` names.
+    fn read(race: &RaceSettings, folder: &Path) -> Result<Self> {
+        let states = DroneRace::default().states();
+        let names = states.each_ref().map(|axis| axis.name.as_str());
+        let read = |file: &str, outputs: usize| {
+            if file.is_empty() {
+                return Ok(None);
+            }
+            let path = folder.join(file);
+            let network = Mlp::load(&path)?;
+            let fits = network.check_fits(&names, outputs);
+            fits.map_err(|problem| Error::file(&path, problem))?;
+            Ok(Some(network))
+        };
+        let files = &race.networks;
+        Ok(Self {
+            value: read(&files.value, 1)?,
+            disturbance: read(&files.disturbance, 3)?,
+            ppo: read(&files.ppo, 3)?,
+        })
+    }
+}
+
+/// `count` starts drawn from the box of the configuration.
+fn drawn(race: &RaceSettings, count: u64, seed: u64) -> Result<(Vec<[f32; 12]>, String)> {
+    if !(1..=MOST_STARTS).contains(&count) {
+        let problem = format!("{count} is not within 1..={MOST_STARTS}");
+        return Err(Error::invalid("--starts", problem));
+    }
+    let place = "race.start_box";
+    let corners: [[f64; 2]; 12] = race.start_box.as_slice().try_into().map_err(|_| {
+        let problem = format!("{} intervals, expected 12, one per state", race.start_box.len());
+        Error::invalid(place, problem)
+    })?;
+    let region =
+        Region::new_box(corners.map(|[low, _]| low as f32), corners.map(|[_, high]| high as f32));
+    let region = region.map_err(|error| Error::invalid(place, error.to_string()))?;
+    let starts = Starts::Drawn { region, stream: Stream::new(seed, Purpose::RaceStart, 0) };
+    let source = format!("{count} drawn from the start box with seed {seed}");
+    Ok(((0..count).map(|i| starts.start_array(i)).collect(), source))
+}
