@@ -7,6 +7,7 @@ pub mod gpu;
 #[cfg(not(feature = "gpu"))]
 #[path = "absent.rs"]
 pub mod gpu;
+mod measures;
 mod open;
 mod physics;
 mod program;
