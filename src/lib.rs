@@ -1,14 +1,165 @@
 //! Reachcast: batch rollouts on any GPU or CPU, and the probabilistic reach-avoid certificates
 //! that they support.
 //!
-//! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
-//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`race`] and [`mod@bench`];
-//! [`report`]; the command line.
-//! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
+//! A plant is a model (how a state moves, where it should get to, what it must keep clear of) and the
+//! policy that drives it. It is prepared on a backend once, and answers for any number of starts: did the
+//! rollout from here reach the target before it violated the constraint, and with what margin. A
+//! certificate draws scenarios and says what may be claimed of all starts, with which probability.
+//!
+//! # A plant as text
+//!
+//! Nothing is compiled for it; `docs/models.md` has all that may stand in one. Controls are clipped to
+//! their bounds, and held over a step.
+//!
+//! ```
+//! use std::path::Path;
+//! use reachcast::backend::Backend;
+//! use reachcast::model::text;
+//! use reachcast::rollout::RolloutSpec;
+//!
+//! let text = r#"
+//! [model]
+//! name = "cart"
+//! [model.states]
+//! position = { unit = "m", box = [-1.0, 1.0] }
+//! velocity = { unit = "m/s", box = [-1.0, 1.0] }
+//! [model.controls]
+//! force = { unit = "N", bounds = [-1.0, 1.0] }
+//! [model.flow]
+//! position = "velocity"
+//! velocity = "force"
+//! [model.time]
+//! period = 0.1
+//! integrator = "rk4"
+//! [model.task]
+//! kind = "reach-avoid"
+//! target = "0.1 - hypot(position, velocity)"
+//! constraint = "1.5 - abs(position)"
+//! [policy]
+//! formula = { force = "-position - 1.5 * velocity" }
+//! "#;
+//! let plant = text::read(text, "cart.toml", Path::new("."))?.plant()?;
+//!
+//! // `Backend::auto()` takes the hardware GPU of the machine where there is one.
+//! let backend = Backend::cpu()?;
+//! let program = backend.prepare(&plant)?;
+//!
+//! // 60 steps, no discount; position and velocity of each start.
+//! let spec = RolloutSpec::new(60, 1.0)?;
+//! let measures = program.measures(&[[0.8, 0.0], [1.4, 1.0]], &spec)?;
+//! assert!(measures[0] > 0.0, "it comes to rest in the middle");
+//! assert!(measures[1] < 0.0, "it is beyond the wall before it can stop");
+//! # Ok::<(), reachcast::Error>(())
+//! ```
+//!
+//! # A plant in Rust
+//!
+//! Formulas over [`real::Real`] are written once and run as SIMD lanes at full speed, in f64, as sound
+//! bounds and as WGSL. [`system::Clipped`] clips the controls. A number in a formula is an `R::lit`;
+//! `#[inline(always)]` lets the formulas be compiled for the widest instructions of the processor, and
+//! changes nothing but the speed.
+//!
+//! ```
+//! use reachcast::backend::Backend;
+//! use reachcast::model::Plant;
+//! use reachcast::policy::Policy;
+//! use reachcast::real::Real;
+//! use reachcast::rollout::RolloutSpec;
+//! use reachcast::system::{Axis, Clipped, System};
+//!
+//! struct Cart;
+//!
+//! impl System<2, 1> for Cart {
+//!     fn name(&self) -> &str {
+//!         "cart"
+//!     }
+//!     fn states(&self) -> [Axis; 2] {
+//!         [Axis::new("position", "m", -1.0, 1.0), Axis::new("velocity", "m/s", -1.0, 1.0)]
+//!     }
+//!     fn controls(&self) -> [Axis; 1] {
+//!         [Axis::new("force", "N", -1.0, 1.0)]
+//!     }
+//!     #[inline(always)]
+//!     fn step<R: Real>(&self, [x, v]: [R; 2], [force]: [R; 1]) -> [R; 2] {
+//!         let period = R::lit(0.1);
+//!         [x + period * v, v + period * force]
+//!     }
+//!     #[inline(always)]
+//!     fn target<R: Real>(&self, [x, v]: [R; 2]) -> R {
+//!         R::lit(0.1) - x.hypot(v)
+//!     }
+//!     #[inline(always)]
+//!     fn constraint<R: Real>(&self, [x, _]: [R; 2]) -> R {
+//!         R::lit(1.5) - x.abs()
+//!     }
+//! }
+//!
+//! struct Brake;
+//!
+//! impl Policy<2, 1> for Brake {
+//!     fn name(&self) -> String {
+//!         "brake".to_owned()
+//!     }
+//!     #[inline(always)]
+//!     fn control<R: Real>(&self, [x, v]: [R; 2]) -> [R; 1] {
+//!         [-x - R::lit(1.5) * v]
+//!     }
+//! }
+//!
+//! let plant = Plant::of(Clipped::new(Cart), Brake);
+//! let backend = Backend::cpu()?;
+//! let measures = backend.prepare(&plant)?.measures(&[[0.8, 0.0]], &RolloutSpec::new(60, 1.0)?)?;
+//! assert!(measures[0] > 0.0);
+//! # Ok::<(), reachcast::Error>(())
+//! ```
+//!
+//! # A certificate
+//!
+//! [`scenario::settings::Settings`] says what is asked for, risk and confidence included; the record that
+//! comes of it holds every number that was found, and its claims as sentences.
+//!
+//! ```
+//! use reachcast::backend::Backend;
+//! use reachcast::model::Plant;
+//! use reachcast::rollout::RolloutSpec;
+//! use reachcast::scenario::settings::Settings;
+//! use reachcast::scenario::{Unwatched, certify};
+//! use reachcast::system::{BangBang, DoubleIntegrator};
+//!
+//! let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
+//! let backend = Backend::cpu()?;
+//! // Around the state at rest 0.9 m from the middle, over 40 steps.
+//! let mut settings = Settings::new(&plant.model, [0.9, 0.0], RolloutSpec::new(40, 0.99)?);
+//! settings.global.draws = 2000;
+//! let record = certify(&backend.prepare(&plant)?, &settings, "a tour".into(), &Unwatched)?;
+//! assert!(record.global.accepted > 0);
+//! for claim in &record.statements {
+//!     println!("{claim}");
+//! }
+//! # Ok::<(), reachcast::Error>(())
+//! ```
+//!
+//! # Features
+//!
+//! * `gpu`: adapters, through wgpu. Without it, [`backend::Backend`] has the CPU alone.
+//! * `import`: networks from checkpoints of PyTorch and from ONNX.
+//! * `cli`, the default, which has both: the program, its configurations, reports and benchmarks, and the
+//!   study of races.
+//! * `train`, `train-gpu`: training, on the CPU and on a GPU.
+//!
+//! # Where what is
+//!
+//! The layers, each importing only from those before it: [`real`], [`error`] and [`digest`]; [`formula`],
+//! [`system`], [`policy`], [`cost`] and [`model`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`];
+//! then what is the program's. The mathematics is in `docs/method.md`, the architecture in
+//! `ARCHITECTURE.md`.
 
 pub mod backend;
+#[cfg(feature = "cli")]
 pub mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
 pub mod config;
 pub mod control;
 pub mod cost;
@@ -20,11 +171,13 @@ pub mod model;
 pub mod policy;
 pub mod race;
 pub mod real;
+#[cfg(feature = "cli")]
 pub mod report;
 pub mod rollout;
 pub mod scenario;
 pub mod system;
 mod tile;
+#[cfg(feature = "cli")]
 pub mod train;
 
 #[doc(hidden)]

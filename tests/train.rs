@@ -1,6 +1,5 @@
 //! Training: slopes against central differences in f64, networks against the engine, runs that are
 //! interrupted, and policies that get better.
-#![cfg(feature = "train")]
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod common;

@@ -2,7 +2,6 @@
 //! command with `--backend gpu`.
 //!
 //! Without an adapter every test says so and passes, unless `REACHCAST_REQUIRE_GPU` is 1.
-#![cfg(feature = "train-gpu")]
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod command;

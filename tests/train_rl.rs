@@ -1,6 +1,5 @@
 //! Reinforcement learning: backups against dynamic programming, games whose solution is known, runs
 //! that are interrupted.
-#![cfg(feature = "train")]
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod command;

@@ -2,14 +2,22 @@
 
 pub mod cpu;
 mod event;
+#[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "absent.rs"]
+pub mod gpu;
+mod measures;
+mod open;
 mod physics;
 mod plan_program;
 mod program;
+mod sink;
+mod task;
 
 use crate::error::Result;
 use crate::policy::Policy;
-use crate::rollout::{DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask};
+use crate::rollout::{DeviationTask, Farthest, Plant, ReachAvoidTask};
 use crate::system::System;
 
 use cpu::Cpu;
@@ -19,23 +27,20 @@ pub use event::{Action, Event, add_events};
 pub use physics::physics;
 pub use plan_program::PlanProgram;
 pub use program::Program;
+pub use sink::{MeasureSink, PairSink};
 
-/// The native CPU, or a GPU through wgpu.
+/// The native CPU, or a GPU through wgpu; in a build without the feature `gpu`, the CPU alone.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "a program has one, and passes it by reference")]
+#[cfg_attr(
+    feature = "gpu",
+    expect(clippy::large_enum_variant, reason = "a program has one, and passes it by reference")
+)]
 pub enum Backend {
     /// Lanes and threads on the host.
     Cpu(Cpu),
     /// WGSL on an adapter.
     Gpu(Gpu),
 }
-
-/// Receives the measures of starts `first..first + values.len()`, in order of index; an error
-/// stops the batch.
-pub type MeasureSink<'a> = &'a mut dyn FnMut(u64, &[f32]) -> Result<()>;
-
-/// Receives the measures of pairs, like [`MeasureSink`].
-pub type PairSink<'a> = &'a mut dyn FnMut(u64, &[PairMeasure]) -> Result<()>;
 
 impl Backend {
     /// `cpu` or `gpu`.

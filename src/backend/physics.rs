@@ -176,11 +176,6 @@ impl Function {
         let text = function(role.name(), &arguments, &moved);
         Self { role, text, takes, outputs: graph.outputs.len() }
     }
-
-    /// Whether it takes `part`.
-    pub(crate) fn reads(&self, part: Part) -> bool {
-        self.takes.contains(&part)
-    }
 }
 
 /// `graph` with its inputs at other places, `count` in all.
@@ -227,10 +222,5 @@ impl Physics {
     pub(crate) fn text(&self) -> String {
         let texts: Vec<&str> = self.functions.iter().map(|one| one.text.as_str()).collect();
         texts.join("\n")
-    }
-
-    /// The function of `role`, if there is one.
-    pub(crate) fn function(&self, role: Role) -> Option<&Function> {
-        self.functions.iter().find(|function| function.role == role)
     }
 }

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use super::options::{Changes, Common, Keys, Replace};
+use super::options::{Changes, Common, Global, Keys, Replace};
+use crate::files::Existing;
 use crate::policy::{Activation, OutputActivation};
 use crate::race::command::sweep::SweepArguments;
 use crate::train::settings::Method;
@@ -17,6 +18,15 @@ pub(super) struct Arguments {
     pub(super) common: Common,
     #[command(subcommand)]
     pub(super) command: Command,
+}
+
+impl Arguments {
+    /// The options that are not of one command alone.
+    pub(crate) fn global(&self) -> Global {
+        let (changes, out, replace) = self.command.options();
+        let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
+        Global { common: self.common.clone(), changes, out: out.cloned(), existing }
+    }
 }
 
 /// Shown after the help of the program.

@@ -5,11 +5,10 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::options::{BackendName, Global};
-use super::remembered::hardware;
 use super::{Outcome, report};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
-use crate::backend::gpu::{Adapter, AdapterKind, Choice, Gpu, adapters};
+use crate::backend::gpu::{Adapter, Choice, Gpu, adapters, has_hardware};
 use crate::error::{Error, Result};
 
 /// Opens the backend that the flags ask for; with `--fallback`, the CPU where no adapter opens, and
@@ -40,9 +39,7 @@ fn choice(global: &Global) -> Result<Option<Choice>> {
     }
     Ok(match global.common.backend {
         BackendName::Gpu => Some(Choice::Any),
-        BackendName::Auto if hardware(|| adapters().iter().any(is_hardware)) => {
-            Some(Choice::Hardware)
-        }
+        BackendName::Auto if has_hardware() => Some(Choice::Hardware),
         BackendName::Auto | BackendName::Cpu => None,
     })
 }
@@ -85,11 +82,6 @@ pub(crate) fn threads(global: &Global) -> usize {
     global.common.threads.map_or_else(available, usize::from)
 }
 
-/// Whether `adapter` is a GPU and not a program.
-fn is_hardware(adapter: &Adapter) -> bool {
-    adapter.kind != AdapterKind::Software
-}
-
 /// What `devices --json` prints.
 #[derive(Serialize)]
 struct Listing {
@@ -105,7 +97,7 @@ pub(crate) fn list(global: &Global) -> Result<Outcome> {
     let count = threads(global);
     let plural = if count == 1 { "" } else { "s" };
     let cpu = format!("{}, {count} thread{plural}", cpu(global)?.device());
-    let chosen = adapters.iter().find(|adapter| is_hardware(adapter));
+    let chosen = adapters.iter().find(|adapter| adapter.is_hardware());
     let auto = chosen.map_or("cpu".to_owned(), |adapter| adapter.name.clone());
     let listing = Listing { cpu, adapters, auto };
     report(global, &listing, || {

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::args::Arguments;
 use crate::config::{Overrides, Profile};
 use crate::files::Existing;
 
@@ -86,15 +85,6 @@ impl Global {
     /// The folder of the results, `usual` unless another one was named.
     pub(crate) fn folder(&self, usual: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| PathBuf::from(usual))
-    }
-}
-
-impl Arguments {
-    /// The options that are not of one command alone.
-    pub(crate) fn global(&self) -> Global {
-        let (changes, out, replace) = self.command.options();
-        let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
-        Global { common: self.common.clone(), changes, out: out.cloned(), existing }
     }
 }
 

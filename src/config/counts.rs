@@ -2,7 +2,7 @@
 
 use super::section::Config;
 use crate::scenario::bound::CountRule;
-use crate::scenario::deviation::Program;
+use crate::scenario::settings::Program;
 
 /// Counts by the simple bound what `config` does not give: the pairs of the deviation bound and the
 /// starts of a round of growth, where their claim is another than that of the configuration which

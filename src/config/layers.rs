@@ -1,11 +1,15 @@
 //! The layers of a configuration: the file, what is set over it, and which of them is to blame.
 
-use toml::Table;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::{Table, Value};
 
 use super::counts;
 use super::section::{Config, Profile};
-use super::{defaults, keys, model};
+use super::{keys, model, profile};
 use crate::error::{Error, Result};
+use crate::model::text::Origin;
 
 /// A document with the name that errors have for it.
 pub(super) type Layer = (String, Table);
@@ -100,4 +104,38 @@ impl Layers {
     pub(super) fn trains(&self) -> bool {
         self.given(&|_| true).contains_key("train")
     }
+}
+
+/// The defaults of the profile and the system that the table `given` names.
+fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
+    let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
+    if let Some(section) = given.get("system").filter(|section| !section.is_table()) {
+        let problem = format!("{section} is no section; give a section [system] with a `name`");
+        return Err(refused("system", problem));
+    }
+    let profile = match given.get("profile").cloned() {
+        Some(other) if !other.is_str() => {
+            let problem =
+                format!("{other} is no text; expected \"paper\", \"study\" or \"rigorous\"");
+            return Err(refused("profile", problem));
+        }
+        Some(name) => {
+            Profile::deserialize(name).map_err(|e| refused("profile", e.message().to_owned()))?
+        }
+        None => Profile::default(),
+    };
+    if model::is_described(given) {
+        let place = Origin::new(origin, Path::new(""));
+        let place = text.map_or(place.clone(), |text| place.with_text(text));
+        return model::defaults(profile, given, place);
+    }
+    let systems = profile::SYSTEMS.join("\" or \"");
+    let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
+    let name = given.get("system").and_then(|system| system.get("name"));
+    let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
+    let config = known.ok_or_else(|| {
+        let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
+        refused("system.name", format!("{found}; {expected}"))
+    })?;
+    Table::try_from(config).map_err(|e| refused("defaults", e.to_string()))
 }

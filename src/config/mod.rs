@@ -24,10 +24,9 @@ pub use value::{Constant, Coordinates, Named};
 use std::path::Path;
 
 use serde::Deserialize;
-use toml::{Table, Value};
+use toml::Table;
 
 use crate::error::{Error, Result};
-use crate::model::text::Origin;
 use layers::Layers;
 
 /// What the command line lays over a configuration file.
@@ -138,38 +137,4 @@ fn stored(config: &Config) -> Result<serde_json::Value> {
     let text = serde_json::to_string(config);
     text.and_then(|text| serde_json::from_str(&text))
         .map_err(|e| Error::invalid("configuration", e.to_string()))
-}
-
-/// The defaults of the profile and the system that the table `given` names.
-fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
-    let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
-    if let Some(section) = given.get("system").filter(|section| !section.is_table()) {
-        let problem = format!("{section} is no section; give a section [system] with a `name`");
-        return Err(refused("system", problem));
-    }
-    let profile = match given.get("profile").cloned() {
-        Some(other) if !other.is_str() => {
-            let problem =
-                format!("{other} is no text; expected \"paper\", \"study\" or \"rigorous\"");
-            return Err(refused("profile", problem));
-        }
-        Some(name) => {
-            Profile::deserialize(name).map_err(|e| refused("profile", e.message().to_owned()))?
-        }
-        None => Profile::default(),
-    };
-    if model::is_described(given) {
-        let place = Origin::new(origin, Path::new(""));
-        let place = text.map_or(place.clone(), |text| place.with_text(text));
-        return model::defaults(profile, given, place);
-    }
-    let systems = profile::SYSTEMS.join("\" or \"");
-    let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
-    let name = given.get("system").and_then(|system| system.get("name"));
-    let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
-    let config = known.ok_or_else(|| {
-        let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
-        refused("system.name", format!("{found}; {expected}"))
-    })?;
-    Table::try_from(config).map_err(|e| refused("defaults", e.to_string()))
 }

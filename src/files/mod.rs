@@ -1,27 +1,38 @@
 //! Files: results that appear whole or not at all, and states and measures as arrays.
 
+#[cfg(feature = "import")]
 mod archive;
 mod array;
+#[cfg(feature = "cli")]
 mod claim;
 mod disk;
 mod elements;
+mod existing;
 mod inputs;
 mod lines;
 mod list;
+#[cfg(feature = "cli")]
 mod npz;
 mod states;
+#[cfg(feature = "cli")]
 mod table;
 mod temporary;
 
+#[cfg(feature = "import")]
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
-pub use claim::Existing;
-pub(crate) use claim::{MANIFEST, claim_folder, is_free, make_way, spare_existing};
+#[cfg(feature = "cli")]
+pub(crate) use claim::{MANIFEST, claim_folder, is_free, make_way};
 pub use disk::check_room;
+pub use existing::Existing;
+#[cfg(feature = "cli")]
+pub(crate) use existing::spare_existing;
 pub use inputs::Inputs;
 pub use list::{StateList, States};
+#[cfg(feature = "cli")]
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
 pub use states::StateReader;
+#[cfg(feature = "cli")]
 pub use table::{Column, Table};
 
 use std::io::Write;
@@ -31,7 +42,7 @@ use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
-use claim::spare_other;
+use existing::spare_other;
 use temporary::{clear, temporary};
 
 /// `value` as a JSON document that ends with its line; errors call it `name`.

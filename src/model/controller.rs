@@ -83,7 +83,7 @@ impl Controller {
     }
 
     /// The network, if there is one, as it is shared.
-    pub(crate) fn shared_network(&self) -> Option<&Arc<Mlp>> {
+    pub fn shared_network(&self) -> Option<&Arc<Mlp>> {
         match &self.law {
             Law::Formula(_) => None,
             Law::Network { network, .. } => Some(network),

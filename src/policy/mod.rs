@@ -1,6 +1,7 @@
 //! Policies: a formula over `Real`, or a trained network.
 
 mod file;
+#[cfg(feature = "import")]
 pub mod import;
 pub mod inspect;
 mod mlp;

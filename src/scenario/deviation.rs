@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
+use super::coordinates::coordinates;
 use super::record::{Claim, DeviationRecord, decimal};
-use super::settings::{DeviationSettings, DeviationSource, Joint, Settings};
+use super::settings::{DeviationSettings, DeviationSource, Joint, Program, Settings};
 use super::{Context, linear};
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -12,33 +13,6 @@ use crate::rollout::{
     DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Region, RolloutSpec,
     Starts, Stream, Tightening,
 };
-
-/// Risk, beta and decision variables of each scenario program of a joint method.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Program {
-    /// Decision variables d.
-    pub(crate) decision_vars: u32,
-    /// Risk of one program.
-    pub(crate) epsilon: f64,
-    /// Beta of one program.
-    pub(crate) beta: f64,
-}
-
-impl Program {
-    /// The program that `joint` makes of the deviation bound over `horizon` steps; the bound of
-    /// step 0 is the radius itself and costs nothing.
-    pub(crate) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
-        let DeviationSettings { epsilon, beta, joint, .. } = *settings;
-        let steps = f64::from(horizon);
-        match joint {
-            Joint::FixedShape | Joint::Separate => Self { decision_vars: 1, epsilon, beta },
-            Joint::Variables => Self { decision_vars: horizon, epsilon, beta },
-            Joint::Bonferroni => {
-                Self { decision_vars: 1, epsilon: epsilon / steps, beta: beta / steps }
-            }
-        }
-    }
-}
 
 /// What the pairs of one sample showed.
 struct Sample {
@@ -254,7 +228,7 @@ fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim>
         ),
     };
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let (dimension, frozen) = super::certify::coordinates(model, &region.varies());
+    let (dimension, frozen) = coordinates(model, &region.varies());
     // Risk of one program, times the programs whose risks add up.
     let programs = asked.epsilon / program.epsilon;
     let risk = certified_risk(asked.scenarios, u64::from(program.decision_vars) - 1, program.beta);

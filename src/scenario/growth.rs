@@ -1,10 +1,11 @@
 //! Local growth, Algorithm 1: the largest ball around a boundary point that passes clean.
 
+use super::Context;
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
 use super::boundary::{self, Boundary};
+use super::coordinates::coordinates;
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
-use super::{Context, certify};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{
@@ -248,7 +249,7 @@ pub(super) fn record(
 fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
     let asked = &settings.growth;
     let (beta_used, states) = (asked.round_beta(), model.states.len());
-    let (dimension, frozen) = certify::coordinates(model, &asked.varies);
+    let (dimension, frozen) = coordinates(model, &asked.varies);
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(

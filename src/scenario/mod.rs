@@ -2,8 +2,12 @@
 
 pub mod bound;
 pub mod boundary;
+mod budget;
 mod certify;
+mod claims;
 mod compare;
+mod constants;
+mod coordinates;
 mod derived;
 pub mod deviation;
 mod finding;
@@ -13,16 +17,22 @@ pub mod growth_batch;
 pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
+mod origin;
 pub mod record;
 pub mod sampling;
 pub mod settings;
 mod stored;
 pub(crate) mod tail;
+mod tier;
+mod tightened;
 mod verify;
 
-pub(crate) use certify::provenance;
-pub use certify::{Tightened, certify, check_settings, hashes, tightened};
+pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
+pub use origin::hashes;
+#[cfg(feature = "cli")]
+pub(crate) use origin::provenance;
+pub use tightened::{Tightened, tightened};
 pub use verify::{QueryRow, check, query};
 
 use crate::backend::Program;

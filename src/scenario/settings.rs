@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
-use super::deviation::Program;
 use crate::error::Result;
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
@@ -142,6 +141,33 @@ pub struct Settings {
     pub state: Vec<f32>,
     /// Local growth.
     pub growth: GrowthSettings,
+}
+
+/// Risk, beta and decision variables of each scenario program of a joint method.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Program {
+    /// Decision variables d.
+    pub(crate) decision_vars: u32,
+    /// Risk of one program.
+    pub(crate) epsilon: f64,
+    /// Beta of one program.
+    pub(crate) beta: f64,
+}
+
+impl Program {
+    /// The program that `joint` makes of the deviation bound over `horizon` steps; the bound of
+    /// step 0 is the radius itself and costs nothing.
+    pub(crate) fn new(settings: &DeviationSettings, horizon: u32) -> Self {
+        let DeviationSettings { epsilon, beta, joint, .. } = *settings;
+        let steps = f64::from(horizon);
+        match joint {
+            Joint::FixedShape | Joint::Separate => Self { decision_vars: 1, epsilon, beta },
+            Joint::Variables => Self { decision_vars: horizon, epsilon, beta },
+            Joint::Bonferroni => {
+                Self { decision_vars: 1, epsilon: epsilon / steps, beta: beta / steps }
+            }
+        }
+    }
 }
 
 impl Settings {

@@ -3,11 +3,14 @@
 use serde::Serialize;
 
 use super::bound::lower_bound;
-use super::certify::{certify, hashes, provenance, tightening};
+use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
-use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA, finite_margin};
+use super::origin::{hashes, provenance};
+use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
+use super::tier::{tier, verified_ball};
+use super::tightened::tightening;
 use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
@@ -34,30 +37,6 @@ pub struct QueryRow {
     pub check_margin: f32,
     /// Target margin.
     pub target_margin: f32,
-}
-
-/// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord, x: &[f32]) -> u8 {
-    let local = || verified_ball(growth, x.len()).is_some_and(|ball| ball.contains(x));
-    match () {
-        () if target_margin > 0.0 => 0,
-        () if check_margin > 0.0 => 1,
-        () if local() => 2,
-        () => 3,
-    }
-}
-
-/// The verified ball of `states` coordinates, where there is one: a record that was edited may have
-/// any number of them.
-fn verified_ball(growth: &GrowthRecord, states: usize) -> Option<Ball> {
-    let whole = |center: &&Vec<f32>| center.len() == states && growth.varies.len() == states;
-    let verified = growth.outcome == GrowthOutcome::Verified;
-    let center = growth.center.as_ref().filter(whole).filter(|_| verified)?;
-    Some(Ball {
-        center: center.clone(),
-        radius: growth.radius as f32,
-        varies: growth.varies.clone(),
-    })
 }
 
 /// Whether the record is of the version that this program writes, and not of an older one.

@@ -1,8 +1,10 @@
 //! Systems: dynamics, target and constraint, written once over `Real`.
 
+mod clipped;
 mod diff_drive;
 mod double_integrator;
 
+pub use clipped::Clipped;
 pub use diff_drive::{DiffDrive, Disc};
 pub use double_integrator::{BangBang, DoubleIntegrator};
 
@@ -53,7 +55,7 @@ pub trait System<const NX: usize, const NU: usize>: Sync {
     fn states(&self) -> [Axis; NX];
     /// Name, unit and bounds of each control.
     fn controls(&self) -> [Axis; NU];
-    /// The next state; clips the control to its bounds itself.
+    /// The next state; clips the control to its bounds itself, or stands behind [`Clipped`].
     fn step<R: Real>(&self, x: [R; NX], u: [R; NU]) -> [R; NX];
     /// Target margin `r`: positive inside the target set.
     fn target<R: Real>(&self, x: [R; NX]) -> R;

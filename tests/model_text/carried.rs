@@ -12,7 +12,7 @@ use reachcast::policy::{Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 
-#[path = "../../examples/dubins.rs"]
+#[path = "../../examples/certificate.rs"]
 #[allow(dead_code, missing_docs, reason = "the example's own main is not called")]
 mod dubins;
 

@@ -1,13 +1,26 @@
 //! Signs of reach-avoid measures: a decided trajectory leaves the tile, and the next start takes
 //! its lane.
 
+use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::load::Loader;
-use super::reach_avoid::ReachAvoid;
+use super::reach_avoid::{ReachAvoid, measures};
 use super::tile::{Driver, Loss, Score};
 use crate::real::per_lane;
-use crate::rollout::{NON_FINITE, ReachAvoidTask};
+use crate::rollout::{NON_FINITE, Query, ReachAvoidTask};
 use crate::tile::Frame;
+
+impl Unit for ReachAvoid<'_> {
+    type Output = ();
+
+    fn run<K: Kernel, const N: usize>(self, kernel: K) {
+        let driver = Driver::new(self.plant, kernel, self.width);
+        match self.task.query {
+            Query::Measure => measures::<K, N>(self, driver),
+            Query::Sign => signs::<K, N>(self, driver),
+        }
+    }
+}
 
 /// The signs of the unit's measures.
 ///

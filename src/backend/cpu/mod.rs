@@ -35,7 +35,7 @@ use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
 use self::tile::{Drive, Driven};
-use super::program::check_task;
+use super::task::check_task;
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
 use crate::policy::{Mlp, Policy};

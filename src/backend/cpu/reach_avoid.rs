@@ -1,11 +1,9 @@
 //! Reach-avoid measures of a unit of starts, tile by tile.
 
-use super::dispatch::Unit;
-use super::early_exit::signs;
 use super::kernel::Kernel;
 use super::load::Loader;
 use super::tile::{Driven, Driver, Loss, Score};
-use crate::rollout::{Query, ReachAvoidTask};
+use crate::rollout::ReachAvoidTask;
 
 /// Consecutive starts for one thread; twin: `shaders/reach_avoid.wgsl`.
 pub(super) struct ReachAvoid<'a> {
@@ -21,20 +19,8 @@ pub(super) struct ReachAvoid<'a> {
     pub(super) out: &'a mut [f32],
 }
 
-impl Unit for ReachAvoid<'_> {
-    type Output = ();
-
-    fn run<K: Kernel, const N: usize>(self, kernel: K) {
-        let driver = Driver::new(self.plant, kernel, self.width);
-        match self.task.query {
-            Query::Measure => measures::<K, N>(self, driver),
-            Query::Sign => signs::<K, N>(self, driver),
-        }
-    }
-}
-
 /// The measures, by tiles of trajectories that start and end together.
-fn measures<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver: Driver<'_, K>) {
+pub(super) fn measures<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver: Driver<'_, K>) {
     let (task, width) = (unit.task, unit.width);
     let mut frame = driver.frame();
     let mut loader = Loader::<K, N>::new(driver.kernel(), frame.states().len());

@@ -34,6 +34,7 @@ mod reach_avoid;
 mod readback;
 mod recent;
 mod recover;
+mod remembered;
 mod source;
 mod state;
 mod timing;
@@ -43,7 +44,6 @@ mod upload;
 mod workspace;
 
 pub use adapter::Gpu;
-pub(crate) use cache::folder as cache_folder;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
 pub use device::{Adapter, AdapterKind, Choice, adapters};
@@ -53,5 +53,24 @@ pub use params::Params;
 pub use plan::NetworkKernels;
 pub(super) use prepared::Prepared;
 pub(super) use prepared_plans::PreparedPlanning;
+pub use remembered::has_hardware;
 pub use timing::KernelTime;
 pub use traffic::Traffic;
+
+use crate::error::Result;
+
+/// The hardware adapter of this machine, if it has one.
+///
+/// # Errors
+/// [`crate::Error::Device`] if it does not open.
+pub(super) fn hardware() -> Result<Option<Gpu>> {
+    has_hardware().then(|| Gpu::open(&Choice::Hardware)).transpose()
+}
+
+/// Any adapter, hardware before software.
+///
+/// # Errors
+/// [`crate::Error::Device`] if there is none or it does not open.
+pub(super) fn any() -> Result<Gpu> {
+    Gpu::open(&Choice::Any)
+}

@@ -9,7 +9,6 @@ use std::time::Instant;
 use crate::backend::{Backend, Program};
 use crate::cli::options::{BackendName, Global};
 use crate::cli::progress::Progress;
-use crate::cli::train::DEFAULT_OUT;
 use crate::cli::{Outcome, devices, report};
 use crate::config::{Config, Job, SystemJob};
 use crate::error::Result;
@@ -32,18 +31,17 @@ use crate::train::value::{Lesson, Value};
 /// Bytes that a training frees and takes at every iteration, and no more than glibc heeds.
 const KEPT: usize = 24 << 20;
 
-/// Trains, stores and reports; `folder` is that of the configuration.
-pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Outcome> {
+/// Trains, stores in `out` and reports; `folder` is that of the configuration.
+pub(super) fn run(global: &Global, config: &Config, folder: &Path, out: &Path) -> Result<Outcome> {
     let begun = Instant::now();
     keep_memory();
-    let out = global.folder(DEFAULT_OUT);
     let (backend, progress) = (opened(global)?, Progress::new(global));
     let device = Device::of(&backend)?;
     let settings = config.train_settings()?;
     let existing = global.existing;
     let (backend_used, watch) = (&backend, &progress);
     let training =
-        Training { config, settings, backend: backend_used, device, watch, out: &out, existing };
+        Training { config, settings, backend: backend_used, device, watch, out, existing };
     let mut trained = match settings.method {
         Method::Analytic | Method::Ddpg | Method::Ppo => config.with_system(training)?,
         Method::Value | Method::ActionValue => {
@@ -53,7 +51,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path) -> Result<Out
     progress.finish();
     devices::note_events(global, &backend);
     trained.record.events = backend.events();
-    let files = write(&out, &trained)?;
+    let files = write(out, &trained)?;
     let seconds = begun.elapsed().as_secs_f64();
     report(global, &trained.record, || text(&trained.record, &files, seconds))?;
     Ok(Outcome::Done)

@@ -1,11 +1,11 @@
 //! From text to terms: recursive descent, weak operators first, and a limit to its depth.
 
 use super::fault::{Fault, nearest};
+use super::formula::{Formula, MOST_NODES, NetworkCall};
 use super::function::Function;
 use super::names::Names;
 use super::term::{Comparison, Operation, Term, Values};
 use super::token::{Kind, Lexer, Token};
-use super::{Formula, MOST_NODES, NetworkCall};
 
 /// Deepest nesting of brackets, signs and powers.
 const DEEPEST: usize = 256;

@@ -9,10 +9,19 @@ use super::written::Written;
 use crate::error::{Error, Result};
 use crate::formula::text::Values;
 use crate::formula::{Graph, record};
+use crate::model::Plant;
 use crate::model::controller::{Controller, Law};
 use crate::policy::Mlp;
 
 impl Description {
+    /// The model and its policy.
+    ///
+    /// # Errors
+    /// Those of [`Description::model`] and [`Description::controller`].
+    pub fn plant(&self) -> Result<Plant> {
+        Ok(Plant::new(self.model()?, self.controller()?))
+    }
+
     /// The policy: its formulas recorded over the inputs of the model, its network read.
     ///
     /// # Errors

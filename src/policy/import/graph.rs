@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::MOST_LAYERS;
 use super::kind::Cast;
+use super::layers::MOST_LAYERS;
 use super::onnx::{Graph, Node, Tensor};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
 

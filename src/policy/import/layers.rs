@@ -2,8 +2,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::MOST_LAYERS;
 use super::checkpoint::Tensor;
+
+/// Most layers of a network: layers may share their numbers, memory does not.
+pub(super) const MOST_LAYERS: usize = 64;
 
 /// The modules of a tianshou actor or critic that hold its layers: a body and a head.
 const TIANSHOU: [&str; 2] = ["preprocess.model.model", "last.model"];

@@ -19,8 +19,6 @@ use crate::error::{Error, Result};
 use checkpoint::Checkpoint;
 pub use kind::Cast;
 
-/// Most layers of a network: layers may share their numbers, memory does not.
-const MOST_LAYERS: usize = 64;
 /// First bytes of a zip archive.
 const ZIP: &[u8] = b"PK\x03\x04";
 /// First byte of a pickle, which checkpoints of PyTorch before 1.6 are.

@@ -1,6 +1,6 @@
 //! The certified set in the slice, the ball of local growth and its sampled starts.
 
-use super::{entry, margins, no_slice, point, same_unit, slice_states, target_area};
+use super::plane::{entry, margins, no_slice, point, same_unit, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, diamond, dot};
 use crate::report::plot::{Labels, Plot, Shape};
 use crate::report::slice::Grid;

@@ -1,6 +1,6 @@
 //! Trajectories of a few rollouts in the plane of the system's bodies.
 
-use super::{entry, margins, point, same_unit, slice_states, target_area};
+use super::plane::{entry, margins, point, same_unit, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, dot};
 use crate::report::plot::{Labels, Plot, Shape};
 use crate::report::slice::Grid;

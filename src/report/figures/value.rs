@@ -1,6 +1,6 @@
 //! The value slice: `V_check` as a heat map with its zero level.
 
-use super::{lines, no_slice, point, same_unit, slice_states};
+use super::plane::{lines, no_slice, point, same_unit, slice_states};
 use crate::report::figure::{Figure, Swatch, diamond};
 use crate::report::palette::{self, LEVELS};
 use crate::report::plot::{Labels, Plot, Shape, coordinate};

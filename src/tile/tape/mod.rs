@@ -6,6 +6,7 @@
 
 mod operation;
 mod pairs;
+mod place;
 mod rows;
 mod run;
 mod schedule;
@@ -13,50 +14,19 @@ mod schedule;
 mod tests;
 mod values;
 
-use self::operation::Operation;
+pub(crate) use self::place::Source;
+use self::place::{Place, Step};
 use self::run::Run;
 use self::values::Values;
 use super::Frame;
 use crate::formula::Graph;
 use crate::real::simd::Instructions;
 
-/// Where an input of a formula is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Source {
-    /// In that row.
-    Row(usize),
-    /// The same number for all trajectories.
-    Number(f32),
-    /// A row, each number times another.
-    Multiple {
-        /// The row.
-        row: usize,
-        /// The factor.
-        of: f32,
-    },
-}
-
 /// A formula as operations over the rows of a [`Frame`].
 #[derive(Clone, Debug)]
 pub(crate) struct Tape {
     steps: Vec<Step>,
     own: usize,
-}
-
-/// Where an operand is when the tape runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Place {
-    /// In that row.
-    Row(usize),
-    /// The same number for all trajectories.
-    Number(f32),
-}
-
-/// An operation and the row that it writes.
-#[derive(Clone, Debug)]
-struct Step {
-    operation: Operation<Place>,
-    to: usize,
 }
 
 impl Tape {

@@ -1,8 +1,8 @@
 //! Rows for results: each keeps its own until its last use, then the row is free for another.
 
+use super::place::{Place, Step};
 use super::schedule::Scheduled;
 use super::values::Value;
-use super::{Place, Step};
 
 /// Operations whose operands and results have places.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use super::operation::{Binary, Kind, Pair, Unary, Whole};
-use super::{Place, Step};
+use super::place::{Place, Step};
 use crate::formula::Function;
 use crate::real::Vector;
 use crate::real::simd::Formulas;

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::Source;
 use super::operation::{Binary, Kind, Operation, Unary, Whole};
+use super::place::Source;
 use crate::formula::{Graph, Node};
 use crate::real::Real;
 

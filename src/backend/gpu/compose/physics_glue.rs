@@ -2,7 +2,7 @@
 
 use super::kernels::Slot;
 use super::layers::Fused;
-use crate::backend::physics::{Function, Part, Role};
+use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::policy::{Activation, Mlp, OutputActivation};
 
 /// What the texts have of a plant besides its formulas.
@@ -45,6 +45,20 @@ impl Driver {
             outputs: widths[widths.len() - 1],
             fused: None,
         }
+    }
+}
+
+impl Function {
+    /// Whether it takes `part`.
+    pub(super) fn reads(&self, part: Part) -> bool {
+        self.takes.contains(&part)
+    }
+}
+
+impl Physics {
+    /// The function of `role`, if there is one.
+    pub(super) fn function(&self, role: Role) -> Option<&Function> {
+        self.functions.iter().find(|function| function.role == role)
     }
 }
 

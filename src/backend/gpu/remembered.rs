@@ -5,7 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::backend::gpu::cache_folder;
+use super::cache::folder as cache_folder;
+use super::device::{Adapter, AdapterKind, adapters};
 use crate::digest::sha256;
 use crate::files::Staged;
 
@@ -27,11 +28,22 @@ const GRAPHICS: [&str; 6] = ["dri", "nvidia", "kfd", "dxg", "mali", "card"];
 const VARIABLES: [&str; 7] =
     ["VK_", "VULKAN_", "WGPU_", "MESA_", "LD_LIBRARY_PATH", "CUDA_VISIBLE", "XDG_DATA"];
 
-/// What `ask` says; remembered where it says no and nothing has changed that could change it.
-pub(super) fn hardware(ask: impl FnOnce() -> bool) -> bool {
+/// Whether this machine has an adapter that is a GPU and not a program.
+///
+/// That there is none is remembered in the user's folder for caches, until something changes that could
+/// change the answer.
+pub fn has_hardware() -> bool {
+    let ask = || adapters().iter().any(Adapter::is_hardware);
     match (key(), cache_folder()) {
         (Some(key), Some(folder)) => remembered(&folder, &key, ask),
         _ => ask(),
+    }
+}
+
+impl Adapter {
+    /// Whether it is a GPU and not a program.
+    pub fn is_hardware(&self) -> bool {
+        self.kind != AdapterKind::Software
     }
 }
 

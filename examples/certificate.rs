@@ -1,8 +1,8 @@
 //! A system of one's own, from its definition to a certificate: a Dubins car, a round obstacle,
-//! a hand-written policy. `cargo run --release --example dubins`
+//! a hand-written policy. `cargo run --release --example certificate`
 
 use reachcast::Result;
-use reachcast::backend::{Backend, cpu::Cpu};
+use reachcast::backend::Backend;
 use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
@@ -74,7 +74,7 @@ pub(crate) fn certificate(backend: &Backend) -> Result<Record> {
 }
 
 fn main() -> Result<()> {
-    let record = certificate(&Backend::Cpu(Cpu::new(None)?))?;
+    let record = certificate(&Backend::auto()?)?;
     println!("{}", record.statements.join("\n"));
     Ok(())
 }

@@ -1,0 +1,92 @@
+//! A parsed formula: evaluated over any scalar, and asked what it uses.
+
+use super::term::{Term, Values};
+use crate::real::Real;
+
+/// Most operations of a formula, and most nodes of the graph of a model.
+pub const MOST_NODES: usize = 65_536;
+/// A parsed formula: operations in order of evaluation, the last of which is its value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Formula {
+    pub(super) terms: Vec<Term>,
+    /// Where each term stands in the text, in bytes.
+    pub(super) places: Vec<u32>,
+    pub(super) calls: Vec<NetworkCall>,
+}
+
+/// A network that a formula calls like a function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NetworkCall {
+    /// The file, as the formula writes it.
+    pub file: String,
+    /// The terms that are its inputs.
+    pub arguments: Vec<u32>,
+    /// Which of its outputs is meant.
+    pub output: u32,
+    /// Where the call stands, in bytes.
+    pub at: usize,
+}
+
+/// Something that a formula uses, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Use {
+    /// The place of a name, or the number of an output.
+    pub number: u32,
+    /// Where it stands, in bytes.
+    pub at: usize,
+}
+
+impl Formula {
+    /// Its value for `values`.
+    ///
+    /// # Panics
+    /// If a name or output has no value, or the formula calls a network.
+    pub fn value<R: Real>(&self, values: Values<'_, R>) -> R {
+        let mut earlier: Vec<R> = Vec::with_capacity(self.terms.len());
+        for term in &self.terms {
+            earlier.push(term.value(values, &earlier));
+        }
+        earlier[earlier.len() - 1]
+    }
+
+    /// The number of its operations.
+    pub fn operations(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// The names that it uses, by their places.
+    pub fn names(&self) -> impl Iterator<Item = Use> {
+        self.uses(|term| match term {
+            Term::Name(place) => Some(place),
+            _ => None,
+        })
+    }
+
+    /// The outputs of the policy's network that it uses.
+    pub fn outputs(&self) -> impl Iterator<Item = Use> {
+        self.uses(|term| match term {
+            Term::Output(i) => Some(i),
+            _ => None,
+        })
+    }
+
+    /// The networks that it calls.
+    pub fn networks(&self) -> &[NetworkCall] {
+        &self.calls
+    }
+
+    /// The name that the whole formula is.
+    pub fn only_name(&self) -> Option<u32> {
+        match self.terms[..] {
+            [Term::Name(place)] => Some(place),
+            _ => None,
+        }
+    }
+
+    fn uses(&self, number: fn(Term) -> Option<u32>) -> impl Iterator<Item = Use> {
+        let both = self.terms.iter().zip(&self.places);
+        both.filter_map(move |(term, at)| {
+            number(*term).map(|number| Use { number, at: *at as usize })
+        })
+    }
+}

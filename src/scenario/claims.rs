@@ -1,0 +1,76 @@
+//! What a record claims as a whole: whether all of it was obtained, and its sentences.
+
+use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
+use super::sampling;
+use super::settings::Settings;
+use crate::model::Plant;
+use crate::rollout::StateList;
+
+/// Whether every claim that is asked for was obtained.
+pub(super) fn holds(
+    deviation: &DeviationRecord,
+    global: &GlobalRecord,
+    growth: &GrowthRecord,
+) -> bool {
+    deviation.non_finite == 0
+        && global.accepted > 0
+        && global.claim.certified_risk <= deviation.claim.epsilon
+        && growth.outcome == GrowthOutcome::Verified
+}
+
+/// The claims in words.
+pub(super) fn statements(
+    settings: &Settings,
+    deviation: &DeviationRecord,
+    global: &GlobalRecord,
+    growth: &GrowthRecord,
+) -> Vec<String> {
+    let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
+    let mut statements: Vec<String> =
+        claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
+    statements.insert(2, share_statement(global, settings));
+    statements.extend(growth_statement(growth));
+    statements
+}
+
+/// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is
+/// too coarse for them.
+pub(super) fn of_samples(
+    plant: &Plant,
+    settings: &Settings,
+    picture: &PictureRecord,
+) -> Vec<String> {
+    let size = settings.state.len();
+    let first = |x: &&Vec<f32>| x.len() == size;
+    let firsts = picture.rollouts.iter().filter_map(|rollout| rollout.states.first());
+    let starts = StateList::new(size).with(firsts.filter(first));
+    sampling::sampling(plant, starts.view(), settings.spec.horizon)
+}
+
+/// The certified share of the box in words.
+fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
+    let [low, high] = global.share_interval;
+    format!(
+        "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
+         ({} of {} starts).",
+        settings.global.beta,
+        100.0 * low,
+        100.0 * high,
+        global.accepted,
+        global.draws
+    )
+}
+
+/// What came of the growth, where it is not a claim.
+fn growth_statement(growth: &GrowthRecord) -> Option<String> {
+    match growth.outcome {
+        GrowthOutcome::Verified => None,
+        GrowthOutcome::Exhausted => Some(format!(
+            "Local growth is exhausted: each of {} rounds had a failure, no ball is verified.",
+            growth.rounds.len()
+        )),
+        GrowthOutcome::NoBoundary => Some(
+            "No boundary of the certified set was found: there is nothing to grow from.".into(),
+        ),
+    }
+}

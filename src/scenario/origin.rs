@@ -1,0 +1,52 @@
+//! What a record is of, and who computed it from which input.
+
+use super::record::{Provenance, SystemRecord};
+use super::settings::Settings;
+use crate::backend::Program;
+use crate::digest;
+use crate::model::{Model, Plant};
+use crate::policy::Mlp;
+use crate::rollout::GENERATOR;
+
+/// Who computed what from which input.
+pub(crate) fn provenance(
+    program: &Program<'_>,
+    seed: u64,
+    config: serde_json::Value,
+) -> Provenance {
+    let (plant, backend) = (program.plant(), program.backend());
+    let (physics_sha256, policy_sha256) = hashes(plant);
+    Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed,
+        generator: GENERATOR.to_owned(),
+        config,
+        policy: plant.controller.name.clone(),
+        policy_sha256,
+        physics_sha256,
+        backend: backend.name().to_owned(),
+        device: backend.device(),
+    }
+}
+
+/// SHA-256 of the recorded physics and of the policy.
+pub fn hashes(plant: &Plant) -> (String, String) {
+    let physics = digest::sha256([plant.text().as_bytes()]);
+    // A formula is part of the recorded text.
+    let policy = plant.controller.network().map_or_else(|| physics.clone(), Mlp::digest);
+    (physics, policy)
+}
+
+/// Names, boxes and bodies of the system, with the box of starts that `settings` ask for.
+pub(super) fn system_record(model: &Model, settings: &Settings) -> SystemRecord {
+    let mut states = model.states.clone();
+    for (axis, (low, high)) in states.iter_mut().zip(settings.low.iter().zip(&settings.high)) {
+        (axis.low, axis.high) = (*low, *high);
+    }
+    SystemRecord {
+        name: model.name.clone(),
+        states,
+        controls: model.controls.clone(),
+        bodies: model.bodies.clone(),
+    }
+}

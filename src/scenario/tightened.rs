@@ -1,0 +1,40 @@
+//! What V_check is computed with: constants, deviation bound, and what they take off the margins.
+
+use super::constants::constants;
+use super::record::{ConstantsRecord, DeviationRecord};
+use super::settings::Settings;
+use super::{Context, deviation};
+use crate::error::Result;
+use crate::rollout::{Region, RolloutSpec, Tightening};
+
+/// What the margins lose with the constants used.
+pub(super) fn tightening(
+    bound: &[f64],
+    constants: &ConstantsRecord,
+    spec: &RolloutSpec,
+) -> Tightening {
+    deviation::tightening(bound, constants.target.used, constants.constraint.used, spec)
+}
+
+/// Constants and deviation bound that `settings` ask for, and what they take off the margins.
+///
+/// # Errors
+/// [`Error::TooFewScenarios`] and [`Error::Invalid`] before any work; those of the backend.
+pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened> {
+    Region::new_box(&*settings.low, &*settings.high)?;
+    let constants = constants(context.model(), settings)?;
+    let deviation = deviation::bound(context, settings)?;
+    let losses = tightening(&deviation.bound, &constants, &settings.spec);
+    Ok(Tightened { constants, deviation, losses })
+}
+
+/// What V_check is computed with.
+#[derive(Clone, Debug)]
+pub struct Tightened {
+    /// Lipschitz constants.
+    pub constants: ConstantsRecord,
+    /// Deviation bound.
+    pub deviation: DeviationRecord,
+    /// What the margins lose.
+    pub losses: Tightening,
+}
