@@ -23,6 +23,7 @@ pub mod real;
 pub mod report;
 pub mod rollout;
 pub mod scenario;
+pub mod studies;
 pub mod system;
 mod tile;
 pub mod train;

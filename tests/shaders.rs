@@ -503,7 +503,7 @@ fn fused_activations_take_the_workgroup_memory_that_is_planned() {
 /// Layer of each top-level module; a file may name its own layer and those above it.
 ///
 /// The study goes through all of them; its parts that stand elsewhere than with the experiments are named.
-const LAYERS: [(&str, u32); 26] = [
+const LAYERS: [(&str, u32); 27] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -526,6 +526,7 @@ const LAYERS: [(&str, u32); 26] = [
     ("bench", 7),
     ("train", 7),
     ("report", 8),
+    ("studies", 9),
     ("cli", 9),
     ("config", 9),
     ("main", 9),

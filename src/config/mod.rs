@@ -5,21 +5,25 @@ mod keys;
 mod layers;
 mod model;
 mod plant;
-mod profile;
+pub(crate) mod profile;
 mod section;
 mod settings;
 #[cfg(test)]
 mod tests;
-mod train;
+pub(crate) mod train;
 mod value;
 
-pub use plant::{Job, PolicySource, SystemJob};
+pub use crate::studies::SystemSection;
+pub use plant::{PlantWork, PolicySource, SystemWork};
 pub use section::{
     BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
     GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,
-    StateSection, SystemSection,
+    StateSection,
 };
 pub use value::{Constant, Coordinates, Named};
+
+pub(crate) use plant::{check_network, no_formula};
+pub(crate) use settings::positive_f32;
 
 use std::path::Path;
 
@@ -28,6 +32,7 @@ use toml::{Table, Value};
 
 use crate::error::{Error, Result};
 use crate::model::text::Origin;
+use crate::studies::{self, SYSTEMS};
 use layers::Layers;
 
 /// What the command line lays over a configuration file.
@@ -96,7 +101,7 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_train_json(&self) -> Result<serde_json::Value> {
-        stored(&Self { race: None, ..self.clone() })
+        stored(&Self { study: None, ..self.clone() })
     }
 
     /// The configuration that a certificate stores.
@@ -116,7 +121,7 @@ impl Config {
 fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
     let system = value.pointer("/system/name").and_then(serde_json::Value::as_str);
     if value.get("model").is_some_and(serde_json::Value::is_object)
-        || system.is_some_and(|name| profile::SYSTEMS.contains(&name))
+        || system.is_some_and(|name| SYSTEMS.contains(&name))
     {
         return None;
     }
@@ -128,7 +133,7 @@ fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
     Some(Error::Refused(format!(
         "the certificate is of {plant}, which another program defines; this one knows {}. Its numbers \
          can be read, and the program that made it can check it (`reachcast::scenario::check`)",
-        profile::SYSTEMS.join(" and ")
+        SYSTEMS.join(" and ")
     )))
 }
 
@@ -163,10 +168,10 @@ fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
         let place = text.map_or(place.clone(), |text| place.with_text(text));
         return model::defaults(profile, given, place);
     }
-    let systems = profile::SYSTEMS.join("\" or \"");
+    let systems = SYSTEMS.join("\" or \"");
     let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
     let name = given.get("system").and_then(|system| system.get("name"));
-    let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
+    let known = name.and_then(Value::as_str).and_then(|name| studies::defaults(profile, name));
     let config = known.ok_or_else(|| {
         let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
         refused("system.name", format!("{found}; {expected}"))

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 
 /// Activation of the hidden layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activation {
     /// `max(0, x)`.
     Relu,
@@ -44,7 +44,7 @@ impl Activation {
 }
 
 /// Activation of the last layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutputActivation {
     /// Hyperbolic tangent: controls in `[-1, 1]`.
     Tanh,

@@ -1,6 +1,7 @@
 //! The race study: two drones and one gate; whole races of many controllers, judged and compared.
 
 pub mod barrier;
+pub mod bench;
 pub(crate) mod command;
 pub mod controller;
 pub mod cost;

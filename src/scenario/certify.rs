@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::boundary;
 use super::ledger::{Entry, Ledger, Spend};
 use super::lipschitz::{self, MarginBox};
+use super::purpose;
 use super::record::{
     ConstantRecord, ConstantsRecord, DeviationRecord, GrowthRecord, PictureRecord, Provenance,
     Record, RolloutRecord, SCHEMA, Spending, StateRecord, SystemRecord, Timing, decimal,
@@ -18,9 +19,7 @@ use crate::digest;
 use crate::error::{Error, Result};
 use crate::model::{Model, Plant};
 use crate::policy::Mlp;
-use crate::rollout::{
-    GENERATOR, Purpose, Query, Region, RolloutSpec, States, Stream, Tightening, replay,
-};
+use crate::rollout::{GENERATOR, Query, Region, RolloutSpec, States, Stream, Tightening, replay};
 
 /// Rollouts drawn in the picture: the state's, and that many starts of the growth.
 const PICTURED: usize = 12;
@@ -55,7 +54,7 @@ pub fn certify(
     check_settings(settings)?;
     let ledger = ledger(settings)?;
     let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
-    let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
+    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
     let global = global::conditional(context, settings, &tightening, purposes)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
@@ -285,7 +284,7 @@ fn state(
 /// A few rollouts: the state's, then starts of the growth's last round.
 fn picture(plant: &Plant, settings: &Settings, growth: &GrowthRecord) -> PictureRecord {
     let region = Region::Box { low: settings.low.to_vec(), high: settings.high.to_vec() };
-    let stream = Stream::new(settings.seed, Purpose::Picture, 0);
+    let stream = Stream::new(settings.seed, purpose::PICTURE, 0);
     let sampled = growth.samples.iter().take(PICTURED).map(|sample| sample.x.clone());
     let mut starts: Vec<Vec<f32>> =
         std::iter::once(settings.state.to_vec()).chain(sampled).collect();

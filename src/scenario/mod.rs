@@ -13,6 +13,7 @@ pub mod growth_batch;
 pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
+pub mod purpose;
 pub mod record;
 pub mod sampling;
 pub mod settings;

@@ -6,15 +6,14 @@ use super::bound::lower_bound;
 use super::certify::{certify, hashes, provenance, tightening};
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
+use super::purpose;
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
-use crate::rollout::{
-    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
-};
+use crate::rollout::{Ball, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening};
 
 /// Fresh starts that a verified ball is tried with.
 const FRESH_STARTS: u64 = 20_000;
@@ -176,7 +175,7 @@ pub fn check(
     findings.push(compare::fields(record, &again));
     findings.extend(not_compared(record));
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
-    let purposes = [Purpose::Check, Purpose::CheckPerturbation];
+    let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
     let fresh = global::conditional(context, settings, &tightening, purposes)?;
     findings.push(refuted(
         "conditional failure on fresh pairs",
@@ -267,7 +266,7 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
 /// Failures among fresh starts in the verified ball.
 fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
     context.watch.begin("fresh starts in the ball", FRESH_STARTS);
-    let stream = Stream::new(settings.seed, Purpose::Check, 1);
+    let stream = Stream::new(settings.seed, purpose::CHECK, 1);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region: Region::Ball(ball), stream },
