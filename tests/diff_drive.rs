@@ -240,7 +240,7 @@ impl Cost<2, 1, 1> for Charged {
 fn a_lost_state_is_charged_a_cell() {
     let spec = MppiSpec::new(MppiSettings::new(&Lost.controls(), 130, 3)).unwrap();
     let planning = Planning::of(&Lost, Charged(small_map()), spec);
-    let stream = Stream::new(1, Purpose::ControlNoise, 0);
+    let stream = Stream::new(1, Purpose::CONTROL_NOISE, 0);
     let problems = [MppiProblem::new([1.2, -1.7], &[[0.0]; 3], &[[0.0]; 3], stream)];
     let task = MppiTask { problems: &problems, iteration: 0, costs: CostQuery::Each };
     for backend in backends() {
@@ -277,7 +277,7 @@ fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> (f32
         let (x, y) = (problem.start[0], problem.start[1]);
         let goal = [goal_x, goal_y, (goal_y - y).atan2(goal_x - x)];
         problem.context.chunks_mut(3).for_each(|context| context.copy_from_slice(&goal));
-        problem.stream = Stream::new(seed, Purpose::ControlNoise, step);
+        problem.stream = Stream::new(seed, Purpose::CONTROL_NOISE, step);
         planner.improve(&mut problems).unwrap();
         let [problem] = &mut problems;
         let before = [problem.start[0], problem.start[1], problem.start[2]];

@@ -70,7 +70,7 @@ fn linear_problem(plan: &[f32], seed: u64) -> MppiProblem {
     let context = (0..STEPS).map(|t| [0.0, 0.0, f32::from(u8::from(t + 1 == STEPS))]);
     let (stages, context): (Vec<[f32; 1]>, Vec<_>) =
         (plan.iter().map(|u| [*u]).collect(), context.collect());
-    MppiProblem::new([1.0, -0.5], &stages, &context, Stream::new(seed, Purpose::ControlNoise, 0))
+    MppiProblem::new([1.0, -0.5], &stages, &context, Stream::new(seed, Purpose::CONTROL_NOISE, 0))
 }
 
 fn linear_settings(samples: u32) -> MppiSettings {
@@ -297,7 +297,7 @@ fn race_problems(horizon: usize) -> Vec<MppiProblem> {
     (0..3)
         .map(|i| {
             let contexts: Vec<_> = (0..horizon).map(|t| context(i, t)).collect();
-            let stream = Stream::new(40 + i as u64, Purpose::ControlNoise, 7 * i as u32);
+            let stream = Stream::new(40 + i as u64, Purpose::CONTROL_NOISE, 7 * i as u32);
             MppiProblem::new(start(i as f32), &plan(i), &contexts, stream)
         })
         .collect()
@@ -391,7 +391,7 @@ fn small_and_long_problems() {
         let spec = MppiSpec::new(MppiSettings { temperature: 20.0, ..settings }).unwrap();
         let context = (0..horizon).map(|t| [0.1, 0.0, f32::from(u8::from(t + 1 == horizon))]);
         let (plan, context) = (vec![[0.1]; horizon as usize], context.collect::<Vec<_>>());
-        let stream = Stream::new(5, Purpose::ControlNoise, 1);
+        let stream = Stream::new(5, Purpose::CONTROL_NOISE, 1);
         let problem = MppiProblem::new([0.6, -0.1], &plan, &context, stream);
         let planning = Planning::of::<_, _, 2, 1, 3>(&system, cost.clone(), spec);
         compare::<_, _, 2, 1, 3>(&system, &cost, &planning, &task(&[problem]));
@@ -445,7 +445,7 @@ fn the_noise_has_the_moments_that_were_asked_for() {
         let settings =
             MppiSettings { noise: kind, sigma: covariance(COVARIANCE), ..race_settings(count, 12) };
         let spec = MppiSpec::new(settings).unwrap();
-        let stream = Stream::new(9, Purpose::ControlNoise, 0);
+        let stream = Stream::new(9, Purpose::CONTROL_NOISE, 0);
         let samples: Vec<_> = (0..count).map(|k| spec.noise().sample(stream, 0, k)).collect();
         let moment = |s: usize, t: usize, i: usize, j: usize| {
             let terms = samples.iter().map(|e| f64::from(e[3 * s + i]) * f64::from(e[3 * t + j]));
@@ -482,7 +482,7 @@ fn the_noise_has_the_moments_that_were_asked_for() {
 fn antithetic_samples_mirror_each_other() {
     let settings = MppiSettings { antithetic: true, ..race_settings(10, 6) };
     let spec = MppiSpec::new(settings).unwrap();
-    let stream = Stream::new(9, Purpose::ControlNoise, 0);
+    let stream = Stream::new(9, Purpose::CONTROL_NOISE, 0);
     for pair in 0..5 {
         let [a, b] = [0, 1].map(|i| spec.noise().sample(stream, 0, 2 * pair + i));
         assert!(a.iter().zip(&b).all(|(a, b)| *a == -*b && *a != 0.0));

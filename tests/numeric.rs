@@ -411,7 +411,7 @@ fn samples_that_overflow_have_no_weight() {
     let spec = MppiSpec::new(MppiSettings::new(&Kicked.controls(), 300, 12)).expect("settings");
     let planning = Planning::of(&Kicked, Squares, spec);
     let problem = |start: f32, number| {
-        let stream = Stream::new(71, Purpose::ControlNoise, number);
+        let stream = Stream::new(71, Purpose::CONTROL_NOISE, number);
         MppiProblem::new([start], &[[0.25]; 12], &[[0.0]; 12], stream)
     };
     // Some samples overflow, then all of them.

@@ -54,7 +54,7 @@ fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
     let (mut x, mut plan) = ([0.8, 0.0], vec![0.0; HORIZON]);
     let mut warm = None;
     for step in 0..steps {
-        let stream = Stream::new(81, Purpose::ControlNoise, step);
+        let stream = Stream::new(81, Purpose::CONTROL_NOISE, step);
         let problem = MppiProblem::new(x, &[[0.0]; HORIZON], &[[0.0; 3]; HORIZON], stream);
         let mut problems = [MppiProblem { plan: shifted(&plan, 1), ..problem }];
         let results = planner.improve(&mut problems).expect("a plan");

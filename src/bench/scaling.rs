@@ -2,40 +2,33 @@
 
 use std::hint::black_box;
 
-use super::data::{self, Data};
 use super::measure::{Protocol, measure};
 use super::record::ScalingRecord;
+use super::workload::Batch;
 use crate::backend::{Backend, Program};
 use crate::error::Result;
-use crate::model::Plant;
-use crate::policy::Mlp;
-use crate::race::system::DroneRace;
-use crate::rollout::{Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
+use crate::rollout::{Query, ReachAvoidTask, Starts, Tightening};
 use crate::scenario::Watch;
 
 /// Sizes of the batches.
 pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
-/// Number of the stream of the starts.
-const STREAM: u32 = 1 << 17;
 
-/// Rolls out the batches of `sizes`, one after the other, under the first network of `data`.
+/// Rolls out the batches of `sizes`, one after the other.
 ///
 /// # Errors
 /// Those of the backend, and interruption.
 pub fn scaling(
     backend: &Backend,
-    data: &Data,
+    batch: &Batch,
     sizes: &[u64],
     protocol: &Protocol,
     watch: &dyn Watch,
 ) -> Result<Vec<ScalingRecord>> {
-    let (_, network) = &data.networks[0];
-    let plant = Plant::of(DroneRace::default(), Mlp::clone(network));
-    let program = backend.prepare(&plant)?;
-    let batch = |&rollouts: &u64| {
+    let program = backend.prepare(&batch.plant)?;
+    let timed = |&rollouts: &u64| {
         reset_peak();
         watch.begin(&format!("{rollouts} rollouts"), rollouts);
-        let timing = measure(protocol, || roll(&program, data.seed, rollouts, watch))?;
+        let timing = measure(protocol, || roll(&program, batch, rollouts, watch))?;
         Ok(ScalingRecord {
             backend: backend.name().to_owned(),
             rollouts,
@@ -44,21 +37,17 @@ pub fn scaling(
             peak_bytes: peak_bytes(),
         })
     };
-    sizes.iter().map(batch).collect()
+    sizes.iter().map(timed).collect()
 }
 
-/// Rolls out `count` starts drawn from the default box of the race.
-fn roll(program: &Program<'_>, seed: u64, count: u64, watch: &dyn Watch) -> Result<()> {
-    let spec = data::rollout_spec()?;
-    let axes = &program.plant().model.states;
-    let low: Vec<f32> = axes.iter().map(|axis| axis.low).collect();
-    let high: Vec<f32> = axes.iter().map(|axis| axis.high).collect();
-    let region = Region::new_box(low, high)?;
+/// Rolls out the first `count` starts of `batch`.
+fn roll(program: &Program<'_>, batch: &Batch, count: u64, watch: &dyn Watch) -> Result<()> {
+    let Batch { region, stream, spec, .. } = batch;
     let task = ReachAvoidTask {
-        starts: Starts::Drawn { region, stream: Stream::new(seed, Purpose::Bench, STREAM) },
+        starts: Starts::Drawn { region: region.clone(), stream: *stream },
         range: 0..count,
-        spec,
-        tightening: &Tightening::none(&spec),
+        spec: *spec,
+        tightening: &Tightening::none(spec),
         query: Query::Measure,
     };
     program.reach_avoid(&task, &mut |_, measures| {
@@ -89,7 +78,7 @@ mod tests {
     fn the_peak_sees_what_was_held() {
         reset_peak();
         let before = peak_bytes().unwrap();
-        let held = black_box(vec![1_u8; 256 << 20]);
+        let held = std::hint::black_box(vec![1_u8; 256 << 20]);
         let during = peak_bytes().unwrap();
         drop(held);
         // Half of it: other tests of the same process give memory back.

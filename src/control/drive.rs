@@ -57,7 +57,7 @@ impl DriveBenchmark {
         let planning = Planning::of(&system, cost.clone(), MppiSpec::new(settings)?);
         let [x, y] = system.goal.center;
         let (plan, goals) = ([[0.0; 2]; HORIZON as usize], [[x, y, GOAL_YAW]; HORIZON as usize]);
-        let stream = Stream::new(1, Purpose::ControlNoise, 0);
+        let stream = Stream::new(1, Purpose::CONTROL_NOISE, 0);
         let problem = MppiProblem::new(START, &plan, &goals, stream);
         Ok(Self { system, cost, planning, problem })
     }

@@ -2,6 +2,7 @@
 
 mod fold;
 mod mppi;
+mod mppi_settings;
 mod noise;
 mod philox;
 mod planning;
@@ -15,7 +16,8 @@ mod tally;
 
 pub use crate::files::{StateList, States};
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
-pub use mppi::{MAX_PLAN, MAX_SAMPLES, MppiSettings, MppiSpec, NoiseKind, Sigma};
+pub use mppi::MppiSpec;
+pub use mppi_settings::{MAX_PLAN, MAX_SAMPLES, MppiSettings, NoiseKind, Sigma};
 pub use noise::{Noise, NoiseShape, SPLINE_SUPPORT, SplineRow};
 pub use philox::philox;
 pub use planning::{

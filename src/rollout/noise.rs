@@ -1,6 +1,6 @@
 //! Control noise of MPPI: a function of seed, stream, sample and step, on every backend.
 
-use super::mppi::{MppiSettings, NoiseKind};
+use super::mppi_settings::{MppiSettings, NoiseKind};
 use super::philox::philox;
 use super::sample::{Stream, normal_pair, unit};
 use crate::error::{Error, Result};

@@ -68,7 +68,7 @@ impl MppiProblem {
     ///
     /// ```
     /// use reachcast::rollout::{MppiProblem, Purpose, Stream};
-    /// let stream = Stream::new(1, Purpose::ControlNoise, 0);
+    /// let stream = Stream::new(1, Purpose::CONTROL_NOISE, 0);
     /// let problem = MppiProblem::new([0.5, 0.0], &[[0.0]; 20], &[[0.0, 0.0, 0.0]; 20], stream);
     /// assert_eq!(problem.plan.len(), 20);
     /// ```

@@ -13,6 +13,7 @@ use reachcast::rollout::{
     PairControl, PairMeasure, Pairs, Planning, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec,
     Stream,
 };
+use reachcast::scenario::purpose;
 use reachcast::system::{DoubleIntegrator, System};
 use reachcast::{Error, Fault, Result};
 
@@ -108,7 +109,7 @@ fn pairs(backend: &Backend, found: &mut Found) -> Result<()> {
         pairs: Pairs {
             nominal: drawn(whole_box(&system), 62),
             radius: 0.1,
-            stream: Stream::new(62, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(62, purpose::DEVIATION_PERTURBATION, 0),
         },
         range: 0..COUNT,
         spec,
@@ -131,7 +132,7 @@ fn plans(backend: &Backend, found: &mut Found) -> Result<()> {
     let planning =
         Planning::of::<_, _, 2, 1, 3>(&system, cost, MppiSpec::new(settings).expect("settings"));
     let problem = |number: u32| {
-        let stream = Stream::new(63, Purpose::ControlNoise, number);
+        let stream = Stream::new(63, Purpose::CONTROL_NOISE, number);
         MppiProblem::new([0.1 * number as f32, -0.2], &[[0.1]; 8], &[[0.0; 3]; 8], stream)
     };
     let problems: Vec<_> = (0..PROBLEMS).map(problem).collect();

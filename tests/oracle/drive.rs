@@ -36,7 +36,7 @@ fn problem(number: u32) -> MppiProblem {
     let plan: Vec<_> = (0..HORIZON).map(|t| [1.2 + 0.5 * wave(t), 1.5 * wave(2 * t)]).collect();
     let goal = |t: u32| [1.5 + 0.1 * wave(t), 0.4, 3.0 - 0.05 * t as f32];
     let context: Vec<_> = (0..HORIZON).map(goal).collect();
-    MppiProblem::new(start, &plan, &context, Stream::new(11, Purpose::ControlNoise, number))
+    MppiProblem::new(start, &plan, &context, Stream::new(11, Purpose::CONTROL_NOISE, number))
 }
 
 /// What is wrong with the plans of `backend`, against f64 and, for an adapter, against `host`.

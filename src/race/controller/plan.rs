@@ -50,7 +50,7 @@ pub(in crate::race) fn first(plan: &[f32]) -> [f32; 3] {
 
 /// The stream of the control noise of a race at one step.
 pub(in crate::race) fn stream(seed: u64, step: u32) -> Stream {
-    Stream::new(seed, Purpose::ControlNoise, step)
+    Stream::new(seed, Purpose::CONTROL_NOISE, step)
 }
 
 /// The problem at `start`, with the reference of each stage.
