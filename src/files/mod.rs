@@ -16,7 +16,7 @@ mod temporary;
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
 pub use claim::Existing;
-pub(crate) use claim::{MANIFEST, claim_folder, is_free, make_way, spare_existing};
+pub(crate) use claim::{MANIFEST, NETWORK_COPIES, claim_folder, is_free, make_way, spare_existing};
 pub use disk::check_room;
 pub use inputs::Inputs;
 pub use list::{StateList, States};

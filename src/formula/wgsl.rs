@@ -1,6 +1,6 @@
 //! Prints a recorded graph as a WGSL function.
 
-use super::{Graph, Node};
+use super::{Call, Graph, Node};
 
 /// The functions that printed formulas call: choices that hand a NaN on.
 pub const CHOICES: &str = include_str!("../../shaders/choices.wgsl");
@@ -59,6 +59,7 @@ pub fn function_with(
     for (i, node) in graph.nodes.iter().enumerate() {
         text += &match *node {
             Node::Literal(bits) => literal(i, f32::from_bits(bits)),
+            Node::Said(call, output) => said(i, &graph.calls[call as usize], output),
             node => format!("    let v{i} = {};\n", operation(node, &inputs, product)),
         };
     }
@@ -96,6 +97,14 @@ fn operation(node: Node, inputs: &[String], product: Product<'_>) -> String {
         Node::SelectLt(a, b, yes, no) => format!("select(v{no}, v{yes}, v{a} < v{b})"),
         other => unreachable!("an expanded graph has no {other:?}"),
     }
+}
+
+/// The statement of an output of a network, which WGSL has no operation for: its text tells plants
+/// apart, and no kernel is made of it. The network is named by its digest.
+fn said(i: usize, call: &Call, output: u32) -> String {
+    let arguments: Vec<String> = call.arguments.iter().map(|at| format!("v{at}")).collect();
+    let (digest, arguments) = (call.network.digest(), arguments.join(", "));
+    format!("    let v{i} = network_{digest}({arguments})[{output}];\n")
 }
 
 /// The statements of literal number `i`: the shortest decimal that is read back as the same f32. What

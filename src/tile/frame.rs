@@ -62,6 +62,8 @@ pub(crate) struct Frame {
     begin: usize,
     width: usize,
     layout: Layout,
+    /// Room that networks inside formulas take turns with.
+    room: [Vec<f32>; 2],
 }
 
 impl Frame {
@@ -71,7 +73,7 @@ impl Frame {
         let numbers = vec![0.0; layout.rows() * width + LINE / size_of::<f32>()];
         // A place beyond the allowance cannot be: then rows begin where they do.
         let begin = numbers.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
-        Self { numbers, begin, width, layout }
+        Self { numbers, begin, width, layout, room: Default::default() }
     }
 
     /// Numbers of a row.
@@ -134,6 +136,16 @@ impl Frame {
     pub(crate) fn row_mut(&mut self, row: usize) -> &mut [f32] {
         let width = self.width;
         &mut self.rows_mut()[row * width..][..width]
+    }
+
+    /// Takes the room for activations of networks out, to be put back with [`Frame::put_room`].
+    pub(crate) fn take_room(&mut self) -> [Vec<f32>; 2] {
+        std::mem::take(&mut self.room)
+    }
+
+    /// Puts the room for activations back, so that it is there the next time.
+    pub(crate) fn put_room(&mut self, room: [Vec<f32>; 2]) {
+        self.room = room;
     }
 
     /// Copies the states of trajectory `from` of `source` to trajectory `to`.

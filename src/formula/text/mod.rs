@@ -4,6 +4,7 @@
 mod fault;
 mod function;
 mod names;
+mod networks;
 mod parser;
 mod term;
 mod token;
@@ -12,10 +13,11 @@ pub use fault::Fault;
 pub(crate) use fault::{nearest, shown};
 pub use function::Function;
 pub use names::Names;
+pub use networks::Networks;
 pub use term::{Comparison, Operation, Term, Values};
 pub(crate) use token::LONGEST_NAME;
 
-use crate::real::Real;
+use super::Scalar;
 use parser::Parser;
 
 /// Most operations of a formula, and most nodes of the graph of a model.
@@ -45,6 +47,14 @@ pub struct NetworkCall {
     pub at: usize,
 }
 
+impl NetworkCall {
+    /// Its value, given those of the `earlier` terms.
+    fn value<R: Scalar>(&self, networks: &Networks, earlier: &[R]) -> R {
+        let inputs: Vec<R> = self.arguments.iter().map(|i| earlier[*i as usize]).collect();
+        R::call(networks.of(&self.file), &inputs)[self.output as usize]
+    }
+}
+
 /// Something that a formula uses, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
@@ -58,11 +68,13 @@ impl Formula {
     /// Parses `text`, which may use `names`, functions, `pi`, `out[i]` and `net(...)[i]`.
     ///
     /// ```
-    /// use reachcast::formula::text::{Formula, Names, Values};
+    /// use reachcast::formula::text::{Formula, Names, Networks, Values};
     /// let mut names = Names::default();
     /// names.add("x", "a state")?;
     /// let formula = Formula::parse("-x^2 + 2 * hypot(x, 4)", &names).expect("a formula");
-    /// assert_eq!(formula.value(Values { names: &[3.0_f32], outputs: &[] }), 1.0);
+    /// let networks = Networks::default();
+    /// let values = Values { names: &[3.0_f32], outputs: &[], networks: &networks };
+    /// assert_eq!(formula.value(values), 1.0);
     /// let fault = Formula::parse("1 + cosh(x)", &names).expect_err("no such function");
     /// assert_eq!(fault.problem, "unknown function `cosh`; the nearest is `cos`");
     /// # Ok::<(), String>(())
@@ -82,11 +94,15 @@ impl Formula {
     /// Its value for `values`.
     ///
     /// # Panics
-    /// If a name or output has no value, or the formula calls a network.
-    pub fn value<R: Real>(&self, values: Values<'_, R>) -> R {
+    /// If a name or output has no value, or a network is missing or has other inputs.
+    pub fn value<R: Scalar>(&self, values: Values<'_, R>) -> R {
         let mut earlier: Vec<R> = Vec::with_capacity(self.terms.len());
         for term in &self.terms {
-            earlier.push(term.value(values, &earlier));
+            let value = match *term {
+                Term::Network(call) => self.calls[call as usize].value(values.networks, &earlier),
+                term => term.value(values, &earlier),
+            };
+            earlier.push(value);
         }
         earlier[earlier.len() - 1]
     }
