@@ -10,7 +10,7 @@ use super::record::{Expr, Graph, record};
 use crate::policy::Mlp;
 
 /// Numbers that a network's inputs and outputs lie at multiples of: kernels take vectors of them.
-pub(crate) const ROOM: usize = 8;
+const ROOM: usize = 8;
 
 /// A formula cut at its networks.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,6 +11,6 @@ pub mod text;
 pub mod wgsl;
 
 pub use call::{Call, Scalar};
-pub(crate) use chain::{Ask, Chain, Link, Place, ROOM};
+pub(crate) use chain::{Ask, Chain, Link, Place};
 pub use node::{Function, Node};
 pub use record::{Expr, Graph, record, record_with};

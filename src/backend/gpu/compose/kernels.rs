@@ -26,6 +26,8 @@ pub enum Kernel {
     Reduce,
     /// Evaluates what a network sees.
     Observe,
+    /// Evaluates the part of that number of formulas that call networks.
+    Link(u32),
     /// A hidden layer of the network.
     HiddenLayer,
     /// The last layer of the network.
@@ -115,6 +117,12 @@ pub enum Slot {
     Partials = 26,
     /// `values`: the parameters of the model, in vectors of 4.
     Values = 27,
+    /// `kept`: numbers that parts of formulas keep for later ones, `[numbers, stride]`.
+    Kept = 30,
+    /// `asked`: vectors of 4 inputs of networks that formulas call.
+    Asked = 31,
+    /// `said`: vectors of 4 outputs of such networks.
+    Said = 32,
 }
 
 impl Kernel {
@@ -145,6 +153,7 @@ impl Kernel {
             Self::Deviation => "deviation",
             Self::Reduce => "reduce",
             Self::Observe => "observe",
+            Self::Link(_) => "link",
             Self::HiddenLayer | Self::OutputLayer => "mlp",
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
@@ -197,6 +206,9 @@ impl Kernel {
             ],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
+            Self::Link(_) => {
+                &[(S::State, Read), (S::Kept, ReadWrite), (S::Asked, ReadWrite), (S::Said, Read)]
+            }
             Self::HiddenLayer | Self::OutputLayer => {
                 &[(S::Weights, Read), (S::Source, Read), (S::Sink, ReadWrite)]
             }
