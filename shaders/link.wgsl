@@ -4,8 +4,6 @@
 
 @group(0) @binding(3) var<storage, read> state: array<vec4<f32>>;
 @group(0) @binding(30) var<storage, read_write> kept: array<f32>;
-@group(0) @binding(31) var<storage, read_write> asked: array<vec4<f32>>;
-@group(0) @binding(32) var<storage, read> said: array<vec4<f32>>;
 
 @compute @workgroup_size(WORKGROUP)
 fn link(@builtin(global_invocation_id) id: vec3<u32>) {

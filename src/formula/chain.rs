@@ -230,12 +230,12 @@ impl Forge<'_> {
             let (asked, said) = (asked.clone(), said.clone());
             asks.push(Ask { network: Arc::clone(&call.network), asked, said });
         }
+        if level == self.levels.last {
+            outputs.extend(self.graph.outputs.iter().map(|node| self.node(&mut part, *node)));
+        }
         for (node, slot) in self.hand_on(level, computed) {
             outputs.push(self.node(&mut part, node));
             writes.push(Place::Carried(slot));
-        }
-        if level == self.levels.last {
-            outputs.extend(self.graph.outputs.iter().map(|node| self.node(&mut part, *node)));
         }
         let Part { nodes, reads, .. } = part;
         let inputs = self.graph.inputs + reads.len();

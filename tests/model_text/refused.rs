@@ -226,7 +226,7 @@ fn networks_in_formulas_are_looked_at() {
     assert_refused(
         "pull / mass",
         &net(", x)[0]"),
-        &["cart.toml:18: model.flow.speed, column 15", "takes 2 inputs, found 1"],
+        &["cart.toml:16: model.flow.speed, column 15", "takes 2 inputs, found 1"],
     );
     assert_refused("pull / mass", &net(", x, speed)[1]"), &["has the outputs 0 to 0, found [1]"]);
     assert_refused("pull / mass", "net('none.safetensors', x)[0]", &["none.safetensors"]);

@@ -43,6 +43,8 @@ pub(in super::super) struct ChainSizes {
 struct LinkText {
     /// What it evaluates.
     text: String,
+    /// Whether it is told what networks before it said.
+    told: bool,
     /// The networks that run behind it.
     asks: Vec<AskShape>,
 }
@@ -110,9 +112,16 @@ impl ChainText {
         self.sizes
     }
 
-    /// What the kernel of a link binds besides the parameters of its dispatch.
-    pub(super) fn bindings(&self, outline: &Outline) -> Vec<(Slot, Access)> {
-        let mut list = Kernel::Link(0).bindings(false);
+    /// What the kernel of a link binds: nothing that it does not use.
+    pub(super) fn bindings(&self, outline: &Outline, number: u32) -> Vec<(Slot, Access)> {
+        let mut list = Kernel::Link(number).bindings(false);
+        let link = &self.links[number as usize];
+        if !link.asks.is_empty() {
+            list.push((Slot::Asked, Access::ReadWrite));
+        }
+        if link.told {
+            list.push((Slot::Said, Access::Read));
+        }
         if outline.parameters > 0 {
             list.push((Slot::Values, Access::Constant));
         }
@@ -121,12 +130,21 @@ impl ChainText {
 
     /// The part of the kernel of a link that is its own.
     pub(super) fn link(&self, outline: &Outline, number: u32) -> String {
+        let link = &self.links[number as usize];
+        let declare = |slot: Slot, access: &str| {
+            let (binding, name) = (slot as u32, if slot == Slot::Said { "said" } else { "asked" });
+            format!(
+                "@group(0) @binding({binding}) var<storage, {access}> {name}: array<vec4<f32>>;\n"
+            )
+        };
         let glue = [
+            if link.asks.is_empty() { String::new() } else { declare(Slot::Asked, "read_write") },
+            if link.told { declare(Slot::Said, "read") } else { String::new() },
             if outline.parameters > 0 { parameter_glue(outline.parameters) } else { String::new() },
             seconds_glue(outline.period),
             load_glue(outline.states, &[]),
         ];
-        [&glue.concat(), &self.links[number as usize].text, LINK].join("\n")
+        [&glue.concat(), &link.text, LINK].join("\n")
     }
 
     /// What gives a rollout its margins and its next states: numbers that links have kept, loaded along
@@ -208,7 +226,11 @@ struct Printer<'a> {
 impl Printer<'_> {
     /// The links of `chain`, whose outputs are kept from the number `first` on.
     fn links(&mut self, chain: &Chain, first: usize) -> Vec<LinkText> {
-        let link = |link| LinkText { text: self.text(link, first), asks: self.asks(link) };
+        let link = |link: &Link| LinkText {
+            text: self.text(link, first),
+            told: link.reads.iter().any(|place| matches!(place, Place::Said(_))),
+            asks: self.asks(link),
+        };
         chain.links.iter().map(link).collect()
     }
 

@@ -206,9 +206,7 @@ impl Kernel {
             ],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
-            Self::Link(_) => {
-                &[(S::State, Read), (S::Kept, ReadWrite), (S::Asked, ReadWrite), (S::Said, Read)]
-            }
+            Self::Link(_) => &[(S::State, Read), (S::Kept, ReadWrite)],
             Self::HiddenLayer | Self::OutputLayer => {
                 &[(S::Weights, Read), (S::Source, Read), (S::Sink, ReadWrite)]
             }

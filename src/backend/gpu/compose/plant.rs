@@ -102,7 +102,7 @@ impl PlantText {
     pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
         let mut list = kernel.bindings(self.outline.driver.is_some());
         match (&self.chain, kernel) {
-            (Some(chain), Kernel::Link(_)) => return chain.bindings(&self.outline),
+            (Some(chain), Kernel::Link(number)) => return chain.bindings(&self.outline, number),
             (Some(_), Kernel::ReachAvoid | Kernel::Deviation) => {
                 list.push((Slot::Kept, Access::Read));
             }
