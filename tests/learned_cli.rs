@@ -152,7 +152,7 @@ fn what_does_not_fit_is_refused_with_file_key_and_column() {
         (
             ", v, x)",
             ", v)",
-            &["line.toml:13: model.flow.v, column 9", "takes 2 inputs, found 1"][..],
+            &["line.toml:11: model.flow.v, column 9", "takes 2 inputs, found 1"][..],
         ),
         ("v)[1]", "v)[2]", &["model.task.target, column 24", "outputs 0 to 1, found [2]"]),
         ("shift", "none", &["model.task.target, column 24", "none.safetensors", "No such file"]),

@@ -73,3 +73,13 @@ fn changed_links_are_seen() {
         assert!(farthest > 1e-3, "{to} is not seen: {farthest}");
     }
 }
+
+/// A step of very many networks one after the other is for the CPU, and the error says so.
+#[test]
+fn too_long_a_chain_is_refused_with_the_remedy() {
+    let Some(gpu) = gpu() else { return };
+    let text = Law::Formula.cart().replacen("substeps = 2", "substeps = 20", 1);
+    let backend = Backend::Gpu(gpu);
+    let refused = backend.prepare(&plant_of(&text)).map(drop).expect_err("161 links").to_string();
+    assert!(refused.contains("at most 128") && refused.contains("--backend cpu"), "{refused}");
+}

@@ -4,6 +4,7 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::formula::Node;
 use reachcast::rollout::{NON_FINITE, PairControl, Query};
+use reachcast::scenario::lipschitz::{MarginBox, margins, sampled};
 
 use super::learned::batches::{assert_measures, assert_mutants_are_seen, assert_pairs, values};
 use super::learned::{LAWS, Law, Truth, plant, plant_of};
@@ -108,4 +109,26 @@ fn a_weight_is_part_of_the_hash() {
     };
     assert_eq!(text(|_| {}), text(|_| {}));
     assert_ne!(text(|_| {}), text(|last| *last = last.next_up()));
+}
+
+/// Constants of learned margins hold every sampled slope, and over a small box they are no more than
+/// the slopes there are.
+#[test]
+fn constants_of_learned_margins() {
+    let model = &plant(Law::Formula).model;
+    for (half, share) in [(1.0, 0.0), (1e-3, 0.9)] {
+        for [x, v] in [[0.0, 0.0], [0.4, -0.7], [-0.9, 0.2]] {
+            let (low, high) = ([x - half, v - half], [x + half, v + half]);
+            let region = MarginBox { low: &low, high: &high, varies: &[true; 2], horizon: 0 };
+            let (found, slopes) = (margins(model, region), sampled(model, region, 500, 1));
+            for (found, slope) in
+                [(found.target, slopes.target), (found.constraint, slopes.constraint)]
+            {
+                // A slope over 2e-5 between margins of a few units is rounded at 1e-10.
+                assert!(slope <= found.constant + 1e-9, "{slope} of {found:?}");
+                assert!(slope >= share * found.constant, "{slope} of {found:?}");
+                assert!(found.constant.is_finite() && !found.assumed_continuous, "{found:?}");
+            }
+        }
+    }
 }

@@ -238,7 +238,8 @@ fn networks_in_formulas_are_looked_at() {
         &format!("lift = \"{}\"\ndrag = \"0.1", net(")[0]")),
         &["model.let.lift", "found 0"],
     );
-    assert_refused("-2 * x - speed", &net(", x)[0]"), &["policy.formula.force", "takes 2 inputs"]);
+    let policy = format!("net('{file}', x)[0]");
+    assert_refused("-2 * x - speed", &policy, &["policy.formula.force", "takes 2 inputs"]);
     assert_refused("0.1 - abs(x)", &net(", x, force)[0]"), &["`force` is a control"]);
 }
 

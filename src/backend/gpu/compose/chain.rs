@@ -6,12 +6,16 @@ use std::sync::Arc;
 use super::glue::load_glue;
 use super::kernels::{Access, Kernel, Slot};
 use super::physics_glue::{Outline, parameter_glue, seconds_glue};
+use crate::error::{Error, Result};
 use crate::formula::wgsl::function;
 use crate::formula::{Ask, Chain, Expr, Graph, Link, Place, Scalar, record};
 use crate::model::{Controller, Law, Model};
 use crate::policy::Mlp;
 
 const LINK: &str = include_str!("../../../../shaders/link.wgsl");
+
+/// Most links of a plant: each is a kernel to compile, and a dispatch of every step.
+const MOST_LINKS: usize = 128;
 
 /// Kept numbers before the controls: target and constraint margin.
 const MARGINS: usize = 2;
@@ -62,11 +66,25 @@ pub(in super::super) struct AskShape {
 
 impl ChainText {
     /// The chain of a plant whose formulas call networks; `None` for any other.
-    pub(super) fn new(outline: &Outline, model: &Model, controller: &Controller) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`Error::Device`] if too many networks follow one another.
+    pub(super) fn new(
+        outline: &Outline,
+        model: &Model,
+        controller: &Controller,
+    ) -> Result<Option<Self>> {
         if !calls_networks(model, controller) {
-            return None;
+            return Ok(None);
         }
         let chains = [Chain::new(&decision(model, controller)), Chain::new(&model.step)];
+        let count: usize = chains.iter().map(|chain| chain.links.len()).sum();
+        if count > MOST_LINKS {
+            return Err(Error::Device(format!(
+                "the formulas of a step are {count} parts with networks between them; at most {MOST_LINKS} run \
+                 on an adapter: give `--backend cpu`, or fewer `substeps`"
+            )));
+        }
         let size = |of: fn(&Chain) -> usize| chains.iter().map(of).max().unwrap_or(0);
         let fixed = MARGINS + outline.controls + outline.states;
         let sizes = ChainSizes {
@@ -79,7 +97,7 @@ impl ChainText {
         let outputs = [0, MARGINS + outline.controls];
         let links = chains.iter().zip(outputs);
         let links = links.flat_map(|(chain, first)| printer.links(chain, first)).collect();
-        Some(Self { links, deciding, sizes, networks: printer.networks })
+        Ok(Some(Self { links, deciding, sizes, networks: printer.networks }))
     }
 
     /// Number of links.

@@ -38,7 +38,8 @@ impl PlantText {
     ///
     /// # Errors
     /// [`Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
-    /// what is not known there, or the network does not fit.
+    /// what is not known there, or the network does not fit; [`Error::Device`] if more networks follow
+    /// one another inside formulas than an adapter takes.
     pub fn new(model: &Model, controller: &Controller) -> Result<Self> {
         check_formulas(model, controller)?;
         let physics = Physics::new(model, controller);
@@ -50,7 +51,7 @@ impl PlantText {
             period: model.period.unwrap_or(0.0),
             driver: controller.network().map(Driver::new),
         };
-        let chain = ChainText::new(&outline, model, controller);
+        let chain = ChainText::new(&outline, model, controller)?;
         if chain.is_some() {
             // The network that drives is one of those that the chain calls.
             outline.driver = None;
