@@ -241,7 +241,7 @@ fn mppi_texts() -> Vec<(String, MppiText)> {
 fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInfo)) {
     for (plant, text) in all_plants() {
         // Only some networks see other things than the state.
-        let links = 0..text.chain().map_or(0, |chain| chain.len() as u32);
+        let links = 0..text.chain().map_or(0, |chain| chain.count() as u32);
         let kernels = Kernel::ROLLOUT.into_iter().chain(links.map(Kernel::Link));
         for kernel in kernels.filter(|kernel| *kernel != Kernel::Observe || text.observes()) {
             let name = format!("{kernel:?} of {plant}");

@@ -11,7 +11,7 @@ use super::section::{Config, PolicySection, Profile};
 use crate::error::{Error, Result};
 use crate::files::NETWORK_COPIES;
 use crate::model::Plant;
-use crate::model::text::{Description, NetworkFile, Origin, read_table};
+use crate::model::text::{Description, MOST_NETWORKS, NetworkFile, Origin, read_table};
 
 /// The sections that describe a plant.
 const SECTIONS: [&str; 2] = ["model", "policy"];
@@ -23,6 +23,9 @@ const SECTIONS: [&str; 2] = ["model", "policy"];
 pub fn copy_name(i: usize) -> &'static str {
     NETWORK_COPIES[i]
 }
+
+// Every network has a name for its copy.
+const _: () = assert!(NETWORK_COPIES.len() == MOST_NETWORKS);
 
 /// Whether `given` describes its plant itself.
 pub(super) fn is_described(given: &Table) -> bool {

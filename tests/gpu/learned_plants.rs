@@ -63,7 +63,7 @@ fn changed_links_are_seen() {
         let Some(gpu) = gpu() else { return };
         let plant = plant(Law::Formula);
         let text = PlantText::new(&plant.model, &plant.controller).expect("formulas that fit");
-        let links = text.chain().expect("networks in formulas").len() as u32;
+        let links = text.chain().expect("networks in formulas").count() as u32;
         let kernels = (0..links).map(Kernel::Link).chain([Kernel::ReachAvoid]);
         let all: Vec<String> = kernels.map(|kernel| text.compose(kernel)).collect();
         assert!(all.iter().any(|text| text.contains(from)), "{from}: {all:#?}");

@@ -40,7 +40,7 @@ impl ChainLoad {
     pub(super) fn new(chain: &ChainText) -> Self {
         let networks = chain.networks();
         let most = |of: fn(&Mlp) -> u64| networks.iter().map(|mlp| of(mlp)).max().unwrap_or(0);
-        let asks = || (0..chain.len()).flat_map(|link| chain.asks(link));
+        let asks = || (0..chain.count()).flat_map(|link| chain.asks(link));
         let layers = |ask: &AskShape| networks[ask.network].layers().len();
         let activations = VECTOR_BYTES * most(widest_quads);
         let ChainSizes { kept, asked, said } = chain.sizes();
@@ -50,7 +50,7 @@ impl ChainLoad {
             flops: asks().map(|ask| network_flops(&networks[ask.network])).sum(),
             parameters: VECTOR_BYTES * most(|mlp| parameter_quads(mlp) as u64),
             inputs: most(|mlp| mlp.layers().iter().map(|one| input_quads(one.inputs) as u64).sum()),
-            dispatches: chain.len() + asks().map(layers).sum::<usize>(),
+            dispatches: chain.count() + asks().map(layers).sum::<usize>(),
         }
     }
 }
@@ -137,7 +137,7 @@ impl ChainBinder<'_> {
             let asks = chain.asks(number).iter().map(|ask| self.ask(chain, ask));
             Ok(BoundLink { link: self.link(number)?, asks: asks.collect::<Result<_>>()? })
         };
-        let links = (0..chain.len()).map(link).collect::<Result<_>>()?;
+        let links = (0..chain.count()).map(link).collect::<Result<_>>()?;
         Ok(BoundChain { links, deciding: chain.deciding() })
     }
 

@@ -8,12 +8,11 @@ use super::dynamics::Dynamics;
 use super::policy::Policy;
 use super::written::Written;
 use crate::error::{Error, Result};
-use crate::files::NETWORK_COPIES;
 use crate::formula::text::{NetworkCall, Networks, shown};
 use crate::policy::Mlp;
 
 /// Most files of networks that the formulas of a model may name.
-pub const MOST_NETWORKS: usize = NETWORK_COPIES.len();
+pub const MOST_NETWORKS: usize = 8;
 
 /// The file of a network that formulas call.
 #[derive(Clone, Debug, PartialEq)]

@@ -101,13 +101,8 @@ impl ChainText {
     }
 
     /// Number of links.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.links.len()
-    }
-
-    /// Whether there is none, which does not happen.
-    pub fn is_empty(&self) -> bool {
-        self.links.is_empty()
     }
 
     /// How many of the links come before the controls are known; the others move the state.
