@@ -1,5 +1,6 @@
 //! Without a GPU: every composed kernel is valid WGSL and agrees with the Rust side.
 
+mod learned;
 mod models;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use reachcast::backend::gpu::compose::{
     Access, Fused, Kernel, MppiText, PlantText, Slot, limit_kernel,
 };
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, Quadratic};
+use reachcast::formula::{Expr, Scalar as _, record};
 use reachcast::model::{Controller, Law, Model};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::{Cone, DroneRace, Fence, RaceCost, RecoveryCost, Safety};
@@ -131,7 +133,22 @@ fn all_plants() -> Vec<Named> {
         all.extend(plants(DroneRace { cone, speed_limit, ..DroneRace::default() }));
     }
     all.extend(drifts());
+    for law in learned::LAWS {
+        let plant = learned::plant(law);
+        all.push((format!("learned cart, {law:?}"), text(&plant.model, &plant.controller)));
+    }
+    all.push(("learned scalar".to_owned(), learned_scalar()));
     all
+}
+
+/// One state and one control, whose next state and margins are a network's.
+fn learned_scalar() -> PlantText {
+    let network = Arc::new(network(1, 1, Activation::Relu));
+    let mut model = Model::of(Scalar);
+    let called = |x: &[Expr]| Expr::call(&network, &x[..1]);
+    model.step = record(model.inputs(), called);
+    model.target = record(model.inputs(), called);
+    text(&model, &Controller::of(&Scalar, Clamped))
 }
 
 /// Parses and validates; the panic shows the place.
@@ -219,7 +236,8 @@ fn mppi_texts() -> Vec<(String, MppiText)> {
 fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInfo)) {
     for (plant, text) in all_plants() {
         // Only some networks see other things than the state.
-        let kernels = Kernel::ROLLOUT.into_iter();
+        let links = 0..text.chain().map_or(0, |chain| chain.count() as u32);
+        let kernels = Kernel::ROLLOUT.into_iter().chain(links.map(Kernel::Link));
         for kernel in kernels.filter(|kernel| *kernel != Kernel::Observe || text.observes()) {
             let name = format!("{kernel:?} of {plant}");
             let (module, info) = validated(&name, &text.compose(kernel));
@@ -275,6 +293,9 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
         Slot::Partials => &["partials"],
         Slot::Values => &["values"],
         Slot::Cells => &["cells"],
+        Slot::Kept => &["kept"],
+        Slot::Asked => &["asked"],
+        Slot::Said => &["said"],
     }
 }
 

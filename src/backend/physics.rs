@@ -188,6 +188,7 @@ fn moved(graph: &Graph, place: &[u32], count: u32) -> Graph {
         inputs: count as usize,
         nodes: graph.nodes.iter().map(node).collect(),
         outputs: graph.outputs.clone(),
+        calls: graph.calls.clone(),
     }
 }
 

@@ -22,14 +22,16 @@ const UNIFORMS: f64 = 3.0;
 /// the sums of weights, squares and costs.
 const WEIGHT: f64 = 7.0;
 
-/// Of a recorded formula, its functions as polynomials; a clip or a sign is two comparisons.
+/// Of a recorded formula and the networks that it calls, its functions as polynomials; a clip or a sign
+/// is two comparisons.
 pub fn formula(graph: &Graph) -> f64 {
     let operations = |node: &Node| match node {
-        Node::Input(_) | Node::Literal(_) => 0.0,
+        Node::Input(_) | Node::Literal(_) | Node::Said(..) => 0.0,
         Node::Clamp(..) | Node::Sign(_) => 2.0,
         _ => 1.0,
     };
-    graph.expanded().nodes.iter().map(operations).sum()
+    let calls: f64 = graph.calls.iter().map(|call| network(&call.network)).sum();
+    graph.expanded().nodes.iter().map(operations).sum::<f64>() + calls
 }
 
 /// Of a network's layers: two for each weight.

@@ -3,14 +3,15 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::inputs::inputs;
+use super::inputs::{inputs, networks};
 use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report, summary};
-use crate::config::{Config, PolicySource};
+use crate::config::{Config, PolicySource, copy_name};
 use crate::error::Result;
 use crate::files::{Existing, MANIFEST, Staged, check_room, is_free, json, make_way, npy_bytes};
 use crate::model::Plant;
+use crate::model::text::NetworkFile;
 use crate::scenario;
 use crate::scenario::check_settings;
 use crate::scenario::record::{DeviationRecord, Record};
@@ -30,12 +31,12 @@ pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let config = Config::load(path, &global.overrides())?;
     let policy = config.policy_source(folder_of(path))?;
     let out = global.folder(DEFAULT_OUT);
-    inputs(path, &policy, []).spare_folder(&out)?;
+    inputs(path, &policy, networks(&config)).spare_folder(&out)?;
     let manifest = manifest(&config, &policy)?;
     let work = Certify { global, config: &config, out: &out, manifest: &manifest };
     let (record, mut staged) = work.run(&config.plant(&policy)?)?;
     staged.add(MANIFEST, manifest.as_bytes())?;
-    stage(&mut staged, &record, &policy)?;
+    stage(&mut staged, &record, (&policy, &config.networks))?;
     // Again: the work may have taken hours.
     match global.existing {
         Existing::Kept => is_free(&out, &manifest).map(drop)?,
@@ -52,7 +53,12 @@ fn manifest(config: &Config, policy: &PolicySource) -> Result<String> {
         PolicySource::Network { network, .. } => Some(network.digest()),
         PolicySource::Formula(_) => None,
     };
-    let work = serde_json::json!({ "config": config.to_json()?, "policy_sha256": digest });
+    let mut work = serde_json::json!({ "config": config.to_json()?, "policy_sha256": digest });
+    let networks = config.networks.iter().map(|file| file.network.digest());
+    let networks: Vec<String> = networks.collect();
+    if !networks.is_empty() {
+        work["networks_sha256"] = networks.into();
+    }
     json(MANIFEST, &serde_json::json!({ "certificate": work }))
 }
 
@@ -95,9 +101,16 @@ fn estimate(settings: &Settings) -> u64 {
 }
 
 /// Writes all files of the folder, the certificate itself last.
-fn stage(staged: &mut Staged, record: &Record, policy: &PolicySource) -> Result<()> {
+fn stage(
+    staged: &mut Staged,
+    record: &Record,
+    (policy, networks): (&PolicySource, &[NetworkFile]),
+) -> Result<()> {
     if let PolicySource::Network { bytes, .. } = policy {
         staged.add(POLICY, bytes)?;
+    }
+    for (i, file) in networks.iter().enumerate() {
+        staged.add(copy_name(i), &file.bytes)?;
     }
     for (name, bytes) in derived_files(record) {
         staged.add(name, &bytes)?;

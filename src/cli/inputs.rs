@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::config::PolicySource;
+use crate::config::{Config, PolicySource};
 use crate::files::Inputs;
 
 /// The configuration at `config`, the policy's file if it has one, and `more`.
@@ -16,4 +16,9 @@ pub(crate) fn inputs(
         PolicySource::Formula(_) => None,
     };
     Inputs::new(std::iter::once(config.to_owned()).chain(network).chain(more))
+}
+
+/// The files of networks that formulas of a model call.
+pub(super) fn networks(config: &Config) -> impl Iterator<Item = PathBuf> {
+    config.networks.iter().map(|file| file.path.clone())
 }

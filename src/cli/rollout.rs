@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::inputs::inputs;
+use super::inputs::{inputs, networks};
 use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
@@ -55,7 +55,8 @@ pub(super) fn run(global: &Global, path: &Path, starts: &Path, measures: &Path) 
     let config = Config::load(path, &global.overrides())?;
     let spec = config.spec()?;
     let policy = config.policy_source(folder)?;
-    inputs(path, &policy, [starts.to_owned()]).spare_file(measures)?;
+    let read = networks(&config).chain([starts.to_owned()]);
+    inputs(path, &policy, read).spare_file(measures)?;
     spare_existing(measures, global.existing)?;
     let work = Rollout { global, spec, starts, measures };
     let summary = work.run(&config.plant(&policy)?)?;

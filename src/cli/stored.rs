@@ -6,6 +6,7 @@ use super::options::Global;
 use serde::Serialize;
 
 use super::certify::{CERTIFICATE, POLICY, derived_files};
+use super::inputs::networks;
 use super::progress::Progress;
 use super::{Outcome, devices, report};
 use crate::config::{Config, PolicySource};
@@ -35,7 +36,7 @@ impl Stored {
         let path = folder.join(CERTIFICATE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;
-        let config = Config::from_json(&record.provenance.config)?;
+        let config = Config::from_json(&record.provenance.config)?.with_copies(folder)?;
         let policy = match &config.policy.file {
             Some(_) => PolicySource::read(folder.join(POLICY))?,
             None => config.policy_source(folder)?,
@@ -57,7 +58,8 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     let stored = Stored::read(folder)?;
     if let Some(out) = &global.out {
         let read = [states.to_owned(), folder.join(CERTIFICATE), folder.join(POLICY)];
-        Inputs::new(read).spare_file(&out.join(ANSWERS))?;
+        Inputs::new(read.into_iter().chain(networks(&stored.config)))
+            .spare_file(&out.join(ANSWERS))?;
     }
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;

@@ -14,6 +14,7 @@ pub(crate) mod train;
 mod value;
 
 pub use crate::studies::SystemSection;
+pub use model::copy_name;
 pub use plant::{PlantWork, PolicySource, SystemWork};
 pub use section::{
     BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
@@ -55,7 +56,8 @@ impl Config {
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
-        Self::from_layers(table, Some(text), &path.display().to_string(), overrides)
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_layers(table, Some(text), (&path.display().to_string(), folder), overrides)
     }
 
     /// The configuration of the TOML document `table`, which errors call `origin`.
@@ -63,14 +65,14 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`], as for [`Config::load`].
     pub fn from_table(table: Table, origin: &str, overrides: &Overrides) -> Result<Self> {
-        Self::from_layers(table, None, origin, overrides)
+        Self::from_layers(table, None, (origin, Path::new("")), overrides)
     }
 
-    /// The configuration of the document `table`, whose text makes errors name lines.
+    /// The configuration of the document `table` in `folder`, whose text makes errors name lines.
     fn from_layers(
         table: Table,
         text: Option<String>,
-        origin: &str,
+        (origin, folder): (&str, &Path),
         overrides: &Overrides,
     ) -> Result<Self> {
         let sets = overrides.set.iter().map(|text| {
@@ -78,8 +80,10 @@ impl Config {
         });
         let sets = sets.collect::<Result<Vec<_>>>()?;
         let file = (origin.to_owned(), table);
+        let place = text.iter().fold(Origin::new(origin, folder), |at, text| at.with_text(text));
         let layers = Layers { file, text, sets, profile: overrides.profile };
         let mut config = layers.config()?;
+        config.networks = config.networks_beside(&place)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
         // What is about to be trained is not there yet.
         config.policy.check(layers.trains())?;

@@ -9,11 +9,23 @@ use super::plant::PolicySource;
 use super::profile;
 use super::section::{Config, PolicySection, Profile};
 use crate::error::{Error, Result};
+use crate::files::NETWORK_COPIES;
 use crate::model::Plant;
-use crate::model::text::{Origin, read_table};
+use crate::model::text::{Description, MOST_NETWORKS, NetworkFile, Origin, read_table};
 
 /// The sections that describe a plant.
 const SECTIONS: [&str; 2] = ["model", "policy"];
+
+/// Name of the copy of the network number `i`, from 0, that formulas of a model call.
+///
+/// # Panics
+/// Beyond [`crate::model::text::MOST_NETWORKS`].
+pub fn copy_name(i: usize) -> &'static str {
+    NETWORK_COPIES[i]
+}
+
+// Every network has a name for its copy.
+const _: () = assert!(NETWORK_COPIES.len() == MOST_NETWORKS);
 
 /// Whether `given` describes its plant itself.
 pub(super) fn is_described(given: &Table) -> bool {
@@ -61,6 +73,49 @@ fn sections(given: &Table) -> Table {
 }
 
 impl Config {
+    /// The networks that formulas call, beside the file of `origin`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the formula whose network cannot be read or does not fit.
+    pub(super) fn networks_beside(&self, origin: &Origin) -> Result<Vec<NetworkFile>> {
+        match &self.model {
+            Some(model) => self
+                .description(model, &self.policy, origin)?
+                .networks(|_, name| origin.folder.join(name)),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// The same configuration with the networks that its formulas call, copies of which lie in `folder`:
+    /// that of number `i` as [`copy_name`] says, whatever the formulas call it.
+    ///
+    /// # Errors
+    /// Those of the description; [`Error::Invalid`] naming the formula whose copy cannot be read or does
+    /// not fit.
+    pub fn with_copies(mut self, folder: &Path) -> Result<Self> {
+        if let Some(model) = &self.model {
+            let origin = Origin::new("configuration", folder);
+            let description = self.description(model, &self.policy, &origin)?;
+            self.networks = description.networks(|i, _| folder.join(copy_name(i)))?;
+        }
+        Ok(self)
+    }
+
+    /// The description in the sections `model` and `policy`.
+    fn description(
+        &self,
+        model: &Table,
+        policy: &PolicySection,
+        origin: &Origin,
+    ) -> Result<Description> {
+        let refused = |e: toml::ser::Error| Error::invalid("policy", e.to_string());
+        let table = Table::from_iter([
+            ("model".to_owned(), Value::Table(model.clone())),
+            ("policy".to_owned(), Value::Table(Table::try_from(policy).map_err(refused)?)),
+        ]);
+        read_table(&table, origin)
+    }
+
     /// The plant that the section `model` describes, with the policy.
     ///
     /// # Errors
@@ -74,13 +129,8 @@ impl Config {
             }
             PolicySource::Formula(_) => (self.policy.clone(), Path::new(""), None),
         };
-        let refused = |e: toml::ser::Error| Error::invalid("policy", e.to_string());
-        let section = Table::try_from(section).map_err(refused)?;
-        let table = Table::from_iter([
-            ("model".to_owned(), Value::Table(model.clone())),
-            ("policy".to_owned(), Value::Table(section)),
-        ]);
-        let described = read_table(&table, &Origin::new("configuration", folder))?;
+        let described = self.description(model, &section, &Origin::new("configuration", folder))?;
+        let described = described.with_networks(self.networks.clone());
         let controller = match network {
             Some(network) => described.controller_of(network)?,
             None => described.controller()?,

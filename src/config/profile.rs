@@ -75,6 +75,7 @@ pub(crate) fn common(
         seed: 1,
         system,
         model: None,
+        networks: Vec::new(),
         policy: PolicySection::default(),
         rollout: RolloutSection { horizon: 30, gamma: 0.95 },
         bounds: by_name(states, |axis, _| [decimal(axis.low), decimal(axis.high)]),

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
+use crate::model::text::NetworkFile;
 use crate::rollout::PairControl;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::studies::{StudySettings, SystemSection};
@@ -28,6 +29,9 @@ pub struct Config {
     /// The plant and its task as text (`docs/models.md`), where it is one of the user's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<toml::Table>,
+    /// The networks that its formulas call, as they were read; no part of what is stored.
+    #[serde(skip)]
+    pub networks: Vec<NetworkFile>,
     /// The policy.
     pub policy: PolicySection,
     /// Length and discount of a rollout.

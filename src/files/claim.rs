@@ -18,11 +18,7 @@ struct Kind {
 
 /// Every kind of results that has a folder for itself.
 const KINDS: [Kind; 4] = [
-    Kind {
-        words: "a certificate",
-        files: &["certificate.json", "policy.safetensors", "deviation.csv", "slice.npy"],
-        folder: None,
-    },
+    Kind { words: "a certificate", files: &CERTIFICATE, folder: None },
     Kind {
         words: "races",
         files: &["results.json", "timing.json"],
@@ -47,6 +43,25 @@ const KINDS: [Kind; 4] = [
         folder: None,
     },
 ];
+/// Copies of the networks that formulas of a certified model call, in the order of its text.
+pub(crate) const NETWORK_COPIES: [&str; 8] = [
+    "network_1.safetensors",
+    "network_2.safetensors",
+    "network_3.safetensors",
+    "network_4.safetensors",
+    "network_5.safetensors",
+    "network_6.safetensors",
+    "network_7.safetensors",
+    "network_8.safetensors",
+];
+
+/// Files of a certificate.
+const CERTIFICATE: [&str; 12] = {
+    let [a, b, c, d, e, f, g, h] = NETWORK_COPIES;
+    let [record, policy] = ["certificate.json", "policy.safetensors"];
+    [record, policy, "deviation.csv", "slice.npy", a, b, c, d, e, f, g, h]
+};
+
 /// Files that several kinds have: the page, and at last the manifest.
 const SHARED: [&str; 2] = ["report.html", MANIFEST];
 

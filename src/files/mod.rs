@@ -22,7 +22,7 @@ mod temporary;
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
 #[cfg(feature = "cli")]
-pub(crate) use claim::{MANIFEST, claim_folder, is_free, make_way};
+pub(crate) use claim::{MANIFEST, NETWORK_COPIES, claim_folder, is_free, make_way};
 pub use disk::check_room;
 pub use existing::Existing;
 #[cfg(feature = "cli")]

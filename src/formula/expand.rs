@@ -1,12 +1,12 @@
 //! Graphs in the primitives: functions as the polynomials that every scalar computes.
 
 use super::node::Node;
-use super::record::{Graph, operators, primitives, push, recorded};
+use super::record::{Graph, operators, primitives, push, push_call, recorded};
 use crate::real::Real;
 
 impl Graph {
     /// The same formula with its functions as polynomials: sums, differences, products, quotients,
-    /// signs, absolute values, roots, floors and choices are left.
+    /// signs, absolute values, roots, floors and choices are left, and networks as they are.
     ///
     /// Its bits are those of the whole graph in f32 and in lanes. This is what WGSL is printed of, what
     /// operations are counted of, and what training differentiates.
@@ -23,7 +23,12 @@ impl Graph {
     pub fn expanded(&self) -> Self {
         recorded(self.inputs, |places| {
             let inputs: Vec<Primitive> = places.iter().map(|place| Primitive(*place)).collect();
-            self.eval(&inputs).into_iter().map(|output| output.0).collect()
+            let mut values = Vec::with_capacity(self.nodes.len());
+            self.replay_with(&inputs, &mut values, |network, arguments| {
+                let arguments: Vec<u32> = arguments.iter().map(|argument| argument.0).collect();
+                push_call(network, &arguments).into_iter().map(Primitive).collect()
+            });
+            self.outputs.iter().map(|i| values[*i as usize].0).collect()
         })
     }
 }

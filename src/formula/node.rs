@@ -47,6 +47,8 @@ pub enum Node {
     Powf(u32, u32),
     /// An elementary function.
     Apply(Function, u32),
+    /// Of the network call of that number ([`super::Graph::calls`]) the output of that number.
+    Said(u32, u32),
 }
 
 /// An elementary function of one number, as [`Real`] has it.
@@ -129,6 +131,9 @@ impl Function {
 
 impl Node {
     /// Its value for `inputs`, given the `values` of the earlier nodes.
+    ///
+    /// # Panics
+    /// For the output of a network, which the graph has the call of.
     #[inline(always)]
     pub fn value<R: Real>(self, inputs: &[R], values: &[R]) -> R {
         let at = |i: u32| values[i as usize];
@@ -154,10 +159,11 @@ impl Node {
             Self::Powi(a, exponent) => at(a).powi(exponent),
             Self::Powf(a, bits) => at(a).powf(f32::from_bits(bits)),
             Self::Apply(function, a) => function.apply(at(a)),
+            Self::Said(..) => panic!("outputs of networks come from the calls of the graph"),
         }
     }
 
-    /// Calls `see` with each operand.
+    /// Calls `see` with each operand; the arguments of a network are those of its call.
     pub(super) fn operands(self, mut see: impl FnMut(u32)) {
         self.renumbered(|operand| {
             see(operand);
@@ -168,7 +174,7 @@ impl Node {
     /// The node with its operands replaced.
     pub(super) fn renumbered(self, mut new: impl FnMut(u32) -> u32) -> Self {
         match self {
-            Self::Input(_) | Self::Literal(_) => self,
+            Self::Input(_) | Self::Literal(_) | Self::Said(..) => self,
             Self::Add(a, b) => Self::Add(new(a), new(b)),
             Self::Sub(a, b) => Self::Sub(new(a), new(b)),
             Self::Mul(a, b) => Self::Mul(new(a), new(b)),

@@ -3,7 +3,11 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
+use std::sync::Arc;
+
+use super::call::{Call, Scalar};
 use super::node::{Function, Node};
+use crate::policy::Mlp;
 use crate::real::Real;
 
 /// A recorded formula: nodes in order of evaluation, and which of them are the outputs.
@@ -15,6 +19,8 @@ pub struct Graph {
     pub nodes: Vec<Node>,
     /// Indices of the outputs.
     pub outputs: Vec<u32>,
+    /// The networks that it calls; the arguments of each come before its outputs.
+    pub calls: Vec<Call>,
 }
 
 /// A graph under construction.
@@ -25,6 +31,7 @@ struct Arena {
     known: HashMap<Node, u32>,
     /// The inputs that formulas ask for by name.
     parameters: HashMap<String, Expr>,
+    calls: Vec<Call>,
 }
 
 thread_local! {
@@ -42,6 +49,20 @@ pub(super) fn push(node: Node) -> u32 {
         }
         index
     })
+}
+
+/// The outputs of `network` at `arguments` as nodes of the recording in progress on this thread: those
+/// of an equal call, if there was one.
+pub(super) fn push_call(network: &Arc<Mlp>, arguments: &[u32]) -> Vec<u32> {
+    let call = ARENA.with_borrow_mut(|Arena { calls, .. }| {
+        let known = calls.iter().position(|call| call.is(network, arguments));
+        known.unwrap_or_else(|| {
+            calls.push(Call { network: Arc::clone(network), arguments: arguments.to_vec() });
+            calls.len() - 1
+        })
+    });
+    let outputs = network.widths().last().copied().unwrap_or(0);
+    (0..outputs).map(|output| push(Node::Said(call as u32, output as u32))).collect()
 }
 
 /// A number of the recording in progress on this thread; its functions stay whole.
@@ -94,31 +115,56 @@ pub(super) fn recorded(inputs: usize, formula: impl FnOnce(&[u32]) -> Vec<u32>) 
     let arguments: Vec<u32> = (0..inputs).map(|i| push(Node::Input(i as u32))).collect();
     let outputs = formula(&arguments);
     let recorded = ARENA.replace(outer);
-    prune(inputs, &recorded.nodes, &outputs)
-}
-
-/// Keeps the nodes that the outputs need, in order.
-fn prune(inputs: usize, nodes: &[Node], outputs: &[u32]) -> Graph {
-    let mut needed = vec![false; nodes.len()];
-    for output in outputs {
-        needed[*output as usize] = true;
-    }
-    for i in (0..nodes.len()).rev() {
-        if needed[i] {
-            nodes[i].operands(|operand| needed[operand as usize] = true);
-        }
-    }
-    let mut place = vec![0; nodes.len()];
-    let mut kept = Vec::new();
-    for (i, node) in nodes.iter().enumerate().filter(|(i, _)| needed[*i]) {
-        place[i] = kept.len() as u32;
-        kept.push(node.renumbered(|operand| place[operand as usize]));
-    }
-    let outputs = outputs.iter().map(|output| place[*output as usize]).collect();
-    Graph { inputs, nodes: kept, outputs }
+    let Arena { nodes, calls, .. } = recorded;
+    Graph { inputs, nodes, outputs, calls }.pruned()
 }
 
 impl Graph {
+    /// The nodes and calls that the outputs need, in order.
+    pub(super) fn pruned(&self) -> Self {
+        let needed = self.needed();
+        let mut place = vec![0; self.nodes.len()];
+        let mut number = vec![None; self.calls.len()];
+        let (mut nodes, mut calls) = (Vec::new(), Vec::new());
+        for (i, node) in self.nodes.iter().enumerate().filter(|(i, _)| needed[*i]) {
+            place[i] = nodes.len() as u32;
+            nodes.push(match *node {
+                Node::Said(call, output) => {
+                    let known = number[call as usize].get_or_insert_with(|| {
+                        calls.push(self.calls[call as usize].renumbered(&place));
+                        (calls.len() - 1) as u32
+                    });
+                    Node::Said(*known, output)
+                }
+                node => node.renumbered(|operand| place[operand as usize]),
+            });
+        }
+        let outputs = self.outputs.iter().map(|output| place[*output as usize]).collect();
+        Self { inputs: self.inputs, nodes, outputs, calls }
+    }
+
+    /// Whether an output needs each node.
+    fn needed(&self) -> Vec<bool> {
+        let mut needed = vec![false; self.nodes.len()];
+        self.outputs.iter().for_each(|output| needed[*output as usize] = true);
+        for i in (0..self.nodes.len()).rev() {
+            if needed[i] {
+                self.operands(i as u32, |operand| needed[operand as usize] = true);
+            }
+        }
+        needed
+    }
+
+    /// Calls `see` with all that a node is computed from, the arguments of a network included.
+    pub(super) fn operands(&self, node: u32, see: impl FnMut(u32)) {
+        match self.nodes[node as usize] {
+            Node::Said(call, _) => {
+                self.calls[call as usize].arguments.iter().copied().for_each(see);
+            }
+            node => node.operands(see),
+        }
+    }
+
     /// The outputs for `inputs`, in any instance of [`Real`].
     ///
     /// # Panics
@@ -140,10 +186,31 @@ impl Graph {
 
     /// The values of all nodes for `inputs`.
     fn replay<R: Real>(&self, inputs: &[R], values: &mut Vec<R>) {
+        self.replay_with(inputs, values, |network, arguments| network.forward(arguments));
+    }
+
+    /// The same where `call` gives the outputs of a network at its arguments.
+    pub(super) fn replay_with<R: Real>(
+        &self,
+        inputs: &[R],
+        values: &mut Vec<R>,
+        call: impl Fn(&Arc<Mlp>, &[R]) -> Vec<R>,
+    ) {
         assert_eq!(inputs.len(), self.inputs, "inputs of the graph");
         values.clear();
+        let mut said: Vec<Option<Vec<R>>> = vec![None; self.calls.len()];
         for node in &self.nodes {
-            let value = node.value(inputs, values);
+            let value = match *node {
+                Node::Said(number, output) => {
+                    let Call { network, arguments } = &self.calls[number as usize];
+                    let said = said[number as usize].get_or_insert_with(|| {
+                        let at = |i: &u32| values[*i as usize];
+                        call(network, &arguments.iter().map(at).collect::<Vec<_>>())
+                    });
+                    said[output as usize]
+                }
+                node => node.value(inputs, values),
+            };
             values.push(value);
         }
     }
@@ -213,6 +280,13 @@ macro_rules! primitives {
 pub(super) use primitives;
 
 operators!(Expr);
+
+impl Scalar for Expr {
+    fn call(network: &Arc<Mlp>, inputs: &[Self]) -> Vec<Self> {
+        let arguments: Vec<u32> = inputs.iter().map(|input| input.0).collect();
+        push_call(network, &arguments).into_iter().map(Self).collect()
+    }
+}
 
 impl Real for Expr {
     primitives!();

@@ -1,6 +1,8 @@
 //! Prints a recorded graph as a WGSL function.
 
-use super::{Graph, Node};
+use std::sync::Arc;
+
+use super::{Call, Graph, Node};
 
 /// The functions that printed formulas call: choices that hand a NaN on.
 pub const CHOICES: &str = include_str!("../../shaders/choices.wgsl");
@@ -56,9 +58,14 @@ pub fn function_with(
     let result = float_type(graph.outputs.len());
     let mut text = format!("fn {name}({}) -> {result} {{\n", parameters.join(", "));
     let graph = graph.expanded();
+    let digests = digests(&graph.calls);
     for (i, node) in graph.nodes.iter().enumerate() {
         text += &match *node {
             Node::Literal(bits) => literal(i, f32::from_bits(bits)),
+            Node::Said(call, output) => {
+                let call = call as usize;
+                said(i, (&graph.calls[call], &digests[call]), output)
+            }
             node => format!("    let v{i} = {};\n", operation(node, &inputs, product)),
         };
     }
@@ -96,6 +103,24 @@ fn operation(node: Node, inputs: &[String], product: Product<'_>) -> String {
         Node::SelectLt(a, b, yes, no) => format!("select(v{no}, v{yes}, v{a} < v{b})"),
         other => unreachable!("an expanded graph has no {other:?}"),
     }
+}
+
+/// The statement of an output of a network, which WGSL has no operation for: its text tells plants
+/// apart, and no kernel is made of it. The network is named by its digest.
+fn said(i: usize, (call, digest): (&Call, &str), output: u32) -> String {
+    let arguments: Vec<String> = call.arguments.iter().map(|at| format!("v{at}")).collect();
+    let arguments = arguments.join(", ");
+    format!("    let v{i} = network_{digest}({arguments})[{output}];\n")
+}
+
+/// The digest of the network of each call, computed once for each network.
+fn digests(calls: &[Call]) -> Vec<String> {
+    let mut digests: Vec<String> = Vec::with_capacity(calls.len());
+    for (i, call) in calls.iter().enumerate() {
+        let known = calls[..i].iter().position(|one| Arc::ptr_eq(&one.network, &call.network));
+        digests.push(known.map_or_else(|| call.network.digest(), |one| digests[one].clone()));
+    }
+    digests
 }
 
 /// The statements of literal number `i`: the shortest decimal that is read back as the same f32. What

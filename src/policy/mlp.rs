@@ -206,15 +206,10 @@ impl Mlp {
         let mut x = input.to_vec();
         for (i, layer) in self.layers.iter().enumerate() {
             let last = i + 1 == self.layers.len();
-            let neuron = |row: usize| {
-                let weights = &layer.weight[row * layer.inputs..(row + 1) * layer.inputs];
-                let sum = weights
-                    .iter()
-                    .zip(&x)
-                    .fold(R::lit(layer.bias[row]), |sum, (&w, &x)| sum + R::lit(w) * x);
-                if last { self.output.apply(sum) } else { self.activation.apply(sum) }
-            };
-            x = (0..layer.outputs).map(neuron).collect();
+            let activate =
+                |sum: R| if last { self.output.apply(sum) } else { self.activation.apply(sum) };
+            let sums = R::dense(&layer.weight, &layer.bias, &x);
+            x = sums.into_iter().map(activate).collect();
         }
         x
     }

@@ -56,6 +56,19 @@ pub trait Real:
     /// NaN flows on whatever is chosen.
     fn select_lt(self, rhs: Self, yes: Self, no: Self) -> Self;
 
+    /// A dense layer, `weight x + bias`: `weight` is `[outputs, inputs]` row by row, the result
+    /// `[outputs]`. Each sum begins with the bias and takes the inputs in order.
+    ///
+    /// An operation of its own because the bound type takes whole layers: neuron by neuron, its pieces
+    /// would multiply.
+    fn dense(weight: &[f32], bias: &[f32], inputs: &[Self]) -> Vec<Self> {
+        let sum = |(row, bias): (&[f32], &f32)| {
+            let terms = row.iter().zip(inputs);
+            terms.fold(Self::lit(*bias), |sum, (&w, &x)| sum + Self::lit(w) * x)
+        };
+        weight.chunks(inputs.len().max(1)).zip(bias).map(sum).collect()
+    }
+
     /// `yes` where `self <= rhs`, `no` where not, NaN where either is NaN.
     #[inline(always)]
     fn if_le(self, rhs: Self, yes: Self, no: Self) -> Self {

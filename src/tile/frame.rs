@@ -90,13 +90,16 @@ pub(crate) struct Frame {
     numbers: Aligned,
     width: usize,
     layout: Layout,
+    /// Room that networks inside formulas take turns with.
+    room: [Vec<f32>; 2],
 }
 
 impl Frame {
     /// Zeros for tiles of up to `lanes` trajectories.
     pub(crate) fn new(layout: Layout, lanes: usize) -> Self {
         let width = lanes.next_multiple_of(GRANULE);
-        Self { numbers: Aligned::zeros(layout.rows() * width), width, layout }
+        let numbers = Aligned::zeros(layout.rows() * width);
+        Self { numbers, width, layout, room: Default::default() }
     }
 
     /// Numbers of a row.
@@ -159,6 +162,16 @@ impl Frame {
     pub(crate) fn row_mut(&mut self, row: usize) -> &mut [f32] {
         let width = self.width;
         &mut self.rows_mut()[row * width..][..width]
+    }
+
+    /// Takes the room for activations of networks out, to be put back with [`Frame::put_room`].
+    pub(crate) fn take_room(&mut self) -> [Vec<f32>; 2] {
+        std::mem::take(&mut self.room)
+    }
+
+    /// Puts the room for activations back, so that it is there the next time.
+    pub(crate) fn put_room(&mut self, room: [Vec<f32>; 2]) {
+        self.room = room;
     }
 
     /// Copies the states of trajectory `from` of `source` to trajectory `to`.

@@ -12,10 +12,20 @@ pub(crate) trait NativeSystem: Debug + Send + Sync {
 
     /// Evaluates both margins.
     fn margins(&self, with: Instructions, frame: &mut Frame, lanes: usize);
+
+    /// Widest layer of the networks that the formulas call; `None` if they call none.
+    fn widest(&self) -> Option<usize> {
+        None
+    }
 }
 
 /// A formula from rows of a tile to rows of it: a policy, or what stands around a network.
 pub(crate) trait NativeFormula: Debug + Send + Sync {
     /// Evaluates it for the first `lanes` trajectories.
     fn evaluate(&self, with: Instructions, frame: &mut Frame, lanes: usize);
+
+    /// Widest layer of the networks that it calls; `None` if it calls none.
+    fn widest(&self) -> Option<usize> {
+        None
+    }
 }

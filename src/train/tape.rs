@@ -24,7 +24,11 @@ enum Op {
 
 impl Tape {
     /// The graph as it is, its functions as polynomials.
+    ///
+    /// # Panics
+    /// If it calls a network: training knows systems in Rust alone, and they call none.
     pub fn hard(graph: &Graph) -> Self {
+        assert!(graph.calls.is_empty(), "the reverse sweep has no networks inside formulas");
         let graph = graph.expanded();
         let ops = folded(&graph.nodes).into_iter().map(Op::Plain).collect();
         Self { inputs: graph.inputs, ops, outputs: graph.outputs }

@@ -11,6 +11,9 @@ mod edges;
 mod failures;
 mod faults;
 mod infinite;
+#[path = "../learned/mod.rs"]
+mod learned;
+mod learned_plants;
 mod measures;
 #[path = "../models/mod.rs"]
 mod models;

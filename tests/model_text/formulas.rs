@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
-use reachcast::formula::text::{Fault, Formula, Function, Names, Values};
+use reachcast::formula::text::{Fault, Formula, Function, Names, Networks, Values};
 
 /// `x` = 3, `y` = -2, `t` is unknown.
 fn names() -> Names {
@@ -17,7 +17,8 @@ fn names() -> Names {
 fn value(text: &str) -> f64 {
     let formula =
         Formula::parse(text, &names()).unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
-    formula.value(Values { names: &[3.0, -2.0, 0.5], outputs: &[10.0, 20.0] })
+    let networks = Networks::default();
+    formula.value(Values { names: &[3.0, -2.0, 0.5], outputs: &[10.0, 20.0], networks: &networks })
 }
 
 /// The column and the words of the fault of `text`.
@@ -240,7 +241,9 @@ proptest! {
     fn no_text_panics(text in texts()) {
         match Formula::parse(&text, &names()) {
             Ok(formula) if formula.networks().is_empty() && formula.outputs().next().is_none() => {
-                formula.value(Values { names: &[3.0_f32, -2.0, 0.5], outputs: &[] });
+                let networks = Networks::default();
+                let names = &[3.0_f32, -2.0, 0.5];
+                formula.value(Values { names, outputs: &[], networks: &networks });
             }
             Ok(_) => {}
             Err(fault) => prop_assert!(fault.column(&text) <= text.chars().count() + 1),

@@ -3,6 +3,9 @@
 mod carried;
 mod formulas;
 mod integrators;
+#[path = "../learned/mod.rs"]
+mod learned;
+mod networks;
 mod policies;
 mod refused;
 

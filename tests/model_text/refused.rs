@@ -221,10 +221,26 @@ fn formulas_know_what_their_place_allows() {
 fn networks_in_formulas_are_looked_at() {
     let file = "../policies/double_integrator_policy.safetensors";
     let net = |call: &str| format!("pull / mass + net('{file}'{call}");
-    assert_refused("pull / mass", &net(", x, speed)[0]"), &["column 15", "cannot be run yet"]);
-    assert_refused("pull / mass", &net(", x)[0]"), &["takes 2 inputs, found 1"]);
+    let fits = cart_with("pull / mass", &net(", x, speed)[0]"));
+    described(&fits).and_then(|description| description.model()).expect("a network that fits");
+    assert_refused(
+        "pull / mass",
+        &net(", x)[0]"),
+        &["cart.toml:16: model.flow.speed, column 15", "takes 2 inputs, found 1"],
+    );
     assert_refused("pull / mass", &net(", x, speed)[1]"), &["has the outputs 0 to 0, found [1]"]);
     assert_refused("pull / mass", "net('none.safetensors', x)[0]", &["none.safetensors"]);
+    assert_refused("pull / mass", "net('dubins.toml', x)[0]", &["column 1", "safetensors file"]);
+    assert_refused("pull / mass", "net(x, speed)[0]", &["the file of a network between quotes"]);
+    assert_refused("pull / mass", &net(", x, speed)"), &["expected `[`"]);
+    assert_refused(
+        "drag = \"0.1",
+        &format!("lift = \"{}\"\ndrag = \"0.1", net(")[0]")),
+        &["model.let.lift", "found 0"],
+    );
+    let policy = format!("net('{file}', x)[0]");
+    assert_refused("-2 * x - speed", &policy, &["policy.formula.force", "takes 2 inputs"]);
+    assert_refused("0.1 - abs(x)", &net(", x, force)[0]"), &["`force` is a control"]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Plants and policies that are known at run time only: their formulas as tapes.
 
+use super::chained::{Chained, Pack};
 use crate::formula::Graph;
 use crate::model::Model;
 use crate::real::simd::Instructions;
-use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem, Source, Tape};
+use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem, Source};
 
 /// Where the inputs of a model's formulas are in a frame: its states and controls in their rows,
 /// the parameters as numbers, the time as a multiple of the row of steps.
@@ -51,9 +52,10 @@ impl Inputs {
         self
     }
 
-    /// The tape of `graph`, its outputs in `rows`; what lies between is in rows from `first_own` on.
-    pub(super) fn tape(&self, graph: &Graph, rows: &[usize], first_own: usize) -> Tape {
-        Tape::new(&[graph], &self.sources, rows, first_own)
+    /// `graph` as tapes, its outputs in `rows`; what lies between is in rows from `own.0` on, and
+    /// `own.1` packs the networks that it calls.
+    pub(super) fn chained(&self, graph: &Graph, rows: &[usize], own: (usize, Pack<'_>)) -> Chained {
+        Chained::new(&[graph], &self.sources, rows, own)
     }
 
     /// The row of the steps taken.
@@ -65,22 +67,24 @@ impl Inputs {
 /// A model's formulas as tapes.
 #[derive(Debug)]
 pub(super) struct InterpretedSystem {
-    step: Tape,
-    margins: Tape,
+    step: Chained,
+    margins: Chained,
     layout: Layout,
 }
 
 impl InterpretedSystem {
-    /// The formulas of `model` with the values `parameters` of its parameters.
-    pub(super) fn new(model: &Model, parameters: &[f32]) -> Self {
+    /// The formulas of `model` with the values `parameters` of its parameters; `pack` packs the networks
+    /// that they call.
+    pub(super) fn new(model: &Model, parameters: &[f32], pack: Pack<'_>) -> Self {
         let held = Inputs::new(model, parameters, Held::Rows);
         let free = Inputs::new(model, parameters, Held::Zeros);
         let layout = held.layout;
         let next: Vec<usize> = (0..layout.states).collect();
         let margins = [&model.target, &model.constraint];
+        let own = (layout.first_own(), pack);
         Self {
-            step: Tape::new(&[&model.step], &held.sources, &next, layout.first_own()),
-            margins: Tape::new(&margins, &free.sources, &layout.margins(), layout.first_own()),
+            step: Chained::new(&[&model.step], &held.sources, &next, own),
+            margins: Chained::new(&margins, &free.sources, &layout.margins(), own),
             layout,
         }
     }
@@ -104,21 +108,25 @@ impl NativeSystem for InterpretedSystem {
     fn margins(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
         self.margins.evaluate(with, frame, lanes);
     }
+
+    fn widest(&self) -> Option<usize> {
+        self.step.widest().max(self.margins.widest())
+    }
 }
 
 /// A formula of a model's inputs as a tape.
 #[derive(Debug)]
 pub(super) struct InterpretedFormula {
-    tape: Tape,
+    tape: Chained,
     layout: Layout,
 }
 
 impl InterpretedFormula {
     /// `graph` of `inputs`, its outputs in the rows from `to` on; what lies between is in rows from
-    /// `first_own` on.
-    pub(super) fn new(graph: &Graph, inputs: &Inputs, to: usize, first_own: usize) -> Self {
+    /// `own.0` on, and `own.1` packs the networks that it calls.
+    pub(super) fn new(graph: &Graph, inputs: &Inputs, to: usize, own: (usize, Pack<'_>)) -> Self {
         let outputs: Vec<usize> = (to..to + graph.outputs.len()).collect();
-        let tape = inputs.tape(graph, &outputs, first_own);
+        let tape = inputs.chained(graph, &outputs, own);
         Self { tape, layout: inputs.layout }
     }
 
@@ -137,9 +145,13 @@ impl NativeFormula for InterpretedFormula {
     fn evaluate(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
         self.tape.evaluate(with, frame, lanes);
     }
+
+    fn widest(&self) -> Option<usize> {
+        self.tape.widest()
+    }
 }
 
 /// Whether one of `tapes` reads the row of steps.
-fn clock(tapes: &[&Tape], layout: Layout) -> Clock {
+fn clock(tapes: &[&Chained], layout: Layout) -> Clock {
     if tapes.iter().any(|tape| tape.reads(layout.step())) { Clock::Read } else { Clock::Ignored }
 }

@@ -3,20 +3,21 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::chained::{Chained, Pack};
 use super::interpreted::{Held, Inputs};
 use crate::cost::CostMap;
 use crate::formula::Graph;
 use crate::model::{Model, StageCost};
 use crate::real::Vector;
 use crate::real::simd::{Formulas, Instructions};
-use crate::tile::{Clock, NativeStages, Stages, Tape, cell_cost, clipped, noise_cost};
+use crate::tile::{Clock, NativeStages, Stages, cell_cost, clipped, noise_cost};
 
 /// A model's step and the cost of a stage as tapes.
 #[derive(Debug)]
 pub(super) struct InterpretedStages {
-    step: Tape,
-    stage: Tape,
-    cell: Option<(Arc<CostMap>, Tape)>,
+    step: Chained,
+    stage: Chained,
+    cell: Option<(Arc<CostMap>, Chained)>,
     /// The rows of the contexts.
     contexts: Range<usize>,
     /// The row of a stage's cost, and that of the number of a cell.
@@ -28,13 +29,16 @@ pub(super) struct InterpretedStages {
 }
 
 impl InterpretedStages {
-    /// The formulas of `model` and `cost`, whose rows begin at `first`.
-    pub(super) fn new(model: &Model, cost: &StageCost, first: usize) -> Self {
+    /// The formulas of `model` and `cost`, whose rows begin at `first`; `pack` packs the networks that
+    /// they call.
+    pub(super) fn new(model: &Model, cost: &StageCost, (first, pack): (usize, Pack<'_>)) -> Self {
         let values = model.values();
         let contexts = first..first + cost.contexts;
         let (staged, own) = (contexts.end, contexts.end + 2);
         let held = || Inputs::new(model, &values, Held::Rows);
-        let tape = |graph: &Graph, inputs: &Inputs, rows: &[usize]| inputs.tape(graph, rows, own);
+        let tape = |graph: &Graph, inputs: &Inputs, rows: &[usize]| {
+            inputs.chained(graph, rows, (own, pack))
+        };
         let next: Vec<usize> = (0..model.states.len()).collect();
         let step = tape(&model.step, &held(), &next);
         let stage = tape(&cost.stage, &held().followed_by(contexts.clone()), &[staged]);
@@ -46,7 +50,7 @@ impl InterpretedStages {
         let clock_row = held().step();
         let reads = tapes().any(|tape| tape.reads(clock_row));
         let clock = if reads { Clock::Read } else { Clock::Ignored };
-        let most = tapes().map(Tape::own_rows).max().unwrap_or(0);
+        let most = tapes().map(Chained::own_rows).max().unwrap_or(0);
         let rows = own + most - first;
         Self { step, stage, cell, contexts, staged, clock, rows }
     }

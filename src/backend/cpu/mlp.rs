@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use super::dispatch::Unit;
 use super::kernel::{GRANULE, Kernel, Panel};
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
@@ -164,8 +165,17 @@ pub(super) struct Evaluator<'a, K> {
 impl<'a, K: Kernel> Evaluator<'a, K> {
     /// Room for tiles of up to `lanes` trajectories.
     pub(super) fn new(network: &'a Packed, kernel: K, lanes: usize) -> Self {
+        Self::within(network, kernel, lanes, Default::default())
+    }
+
+    /// The same in `room`, which grows where it has to.
+    fn within(network: &'a Packed, kernel: K, lanes: usize, room: [Vec<f32>; 2]) -> Self {
         let size = lanes.next_multiple_of(K::BLOCK) * network.widest();
-        Self { network, kernel, inputs: vec![0.0; size], outputs: vec![0.0; size] }
+        let [inputs, outputs] = room.map(|mut numbers| {
+            numbers.resize(numbers.len().max(size), 0.0);
+            numbers
+        });
+        Self { network, kernel, inputs, outputs }
     }
 
     /// From the rows `rows[0]` of a tile to its rows `rows[1]`, for the first `lanes` trajectories.
@@ -194,6 +204,30 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
             layer.forward::<K, N>(self.kernel, lanes, &self.inputs, &mut self.outputs);
             std::mem::swap(&mut self.inputs, &mut self.outputs);
         }
+    }
+}
+
+/// A network between formulas: from rows of a tile to rows of it, its activations in the room of the
+/// frame.
+pub(super) struct Between<'a> {
+    /// The network.
+    pub(super) network: &'a Packed,
+    /// The tile.
+    pub(super) frame: &'a mut Frame,
+    /// The rows of its inputs and of its outputs.
+    pub(super) rows: [Range<usize>; 2],
+    /// How many trajectories.
+    pub(super) lanes: usize,
+}
+
+impl Unit for Between<'_> {
+    type Output = ();
+
+    fn run<K: Kernel, const N: usize>(self, kernel: K) {
+        let Self { network, frame, rows, lanes } = self;
+        let mut evaluator = Evaluator::within(network, kernel, lanes, frame.take_room());
+        evaluator.forward(frame, rows, lanes);
+        frame.put_room([evaluator.inputs, evaluator.outputs]);
     }
 }
 

@@ -1,5 +1,6 @@
 //! The native CPU backend: tiles of trajectories in SIMD lanes, tiles spread over threads.
 
+mod chained;
 mod deviation;
 mod dispatch;
 mod early_exit;
@@ -166,7 +167,7 @@ impl Cpu {
         check_task(&task.starts, task.range.end, task.tightening, &task.spec)?;
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
-            let schedule = self.schedule(chunk.count, plant.drive.network());
+            let schedule = self.schedule(chunk.count, plant.widest());
             measures.resize(chunk.count, 0.0);
             spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
                 let first = chunk.first + (unit * schedule.unit) as u64;
@@ -189,7 +190,7 @@ impl Cpu {
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
-            let schedule = self.schedule(chunk.count, plant.drive.network());
+            let schedule = self.schedule(chunk.count, plant.widest());
             measures.resize(chunk.count, PairMeasure::default());
             let found = spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
                 let first = chunk.first + (unit * schedule.unit) as u64;
@@ -241,9 +242,10 @@ impl Cpu {
         self.packs.of(network, rows(self.instructions))
     }
 
-    fn schedule(&self, count: usize, network: Option<&Packed>) -> Schedule {
+    /// How `count` trajectories are spread, under networks as wide as `widest`.
+    fn schedule(&self, count: usize, widest: Option<usize>) -> Schedule {
         let threads = self.pool.current_num_threads();
-        Schedule::new(count, threads, network.map(Packed::widest))
+        Schedule::new(count, threads, widest)
     }
 }
 

@@ -43,7 +43,8 @@ impl Cpu {
         let stages: Arc<dyn NativeStages> = match compiled {
             Some(compiled) => Arc::clone(compiled),
             None => {
-                let stages = InterpretedStages::new(model, cost, pushes.end);
+                let stages =
+                    InterpretedStages::new(model, cost, (pushes.end, &|mlp| self.packed(mlp)));
                 layout.own += stages.rows();
                 Arc::new(stages)
             }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Cpu;
+use super::chained::Pack;
 use super::interpreted::{Held, Inputs, InterpretedFormula, InterpretedSystem};
 use super::mlp::Packed;
 use super::tile::{Around, Drive, Driven};
@@ -43,6 +44,8 @@ struct Needs<'a> {
     values: Vec<f32>,
     layout: Layout,
     clock: Clock,
+    /// Packs networks that formulas call.
+    pack: Pack<'a>,
 }
 
 impl Cpu {
@@ -51,7 +54,8 @@ impl Cpu {
         let Plant { model, controller } = plant;
         let layout = Layout { states: model.states.len(), controls: model.controls.len(), own: 0 };
         let values = model.values();
-        let mut needs = Needs { model, values, layout, clock: Clock::Ignored };
+        let pack = &|network: &Mlp| self.packed(network);
+        let mut needs = Needs { model, values, layout, clock: Clock::Ignored, pack };
         let law = match (&controller.law, controller.native()) {
             (Law::Formula(_), Some(compiled)) => PreparedLaw::Formula(Arc::clone(compiled)),
             (Law::Formula(graph), None) => {
@@ -75,7 +79,7 @@ impl Needs<'_> {
         if let Some(compiled) = &self.model.native {
             return Arc::clone(compiled);
         }
-        let system = InterpretedSystem::new(self.model, &self.values);
+        let system = InterpretedSystem::new(self.model, &self.values, self.pack);
         self.room(system.own_rows(), system.clock());
         Arc::new(system)
     }
@@ -123,7 +127,7 @@ impl Needs<'_> {
         to: usize,
         first_own: usize,
     ) -> InterpretedFormula {
-        let formula = InterpretedFormula::new(graph, inputs, to, first_own);
+        let formula = InterpretedFormula::new(graph, inputs, to, (first_own, self.pack));
         let before = first_own - self.layout.first_own();
         self.room(before + formula.own_rows(), formula.clock());
         formula

@@ -32,6 +32,21 @@ pub(super) struct Driven<'a> {
     pub(super) with: Instructions,
 }
 
+impl Driven<'_> {
+    /// Widest layer of all networks that take part; `None` if none does.
+    pub(super) fn widest(&self) -> Option<usize> {
+        let law = match self.drive {
+            Drive::Formula(formula) => formula.widest(),
+            Drive::Network { network, observe, act } => {
+                let around = [observe, act].into_iter().flatten();
+                let around = around.filter_map(|around| around.formula.widest());
+                around.chain([network.widest()]).max()
+            }
+        };
+        law.max(self.system.widest())
+    }
+}
+
 /// Where the controls come from.
 #[derive(Clone, Copy)]
 pub(super) enum Drive<'a> {

@@ -2,6 +2,7 @@
 
 use super::attempt::Attempt;
 use super::batch::Batch;
+use super::chain::ChainStep;
 use super::compose::{Kernel, Slot};
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
@@ -113,6 +114,9 @@ fn segment<'a>(
     let mut step = first;
     while step < first + count {
         let steps = plan.steps.min(first + count - step);
+        let (row, horizon) = (plan.row, params.horizon);
+        let acting = if params.closed_loop == 0 { plan.stride } else { row };
+        kernels.chain(batch, ChainStep { step, horizon, columns: row, row, acting });
         if step < params.horizon {
             // Perturbed states stand `stride` columns after the nominal ones.
             let columns = if params.closed_loop == 0 { params.columns } else { plan.row };

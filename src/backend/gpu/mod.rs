@@ -6,6 +6,7 @@ mod batch;
 mod buffer;
 mod cache;
 mod call;
+mod chain;
 mod compiled;
 pub mod compose;
 mod deviation;

@@ -101,20 +101,29 @@ impl Layers {
         bound: &'a [Bound],
         (columns, row): (u32, u32),
     ) {
-        for (bound, layer) in bound.iter().zip(&self.shapes) {
-            let params = Params {
-                columns,
-                stride: row,
-                layer_offset: layer.offset,
-                layer_inputs: layer.inputs,
-                layer_outputs: layer.outputs,
-                layer_neurons: layer.neurons,
-                ..Params::default()
-            };
-            let across = columns.div_ceil(WORKGROUP);
-            let neurons = (layer.outputs / TILE_QUADS).div_ceil(TILE_PITCH);
-            batch.push(bound, &params, [across, neurons]);
-        }
+        push_layers(batch, (bound, &self.shapes), (columns, row));
+    }
+}
+
+/// Adds the dispatches of layers of these shapes over the first `columns` columns, in rows of `row`.
+pub(super) fn push_layers<'a>(
+    batch: &mut Batch<'a>,
+    (bound, shapes): (&'a [Bound], &[LayerShape]),
+    (columns, row): (u32, u32),
+) {
+    for (bound, layer) in bound.iter().zip(shapes) {
+        let params = Params {
+            columns,
+            stride: row,
+            layer_offset: layer.offset,
+            layer_inputs: layer.inputs,
+            layer_outputs: layer.outputs,
+            layer_neurons: layer.neurons,
+            ..Params::default()
+        };
+        let across = columns.div_ceil(WORKGROUP);
+        let neurons = (layer.outputs / TILE_QUADS).div_ceil(TILE_PITCH);
+        batch.push(bound, &params, [across, neurons]);
     }
 }
 

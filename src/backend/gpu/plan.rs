@@ -1,6 +1,7 @@
 //! How a batch is cut up: columns per chunk, steps per dispatch, steps per submission.
 
 use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit};
+use super::chain::ChainLoad;
 use super::compose::{Fused, WORKGROUP, input_quads, output_quads, parameter_quads};
 use super::device::{Adapter, AdapterKind};
 use crate::error::{Error, Result};
@@ -57,18 +58,18 @@ impl Work {
 enum Driven {
     /// A formula.
     Formula,
-    /// A network, a dispatch per layer between the steps.
+    /// Networks, the one that drives or those that formulas call: dispatches between the steps.
     Layered,
     /// A network that the rollouts run themselves.
     Fused,
 }
 
 impl Driven {
-    fn new(network: Option<&Mlp>, fused: Option<&Fused>) -> Self {
-        match (network, fused) {
-            (None, _) => Self::Formula,
-            (Some(_), None) => Self::Layered,
-            (Some(_), Some(_)) => Self::Fused,
+    fn new(size: &Size<'_>) -> Self {
+        match (size.network, size.fused, size.chain) {
+            (_, _, Some(_)) | (Some(_), None, None) => Self::Layered,
+            (None, _, None) => Self::Formula,
+            (Some(_), Some(_), None) => Self::Fused,
         }
     }
 
@@ -145,6 +146,8 @@ pub(super) struct Size<'a> {
     pub(super) network: Option<&'a Mlp>,
     /// The same, where they run it themselves.
     pub(super) fused: Option<&'a Fused>,
+    /// What formulas that call networks cost, where some do.
+    pub(super) chain: Option<&'a ChainLoad>,
     /// Numbers that the network sees, where a kernel of its own evaluates them; 0 where it sees the
     /// states.
     pub(super) seen: usize,
@@ -155,7 +158,8 @@ pub(super) struct Size<'a> {
 impl Size<'_> {
     /// Operations of a step of one trajectory.
     fn step_flops(&self) -> u64 {
-        self.flops + self.network.map_or(0, network_flops)
+        let called = self.chain.map_or(0, |load| load.flops);
+        self.flops + self.network.map_or(0, network_flops) + called
     }
 }
 
@@ -189,11 +193,13 @@ impl Plan {
         work: Work,
         size: &Size<'_>,
     ) -> Result<Self> {
-        let Size { states, network, fused, seen, count, .. } = *size;
-        let driven = Driven::new(network, fused);
+        let Size { states, network, fused, seen, count, chain, .. } = *size;
+        let driven = Driven::new(size);
         let segment = work.segment(driven);
         let layered = network.filter(|_| driven == Driven::Layered);
-        let parts = column_bytes(work, (states, seen), layered, segment);
+        let mut parts = column_bytes(work, (states, seen), layered, segment);
+        let called = chain.map_or([0; 5], |load| load.bytes);
+        parts.extend(called.map(|bytes| bytes * u64::from(work.sides())));
         let largest = parts.iter().copied().max().unwrap_or(1);
         let binding = adapter.max_binding_bytes.min(adapter.max_buffer_bytes);
         let fitting = (binding / largest).min(MEMORY_BYTES / parts.iter().sum::<u64>());
@@ -204,16 +210,18 @@ impl Plan {
         let most = fitting.min(timely).min(limit.columns);
         let stride = wanted.min(most / COLUMN_UNIT * COLUMN_UNIT);
         let parameters = 16 * network.map_or(0, parameter_quads) as u64;
+        let parameters = parameters.max(chain.map_or(0, |load| load.parameters));
         if stride == 0 || parameters > binding {
             return Err(too_large(adapter, largest * COLUMN_UNIT, parameters, binding));
         }
         let segment = u64::from(segment).min(limit.pieces(stride * step_flops)) as u32;
-        let steps = match (layered, fused) {
-            (Some(_), _) => 1,
-            (None, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work)) as u32),
-            (None, None) => segment,
+        let steps = match (driven, fused) {
+            (Driven::Layered, _) => 1,
+            (_, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work)) as u32),
+            (_, None) => segment,
         };
         let trips = longest_trips(states, layered, stride, u64::from(steps));
+        let trips = trips.max(chain.map_or(0, |load| load.inputs));
         if trips > MAX_TRIPS {
             return Err(Error::Device(format!(
                 "a kernel would need {trips} loop iterations per thread, and some drivers stop \
@@ -292,7 +300,7 @@ mod tests {
         (network, fused): (Option<&'a Mlp>, Option<&'a Fused>),
         count: u64,
     ) -> Size<'a> {
-        Size { states, flops: 200, network, fused, seen: 0, count }
+        Size { states, flops: 200, network, fused, chain: None, seen: 0, count }
     }
 
     fn planned(adapter: &Adapter, work: Work, size: &Size<'_>) -> Result<Plan> {

@@ -7,15 +7,28 @@ use super::adapter::Gpu;
 use super::mppi_source::PlanSource;
 use super::recover;
 use super::traffic::Count;
-use crate::error::{Error, Result};
+use crate::backend::{Action, Event};
+use crate::error::{Error, Fault, Result};
 use crate::rollout::{MppiTask, PlanTally, Planning};
 
 /// What is planned for, prepared on an adapter: printed once, tables and networks uploaded once, each
 /// kernel compiled when it is first needed. Where the adapter is opened again, so is all of that.
 pub(in crate::backend) struct PreparedPlanning<'a> {
     gpu: &'a Gpu,
-    source: Arc<PlanSource>,
+    work: Work,
 }
+
+/// Who improves plans.
+enum Work {
+    /// The adapter.
+    Adapter(Arc<PlanSource>),
+    /// The CPU, which is allowed to do what the adapter does not.
+    Cpu(Planning),
+}
+
+/// What the kernels of plans do not do.
+const CALLS: &str = "formulas of these plans call networks, and adapters do not plan through them; \
+                     use the native CPU backend";
 
 impl Gpu {
     /// See [`crate::backend::Backend::prepare_plans`].
@@ -23,6 +36,9 @@ impl Gpu {
         &self,
         planning: &Planning,
     ) -> Result<PreparedPlanning<'_>> {
+        if calls(planning) {
+            return self.on_cpu(planning);
+        }
         let opened = self.opened();
         opened.device.counters.add(Count::Text);
         let source = Arc::new(PlanSource::new(planning));
@@ -33,7 +49,18 @@ impl Gpu {
             Err(Error::DeviceFailed { .. }) => opened.clear(),
             other => other?,
         }
-        Ok(PreparedPlanning { gpu: self, source })
+        Ok(PreparedPlanning { gpu: self, work: Work::Adapter(source) })
+    }
+
+    /// Leaves `planning` to the CPU, if that is allowed.
+    fn on_cpu(&self, planning: &Planning) -> Result<PreparedPlanning<'_>> {
+        if self.fallback.is_none() {
+            return Err(Error::Device(CALLS.to_owned()));
+        }
+        let (fault, action) = (Fault::Unfit, Action::Cpu);
+        let (problem, work) = (CALLS.to_owned(), "problems".to_owned());
+        self.note(Event { fault, problem, work, index: 0, action });
+        Ok(PreparedPlanning { gpu: self, work: Work::Cpu(planning.clone()) })
     }
 }
 
@@ -45,6 +72,20 @@ impl PreparedPlanning<'_> {
         samples: Range<u32>,
         sink: &mut dyn FnMut(Vec<PlanTally>),
     ) -> Result<()> {
-        recover::tally(self.gpu, &self.source, (task, samples), sink)
+        match (&self.work, &self.gpu.fallback) {
+            (Work::Cpu(planning), Some(cpu)) => {
+                cpu.prepare_plans(planning).tally(cpu, task, samples, sink);
+                Ok(())
+            }
+            (Work::Cpu(_), None) => Err(Error::Device(CALLS.to_owned())),
+            (Work::Adapter(source), _) => recover::tally(self.gpu, source, (task, samples), sink),
+        }
     }
+}
+
+/// Whether a formula of `planning` calls a network.
+fn calls(planning: &Planning) -> bool {
+    let cell = planning.cost.map.iter().map(|map| &map.cell);
+    let mut graphs = [&planning.model.step, &planning.cost.stage].into_iter().chain(cell);
+    graphs.any(|graph| !graph.calls.is_empty())
 }

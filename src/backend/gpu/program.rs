@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::attempt::Attempt;
 use super::buffer::Pool;
+use super::chain::ChainLoad;
 use super::compiled::Compiled;
 use super::device::Device;
 use super::flight::Flight;
@@ -59,11 +60,13 @@ impl Program {
     ) -> Result<Plan> {
         let network = self.source.network.as_deref();
         let text = &self.compiled.text;
+        let chain = text.chain().map(ChainLoad::new);
         let size = Size {
             states: text.states(),
             flops: text.operations(),
             network,
             fused: text.fused(),
+            chain: chain.as_ref(),
             seen: network.filter(|_| text.observes()).map_or(0, |mlp| mlp.widths()[0]),
             count,
         };

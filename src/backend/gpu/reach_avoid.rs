@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::attempt::Attempt;
 use super::batch::Batch;
+use super::chain::ChainStep;
 use super::compose::{Kernel, Slot};
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
@@ -110,6 +111,8 @@ fn segment<'a>(
     let mut step = steps.start;
     while step < steps.end {
         let count = plan.steps.min(steps.end - step);
+        let Params { columns, stride: row, horizon, .. } = params;
+        kernels.chain(batch, ChainStep { step, horizon, columns, row, acting: row });
         if step < params.horizon {
             kernels.drive(batch, buffers, (params.columns, params.stride), step);
         }

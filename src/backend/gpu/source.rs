@@ -10,7 +10,8 @@ use crate::policy::Mlp;
 /// Sources that are remembered.
 const REMEMBERED: usize = 16;
 
-/// A plant printed, and the network that drives it, if one does.
+/// A plant printed, and the network that drives it, if one does: apart from those that formulas call,
+/// which the text holds.
 pub(super) struct Source {
     /// The texts of its kernels, its network in layers.
     pub(super) text: PlantText,
@@ -24,8 +25,10 @@ impl Source {
     /// # Errors
     /// [`crate::Error::Invalid`] where their parts do not fit.
     pub(super) fn new(model: &Model, controller: &Controller) -> Result<Self> {
-        let network = controller.shared_network().cloned();
-        Ok(Self { text: PlantText::new(model, controller)?, network })
+        let text = PlantText::new(model, controller)?;
+        // In a chain it is one of the networks that are called.
+        let driving = controller.shared_network().filter(|_| text.chain().is_none());
+        Ok(Self { network: driving.cloned(), text })
     }
 
     /// Whether both have the same kernels and the same parameters of a network, bit by bit.
@@ -35,7 +38,16 @@ impl Source {
             (Some(one), Some(other)) => Arc::ptr_eq(one, other) || same_bits(one, other),
             _ => false,
         };
-        networks && self.text == other.text
+        networks && self.text == other.text && self.same_called(other)
+    }
+
+    /// Whether the networks that formulas call have the same parameters.
+    fn same_called(&self, other: &Self) -> bool {
+        let of = |source: &Self| {
+            source.text.chain().map(|chain| chain.networks().to_vec()).unwrap_or_default()
+        };
+        let (mine, theirs) = (of(self), of(other));
+        mine.len() == theirs.len() && mine.iter().zip(&theirs).all(|(a, b)| same_bits(a, b))
     }
 }
 

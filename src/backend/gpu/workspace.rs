@@ -2,6 +2,7 @@
 
 use super::batch::Batch;
 use super::buffer::{Buffer, Use};
+use super::chain::{BoundChain, ChainBinder, ChainBuffers, ChainLoad, ChainStep};
 use super::compiled::Compiled;
 use super::compose::{Kernel, Slot};
 use super::flight::Flight;
@@ -53,12 +54,14 @@ impl Workspace {
         let (device, pool) = (&flight.device, flight.pool);
         let (quads, plan) = (compiled.text.states().div_ceil(4), shape.plan);
         let layers = network.map_or(0, |mlp| mlp.layers().len());
+        let chain = compiled.text.chain().map(ChainLoad::new);
+        let chained = chain.map_or(0, |load| load.dispatches);
         let sizes = InputSizes {
             values: compiled.text.parameters().div_ceil(4),
             steps: shape.horizon as usize + 1,
             region: if shape.listed { quads * plan.stride as usize } else { 4 * quads },
-            // The draw, compaction or reduction, and each step with what its network needs.
-            dispatches: 2 + plan.segment as usize * (layers + 2),
+            // The draw, compaction or reduction, and each step with what its networks need.
+            dispatches: 2 + plan.segment as usize * (layers + chained + 2),
         };
         let inputs = Inputs::new(device, pool, sizes);
         let buffers = Buffers::new(flight, (compiled, network), shape);
@@ -84,6 +87,8 @@ pub(super) struct Buffers {
     layers: Option<Layers>,
     /// What the network sees, where that is not the state.
     seen: Option<Buffer>,
+    /// What formulas and the networks that they call hand on.
+    chain: Option<ChainBuffers>,
     bytes: u64,
 }
 
@@ -102,8 +107,12 @@ impl Buffers {
         let layers = layered.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, row));
         let seen = seen.map(|seen| storage(16 * seen.div_ceil(4) as u64 * u64::from(row)));
         let all = slots.iter().map(|(_, buffer)| buffer).chain(&seen);
-        let bytes = all.map(Buffer::size).sum::<u64>();
-        Self { bytes: bytes + layers.as_ref().map_or(0, Layers::size), slots, layers, seen }
+        let on = (&flight.device, flight.pool);
+        let chain = compiled.text.chain().map(|chain| ChainBuffers::new(on, chain, row));
+        let bytes = all.map(Buffer::size).sum::<u64>()
+            + layers.as_ref().map_or(0, Layers::size)
+            + chain.as_ref().map_or(0, ChainBuffers::size);
+        Self { bytes, slots, layers, seen, chain }
     }
 
     /// The buffer of `slot`.
@@ -164,9 +173,17 @@ pub(super) struct Kernels {
     pub(super) after: Option<Bound>,
     observe: Option<Bound>,
     layers: Vec<Bound>,
+    chain: Option<BoundChain>,
 }
 
 impl Kernels {
+    /// Adds the dispatches of a step of formulas that call networks; none where none does.
+    pub(super) fn chain<'a>(&'a self, batch: &mut Batch<'a>, at: ChainStep) {
+        if let Some(chain) = &self.chain {
+            chain.push(batch, at);
+        }
+    }
+
     /// Adds the dispatches by which a network drives step `step` of the first `columns` columns, in
     /// rows of `row`; none where the rollout kernel drives itself.
     pub(super) fn drive<'a>(
@@ -208,6 +225,7 @@ impl Binder<'_> {
             after: after.map(|kernel| self.bind(kernel, set, None)).transpose()?,
             observe: self.observe(set)?,
             layers: self.layers(set)?,
+            chain: self.chain(set)?,
         })
     }
 
@@ -215,6 +233,17 @@ impl Binder<'_> {
     fn observe(&self, set: usize) -> Result<Option<Bound>> {
         let bind = |seen| self.bind(Kernel::Observe, set, Some([seen, seen]));
         self.buffers.seen.as_ref().map(bind).transpose()
+    }
+
+    /// Formulas that call networks.
+    fn chain(&self, set: usize) -> Result<Option<BoundChain>> {
+        let Self { flight, compiled, inputs, buffers } = *self;
+        let both = compiled.text.chain().zip(buffers.chain.as_ref());
+        let bind = |(chain, buffers)| {
+            let state = self.buffers.of_set(Slot::State, set);
+            ChainBinder { flight, compiled, inputs, buffers, state }.bind(chain)
+        };
+        both.map(bind).transpose()
     }
 
     /// The layers of the network.
@@ -237,6 +266,10 @@ impl Binder<'_> {
             (Slot::Control, _) => {
                 let output = self.buffers.layers.as_ref().map(Layers::output);
                 output.unwrap_or(self.buffers.of(Slot::Measures))
+            }
+            (Slot::Kept, _) => {
+                let kept = self.buffers.chain.as_ref().map(ChainBuffers::kept);
+                kept.unwrap_or(self.buffers.of(Slot::Measures))
             }
             (slot, _) => self.buffers.of_set(slot, set),
         };

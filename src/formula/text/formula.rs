@@ -1,7 +1,8 @@
 //! A parsed formula: evaluated over any scalar, and asked what it uses.
 
+use super::networks::Networks;
 use super::term::{Term, Values};
-use crate::real::Real;
+use crate::formula::Scalar;
 
 /// Most operations of a formula, and most nodes of the graph of a model.
 pub const MOST_NODES: usize = 65_536;
@@ -27,6 +28,14 @@ pub struct NetworkCall {
     pub at: usize,
 }
 
+impl NetworkCall {
+    /// Its value, given those of the `earlier` terms.
+    fn value<R: Scalar>(&self, networks: &Networks, earlier: &[R]) -> R {
+        let inputs: Vec<R> = self.arguments.iter().map(|i| earlier[*i as usize]).collect();
+        R::call(networks.of(&self.file), &inputs)[self.output as usize]
+    }
+}
+
 /// Something that a formula uses, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
@@ -40,11 +49,15 @@ impl Formula {
     /// Its value for `values`.
     ///
     /// # Panics
-    /// If a name or output has no value, or the formula calls a network.
-    pub fn value<R: Real>(&self, values: Values<'_, R>) -> R {
+    /// If a name or output has no value, or a network is missing or has other inputs.
+    pub fn value<R: Scalar>(&self, values: Values<'_, R>) -> R {
         let mut earlier: Vec<R> = Vec::with_capacity(self.terms.len());
         for term in &self.terms {
-            earlier.push(term.value(values, &earlier));
+            let value = match *term {
+                Term::Network(call) => self.calls[call as usize].value(values.networks, &earlier),
+                term => term.value(values, &earlier),
+            };
+            earlier.push(value);
         }
         earlier[earlier.len() - 1]
     }

@@ -5,6 +5,7 @@ mod fault;
 mod formula;
 mod function;
 mod names;
+mod networks;
 mod parser;
 mod term;
 mod token;
@@ -14,6 +15,7 @@ pub(crate) use fault::{nearest, shown};
 pub use formula::{Formula, MOST_NODES, NetworkCall, Use};
 pub use function::Function;
 pub use names::Names;
+pub use networks::Networks;
 pub use term::{Comparison, Operation, Term, Values};
 pub(crate) use token::LONGEST_NAME;
 
@@ -26,11 +28,13 @@ impl Formula {
     /// Parses `text`, which may use `names`, functions, `pi`, `out[i]` and `net(...)[i]`.
     ///
     /// ```
-    /// use reachcast::formula::text::{Formula, Names, Values};
+    /// use reachcast::formula::text::{Formula, Names, Networks, Values};
     /// let mut names = Names::default();
     /// names.add("x", "a state")?;
     /// let formula = Formula::parse("-x^2 + 2 * hypot(x, 4)", &names).expect("a formula");
-    /// assert_eq!(formula.value(Values { names: &[3.0_f32], outputs: &[] }), 1.0);
+    /// let networks = Networks::default();
+    /// let values = Values { names: &[3.0_f32], outputs: &[], networks: &networks };
+    /// assert_eq!(formula.value(values), 1.0);
     /// let fault = Formula::parse("1 + cosh(x)", &names).expect_err("no such function");
     /// assert_eq!(fault.problem, "unknown function `cosh`; the nearest is `cos`");
     /// # Ok::<(), String>(())

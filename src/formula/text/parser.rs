@@ -4,6 +4,7 @@ use super::fault::{Fault, nearest};
 use super::formula::{Formula, MOST_NODES, NetworkCall};
 use super::function::Function;
 use super::names::Names;
+use super::networks::Networks;
 use super::term::{Comparison, Operation, Term, Values};
 use super::token::{Kind, Lexer, Token};
 
@@ -25,6 +26,8 @@ pub(super) struct Parser<'a> {
     /// Whether no name enters a term.
     fixed: Vec<bool>,
     calls: Vec<NetworkCall>,
+    /// None: what is fixed calls no network.
+    networks: Networks,
 }
 
 impl<'a> Parser<'a> {
@@ -41,6 +44,7 @@ impl<'a> Parser<'a> {
             constants: Vec::new(),
             fixed: Vec::new(),
             calls: Vec::new(),
+            networks: Networks::default(),
         })
     }
 
@@ -102,7 +106,8 @@ impl<'a> Parser<'a> {
             return Err(Fault::new(at, problem));
         }
         let fixed = self.is_fixed(term);
-        let none = Values { names: &[], outputs: &[] };
+        let networks = &self.networks;
+        let none = Values { names: &[], outputs: &[], networks };
         self.constants.push(if fixed { term.value(none, &self.constants) } else { f32::NAN });
         self.fixed.push(fixed);
         self.terms.push(term);

@@ -1,6 +1,7 @@
 //! The operations of a parsed formula, and their values over any scalar.
 
 use super::function::{Function, power};
+use super::networks::Networks;
 use crate::real::Real;
 
 /// One operation of a formula; operands are indices of earlier ones.
@@ -90,6 +91,8 @@ pub struct Values<'a, R> {
     pub names: &'a [R],
     /// The outputs of the policy's network.
     pub outputs: &'a [R],
+    /// The networks that formulas call.
+    pub networks: &'a Networks,
 }
 
 impl Term {
@@ -108,7 +111,7 @@ impl Term {
             Self::Power(base, exponent) => power(at(base), exponent),
             Self::Call(function, operands) => function.value(operands.map(at)),
             Self::If(comparison, operands) => comparison.choose(operands.map(at)),
-            Self::Network(_) => panic!("a formula with a network is refused before it has values"),
+            Self::Network(_) => panic!("the call of a network has its arguments elsewhere"),
         }
     }
 

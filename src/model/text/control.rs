@@ -7,7 +7,7 @@ use super::description::Description;
 use super::policy::{NetworkPolicy, Policy};
 use super::written::Written;
 use crate::error::{Error, Result};
-use crate::formula::text::Values;
+use crate::formula::text::{Networks, Values};
 use crate::formula::{Graph, record};
 use crate::model::Plant;
 use crate::model::controller::{Controller, Law};
@@ -26,13 +26,14 @@ impl Description {
     ///
     /// # Errors
     /// [`Error::Invalid`] if there is no policy, a formula is too large or asks for an output that
-    /// the network does not have; [`Error::File`] if the network cannot be read or has another
-    /// width.
+    /// the network does not have, or calls a network that cannot be read or does not fit;
+    /// [`Error::File`] if the policy's network cannot be read or has another width.
     pub fn controller(&self) -> Result<Controller> {
         let missing = || self.origin.refuse("policy", "missing; expected a section with a policy");
         match self.policy.as_ref().ok_or_else(missing)? {
             Policy::Formulas(formulas) => {
-                let law = Law::Formula(self.recorded("policy.formula", formulas)?);
+                let networks = self.table()?;
+                let law = Law::Formula(self.recorded("policy.formula", formulas, &networks)?);
                 Ok(Controller::new("formula", law))
             }
             Policy::Network(policy) => self.network(policy, Mlp::load(&policy.file)?),
@@ -53,10 +54,11 @@ impl Description {
     fn network(&self, policy: &NetworkPolicy, network: Mlp) -> Result<Controller> {
         self.check_inputs(policy, &network)?;
         self.check_outputs(policy, &network)?;
+        let networks = self.table()?;
         let observe = policy.observe.as_deref();
-        let observe = observe.map(|formulas| self.recorded("policy.observe", formulas));
+        let observe = observe.map(|formulas| self.recorded("policy.observe", formulas, &networks));
         let outputs = outputs(&network);
-        let act = policy.act.as_deref().map(|formulas| self.act(formulas, outputs));
+        let act = policy.act.as_deref().map(|formulas| self.act(formulas, outputs, &networks));
         let widths: Vec<String> = network.widths().iter().map(ToString::to_string).collect();
         let law = Law::Network {
             observe: observe.transpose()?,
@@ -128,14 +130,14 @@ impl Description {
     }
 
     /// The controls over the inputs of the model and the `outputs` of the network behind them.
-    fn act(&self, formulas: &[Written], outputs: usize) -> Result<Graph> {
+    fn act(&self, formulas: &[Written], outputs: usize, networks: &Networks) -> Result<Graph> {
         let needed = self.lets.needed(formulas);
         let own: usize = formulas.iter().map(|written| written.formula.operations()).sum();
         self.check_size("policy.act", own + self.lets.operations(&needed))?;
         let graph = record(self.inputs() + outputs, |inputs| {
             let (inputs, outputs) = inputs.split_at(self.inputs());
-            let names = self.lets.values(inputs, &needed);
-            let values = Values { names: &names, outputs };
+            let names = self.lets.values(inputs, &needed, networks);
+            let values = Values { names: &names, outputs, networks };
             formulas.iter().map(|written| written.formula.value(values)).collect()
         });
         self.check_size("policy.act", graph.nodes.len())?;

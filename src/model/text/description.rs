@@ -6,6 +6,7 @@ use super::axes::{self, State};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
 use super::names::{Scope, Seconds};
+use super::network::NetworkFile;
 use super::origin::Origin;
 use super::policy::{self, Policy};
 use super::section::Section;
@@ -49,6 +50,8 @@ pub struct Description {
     /// What makes the controls, where the text says.
     pub policy: Option<Policy>,
     pub(super) lets: Lets,
+    /// The networks that formulas call, where they were given.
+    pub(super) networks: Option<Vec<NetworkFile>>,
     pub(super) origin: Origin,
 }
 
@@ -84,6 +87,7 @@ impl Description {
             parameters,
             period: time.period,
             lets,
+            networks: None,
             origin: origin.clone(),
         })
     }

@@ -4,8 +4,8 @@ use super::names::Scope;
 use super::section::Section;
 use super::written::{Purpose, Written};
 use crate::error::{Error, Result};
-use crate::formula::text::{Use, Values};
-use crate::real::Real;
+use crate::formula::Scalar;
+use crate::formula::text::{Networks, Use, Values};
 
 /// Named formulas that others use.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,6 +46,11 @@ impl Lets {
         lets.sort(&section)?;
         lets.note_controls(scope);
         Ok(lets)
+    }
+
+    /// All of them, in the order of the text.
+    pub(super) fn written(&self) -> &[Written] {
+        &self.formulas
     }
 
     /// The intermediate formulas that formula `i` uses, by their numbers.
@@ -141,16 +146,21 @@ impl Lets {
         counted.map(|(written, _)| written.formula.operations()).sum()
     }
 
-    /// The values of all names: the `inputs`, then the intermediate formulas that are `needed`;
-    /// the others have the value of the first input, which nothing asks for.
+    /// The values of all names: the `inputs`, then the intermediate formulas that are `needed`, with the
+    /// `networks` that they call; the others have the value of the first input, which nothing asks for.
     ///
     /// # Panics
     /// If there is no input.
-    pub(super) fn values<R: Real>(&self, inputs: &[R], needed: &[bool]) -> Vec<R> {
+    pub(super) fn values<R: Scalar>(
+        &self,
+        inputs: &[R],
+        needed: &[bool],
+        networks: &Networks,
+    ) -> Vec<R> {
         let mut names = inputs.to_vec();
         names.resize(self.first + self.formulas.len(), inputs[0]);
         for &i in self.order.iter().filter(|i| needed[**i]) {
-            let values = Values { names: &names, outputs: &[] };
+            let values = Values { names: &names, outputs: &[], networks };
             names[self.first + i] = self.formulas[i].formula.value(values);
         }
         names

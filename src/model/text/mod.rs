@@ -17,6 +17,7 @@ mod written;
 pub use axes::{MOST_CONTROLS, MOST_PARAMETERS, MOST_STATES, State, Topology};
 pub use description::Description;
 pub use dynamics::{Dynamics, Integration, Integrator};
+pub use network::{MOST_NETWORKS, NetworkFile};
 pub use origin::Origin;
 pub use policy::{NetworkPolicy, Policy};
 pub use task::Task;

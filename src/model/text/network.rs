@@ -1,29 +1,129 @@
-//! Networks that formulas call by their file.
+//! Networks that formulas call by their files: read once each, and held against their calls.
 
-use std::path::Path;
+use std::path::PathBuf;
+use std::sync::Arc;
 
-use crate::formula::text::{NetworkCall, shown};
+use super::description::Description;
+use super::dynamics::Dynamics;
+use super::policy::Policy;
+use super::written::Written;
+use crate::error::{Error, Result};
+use crate::formula::text::{NetworkCall, Networks, shown};
 use crate::policy::Mlp;
 
-/// Why the call of a network is refused: its file, its width, or that no formula runs one yet.
-pub(super) fn refusal(call: &NetworkCall, folder: &Path) -> String {
-    let file = shown(&call.file);
-    let network = match Mlp::load(&folder.join(&call.file)) {
-        Ok(network) => network,
-        Err(error) => return error.to_string(),
-    };
-    let widths = network.widths();
+/// Most files of networks that the formulas of a model may name.
+pub const MOST_NETWORKS: usize = 8;
+
+/// The file of a network that formulas call.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NetworkFile {
+    /// What formulas call it.
+    pub name: String,
+    /// Where it was read.
+    pub path: PathBuf,
+    /// The file as it was read, for a copy that is sure to be the same.
+    pub bytes: Vec<u8>,
+    /// The network.
+    pub network: Arc<Mlp>,
+}
+
+impl NetworkFile {
+    /// Reads the safetensors file at `path`, which formulas call `name`.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it is missing, damaged, or has a weight that is not finite.
+    pub fn read(name: &str, path: PathBuf) -> Result<Self> {
+        let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
+        let network = Mlp::from_bytes(&bytes).map_err(|problem| Error::file(&path, problem))?;
+        Ok(Self { name: name.to_owned(), path, bytes, network: Arc::new(network) })
+    }
+}
+
+/// A formula's call of a network.
+type Found<'a> = (&'a Written, &'a NetworkCall);
+
+impl Description {
+    /// The networks that formulas call, each once: intermediate formulas first, then the dynamics, the
+    /// margins, the policy. The file of number `i`, from 0, which formulas call `name`, is at
+    /// `place(i, name)`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming formula and column of a call whose network cannot be read, or that gives
+    /// it another number of inputs or asks for an output that it does not have.
+    pub fn networks(&self, place: impl Fn(usize, &str) -> PathBuf) -> Result<Vec<NetworkFile>> {
+        let mut files: Vec<NetworkFile> = Vec::new();
+        for (written, call) in self.calls() {
+            let refuse = |problem: String| written.refuse(&self.origin, call.at, problem);
+            let known = files.iter().position(|file| file.name == call.file);
+            let at = known.unwrap_or(files.len());
+            if at == MOST_NETWORKS {
+                return Err(refuse(format!("more than {MOST_NETWORKS} files of networks")));
+            }
+            if known.is_none() {
+                let file = NetworkFile::read(&call.file, place(at, &call.file));
+                files.push(file.map_err(|error| refuse(error.to_string()))?);
+            }
+            check(call, &files[at].network).map_err(refuse)?;
+        }
+        Ok(files)
+    }
+
+    /// The same description with the networks that its formulas call, which are then not read again.
+    #[must_use]
+    pub fn with_networks(self, networks: Vec<NetworkFile>) -> Self {
+        Self { networks: Some(networks), ..self }
+    }
+
+    /// The networks by their names: those that were given, or those beside the description.
+    pub(super) fn table(&self) -> Result<Networks> {
+        let files = match &self.networks {
+            Some(given) => self.networks_among(given)?,
+            None => self.networks(|_, name| self.origin.folder.join(name))?,
+        };
+        let mut table = Networks::default();
+        files.into_iter().for_each(|file| table.add(&file.name, file.network));
+        Ok(table)
+    }
+
+    /// Those of `given` that formulas call.
+    fn networks_among(&self, given: &[NetworkFile]) -> Result<Vec<NetworkFile>> {
+        for (written, call) in self.calls() {
+            let refuse = |problem: String| written.refuse(&self.origin, call.at, problem);
+            let file = given.iter().find(|file| file.name == call.file);
+            let missing = || refuse(format!("the network `{}` was not given", shown(&call.file)));
+            check(call, &file.ok_or_else(missing)?.network).map_err(refuse)?;
+        }
+        Ok(given.to_vec())
+    }
+
+    /// All calls of networks.
+    fn calls(&self) -> impl Iterator<Item = Found<'_>> {
+        let (Dynamics::Next(moves) | Dynamics::Flow(moves, _)) = &self.dynamics;
+        let law: Vec<&Written> = match &self.policy {
+            None => Vec::new(),
+            Some(Policy::Formulas(formulas)) => formulas.iter().collect(),
+            Some(Policy::Network(policy)) => {
+                [&policy.observe, &policy.act].into_iter().flatten().flatten().collect()
+            }
+        };
+        let margins = [&self.task.target, &self.task.constraint];
+        let all = self.lets.written().iter().chain(moves).chain(margins).chain(law);
+        all.flat_map(|written| written.formula.networks().iter().map(move |call| (written, call)))
+    }
+}
+
+/// Why `network` does not fit the call.
+fn check(call: &NetworkCall, network: &Mlp) -> std::result::Result<(), String> {
+    let (file, widths, given) = (shown(&call.file), network.widths(), call.arguments.len());
     let (inputs, outputs) = (widths[0], widths[widths.len() - 1]);
-    let given = call.arguments.len();
     if given != inputs {
-        return format!("the network `{file}` takes {inputs} inputs, found {given}");
+        let plural = if inputs == 1 { "" } else { "s" };
+        return Err(format!("the network `{file}` takes {inputs} input{plural}, found {given}"));
     }
     if call.output as usize >= outputs {
-        return format!(
-            "the network `{file}` has the outputs 0 to {}, found [{}]",
-            outputs - 1,
-            call.output
-        );
+        let last = outputs - 1;
+        let output = call.output;
+        return Err(format!("the network `{file}` has the outputs 0 to {last}, found [{output}]"));
     }
-    format!("the network `{file}` fits, but a network inside a formula cannot be run yet")
+    Ok(())
 }

@@ -5,8 +5,8 @@ use super::description::Description;
 use super::dynamics::{Dynamics, Integration, Integrator};
 use super::written::Written;
 use crate::error::Result;
-use crate::formula::text::{MOST_NODES, Values};
-use crate::formula::{Graph, record};
+use crate::formula::text::{MOST_NODES, Networks, Values};
+use crate::formula::{Graph, Scalar, record};
 use crate::model::Model;
 use crate::real::Real;
 use crate::system::Axis;
@@ -16,6 +16,7 @@ struct Formulas<'a> {
     description: &'a Description,
     formulas: &'a [Written],
     needed: Vec<bool>,
+    networks: &'a Networks,
 }
 
 impl Description {
@@ -23,18 +24,23 @@ impl Description {
     /// parameters are data of the model and no part of a graph.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] naming the formulas whose graph is too large.
+    /// [`crate::Error::Invalid`] naming the formulas whose graph is too large, or the call of a network
+    /// that cannot be read or does not fit.
     pub fn model(&self) -> Result<Model> {
         let (target, constraint) = (&self.task.target, &self.task.constraint);
+        let networks = self.table()?;
+        let margin = |written: &Written| {
+            self.recorded(&written.key, std::slice::from_ref(written), &networks)
+        };
         Ok(Model {
             name: self.name.clone(),
             states: self.states.iter().map(|state| state.axis.clone()).collect(),
             controls: self.controls.clone(),
             parameters: self.parameters.clone(),
             period: self.period,
-            step: self.step()?,
-            target: self.recorded(&target.key, std::slice::from_ref(target))?,
-            constraint: self.recorded(&constraint.key, std::slice::from_ref(constraint))?,
+            step: self.step(&networks)?,
+            target: margin(target)?,
+            constraint: margin(constraint)?,
             bodies: self.bodies.clone(),
             smallest_feature: None,
             native: None,
@@ -52,8 +58,13 @@ impl Description {
     }
 
     /// The graph of `formulas`, which stand at the dotted key `path`.
-    pub(super) fn recorded(&self, path: &str, formulas: &[Written]) -> Result<Graph> {
-        let formulas = Formulas::new(self, formulas);
+    pub(super) fn recorded(
+        &self,
+        path: &str,
+        formulas: &[Written],
+        networks: &Networks,
+    ) -> Result<Graph> {
+        let formulas = Formulas::new(self, formulas, networks);
         self.check_size(path, formulas.operations())?;
         let graph = record(self.inputs(), |inputs| formulas.values(inputs));
         self.check_size(path, graph.nodes.len())?;
@@ -70,12 +81,12 @@ impl Description {
     }
 
     /// The graph of the next state.
-    fn step(&self) -> Result<Graph> {
+    fn step(&self, networks: &Networks) -> Result<Graph> {
         let (path, formulas, stages) = match &self.dynamics {
             Dynamics::Next(formulas) => ("model.next", formulas, 1),
             Dynamics::Flow(formulas, rule) => ("model.flow", formulas, rule.stages()),
         };
-        let formulas = Formulas::new(self, formulas);
+        let formulas = Formulas::new(self, formulas, networks);
         // Counted before anything is recorded: millions of substeps would fill the memory.
         let operations = (formulas.operations() + formulas.formulas.len()).saturating_mul(stages);
         self.check_size(path, operations)?;
@@ -129,8 +140,8 @@ impl Integration {
 }
 
 impl<'a> Formulas<'a> {
-    fn new(description: &'a Description, formulas: &'a [Written]) -> Self {
-        Self { description, formulas, needed: description.lets.needed(formulas) }
+    fn new(description: &'a Description, formulas: &'a [Written], networks: &'a Networks) -> Self {
+        Self { description, formulas, needed: description.lets.needed(formulas), networks }
     }
 
     /// Operations of one evaluation.
@@ -140,18 +151,23 @@ impl<'a> Formulas<'a> {
     }
 
     /// Their values at `inputs`.
-    fn values<R: Real>(&self, inputs: &[R]) -> Vec<R> {
+    fn values<R: Scalar>(&self, inputs: &[R]) -> Vec<R> {
         let names = self.names(inputs);
-        self.formulas.iter().map(|written| value(written, &names)).collect()
+        self.formulas.iter().map(|written| self.value(written, &names)).collect()
     }
 
     /// The values of all names at `inputs`.
-    fn names<R: Real>(&self, inputs: &[R]) -> Vec<R> {
-        self.description.lets.values(inputs, &self.needed)
+    fn names<R: Scalar>(&self, inputs: &[R]) -> Vec<R> {
+        self.description.lets.values(inputs, &self.needed, self.networks)
+    }
+
+    /// The value of `written` for the values of all names.
+    fn value<R: Scalar>(&self, written: &Written, names: &[R]) -> R {
+        written.formula.value(Values { names, outputs: &[], networks: self.networks })
     }
 
     /// The state a period after `inputs`, the formulas being derivatives.
-    fn integrated<R: Real>(&self, inputs: &[R], rule: Integration) -> Vec<R> {
+    fn integrated<R: Scalar>(&self, inputs: &[R], rule: Integration) -> Vec<R> {
         let count = self.description.states.len();
         let mut moment = inputs.to_vec();
         for substep in 0..rule.substeps {
@@ -175,16 +191,16 @@ impl<'a> Formulas<'a> {
     }
 
     /// `x + h f(x, t)`.
-    fn euler<R: Real>(&self, moment: &[R], seconds: f64) -> Vec<R> {
+    fn euler<R: Scalar>(&self, moment: &[R], seconds: f64) -> Vec<R> {
         let h = R::lit(seconds as f32);
         let names = self.names(moment);
-        let next = |(x, written): (&R, &Written)| *x + h * value(written, &names);
+        let next = |(x, written): (&R, &Written)| *x + h * self.value(written, &names);
         moment.iter().zip(self.formulas).map(next).collect()
     }
 
     /// `x + h / 6 (k1 + 2 k2 + 2 k3 + k4)`, with the slopes at the beginning, twice in the middle,
     /// and at the end of the substep that begins `begin` seconds after `inputs`.
-    fn rk4<R: Real>(&self, moment: &[R], inputs: &[R], begin: f64, seconds: f64) -> Vec<R> {
+    fn rk4<R: Scalar>(&self, moment: &[R], inputs: &[R], begin: f64, seconds: f64) -> Vec<R> {
         let slope = |from: &[R], after: f64, slopes: &[R]| {
             let mut there = moment.to_vec();
             self.at_time(&mut there, inputs, begin + after);
@@ -204,9 +220,4 @@ impl<'a> Formulas<'a> {
         let mean = |i: usize| (first[i] + last[i]) + two * (second[i] + third[i]);
         (0..first.len()).map(|i| moment[i] + sixth * mean(i)).collect()
     }
-}
-
-/// The value of `written` for the values of all names.
-fn value<R: Real>(written: &Written, names: &[R]) -> R {
-    written.formula.value(Values { names, outputs: &[] })
 }

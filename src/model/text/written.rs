@@ -3,7 +3,6 @@
 use toml::Value;
 
 use super::names::Scope;
-use super::network;
 use super::origin::Origin;
 use super::section::{Section, unknown};
 use crate::error::{Error, Result};
@@ -81,10 +80,7 @@ impl Written {
         if purpose != Purpose::Dynamics {
             self.check_controls(origin, scope, purpose)?;
         }
-        match self.formula.networks().first() {
-            Some(call) => Err(self.refuse(origin, call.at, network::refusal(call, &origin.folder))),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// Refuses controls, whether used here or by an intermediate formula.

@@ -226,6 +226,17 @@ impl Real for Bound {
         )
     }
 
+    /// Of the hulls of the inputs: one piece for each neuron. A rectified neuron that may be on either
+    /// side of 0 has two pieces until the next layer, so the gradient of a network is that of every
+    /// pattern of its neurons at once.
+    fn dense(weight: &[f32], bias: &[f32], inputs: &[Self]) -> Vec<Self> {
+        let hulls: Vec<Enclosure> = inputs.iter().map(|input| input.get().hull()).collect();
+        let dimensions = ARENA.with_borrow(|arena| arena.dimensions);
+        let rows = weight.chunks(inputs.len().max(1)).zip(bias);
+        let sums = rows.map(|(row, bias)| Enclosure::weighted(row, *bias, &hulls, dimensions));
+        sums.map(Self::new).collect()
+    }
+
     fn floor(self) -> Self {
         Self::new(branch::floor(&self.get()))
     }

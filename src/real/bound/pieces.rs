@@ -87,7 +87,7 @@ impl Enclosure {
     }
 
     /// One piece with everything in it.
-    fn hull(&self) -> Self {
+    pub(super) fn hull(&self) -> Self {
         let mut pieces = self.pieces.iter();
         let mut all = match pieces.next() {
             Some(first) => first.clone(),
@@ -128,6 +128,26 @@ impl Enclosure {
             let (value, slopes) = range(one.value, other.value);
             pieces.push(Piece::sum(value, slopes, one, other));
         })
+    }
+
+    /// `weights x + bias` of `inputs`, each a single piece: one piece.
+    ///
+    /// # Panics
+    /// If an input has more.
+    pub(super) fn weighted(weights: &[f32], bias: f32, inputs: &[Self], dimensions: usize) -> Self {
+        let mut value = Interval::point(f64::from(bias));
+        let mut gradient = vec![Interval::ZERO; dimensions];
+        let mut caveats = Caveats::default();
+        for (&weight, input) in weights.iter().zip(inputs) {
+            let [piece] = &input.pieces[..] else { panic!("a hull has one piece") };
+            let weight = Interval::point(f64::from(weight));
+            value = value + weight * piece.value;
+            for (side, other) in gradient.iter_mut().zip(&piece.gradient) {
+                *side = *side + weight * *other;
+            }
+            caveats = caveats.or(input.caveats);
+        }
+        Self { pieces: vec![Piece { value, gradient }], caveats }
     }
 
     /// Applies `push` to each pair of pieces; it adds at most `fan` pieces.

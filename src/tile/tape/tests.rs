@@ -44,7 +44,7 @@ fn graph(random: &mut StdRng, inputs: usize, size: usize, outputs: usize) -> Gra
     let count = nodes.len() as u32;
     // Now and then an input or a literal as it is, and the same node twice.
     let outputs = (0..outputs).map(|_| random.random_range(0..count)).collect();
-    Graph { inputs, nodes, outputs }
+    Graph { inputs, nodes, outputs, calls: Vec::new() }
 }
 
 /// An operation of earlier nodes, late ones more often.

@@ -166,6 +166,7 @@ fn operation(node: Node) -> Operation<u32> {
     let whole = |f, a| Operation::new(Kind::Whole(f), &[a]);
     match node {
         Node::Input(_) | Node::Literal(_) => unreachable!("values, not operations"),
+        Node::Said(..) => unreachable!("a tape is a part of a formula without networks"),
         Node::Add(a, b) => binary(Binary::Add, a, b),
         Node::Sub(a, b) => binary(Binary::Sub, a, b),
         Node::Mul(a, b) => binary(Binary::Mul, a, b),

@@ -30,7 +30,7 @@ where
     S: System<NX, NU> + Clone + Send + Sync + 'static,
 {
     let model = Model::of(system.clone());
-    let tapes = InterpretedSystem::new(&model, &model.values());
+    let tapes = InterpretedSystem::new(&model, &model.values(), &|_| unreachable!("no networks"));
     assert_eq!(tapes.clock(), Clock::Ignored);
     let (compiled, own) = (CompiledSystem(system), tapes.own_rows());
     let layout = Layout { states: NX, controls: NU, own };

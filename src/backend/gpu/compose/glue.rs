@@ -11,6 +11,11 @@ pub(super) const RNG: &str = include_str!("../../../../shaders/rng.wgsl");
 
 /// Sizes and sentinels that the kernels share with Rust.
 pub(super) fn constants(states: usize, controls: usize) -> String {
+    constants_with(states, controls, states)
+}
+
+/// The same where a kernel's state is `length` numbers, those that are stored first.
+pub(super) fn constants_with(states: usize, controls: usize, length: usize) -> String {
     format!(
         "const NX: u32 = {}u;\n\
          const NU: u32 = {}u;\n\
@@ -23,7 +28,7 @@ pub(super) fn constants(states: usize, controls: usize) -> String {
         states,
         controls,
         states.div_ceil(4),
-        states,
+        length,
         controls,
     )
 }
@@ -33,8 +38,12 @@ const ROW: &str = "params.stride * (1u + params.paired)";
 
 /// `load_state` and `store_state`, free of loops.
 pub(super) fn state_glue(states: usize) -> String {
-    let mut text = load_glue(states);
-    text += "fn store_state(column: u32, x: State) {\n";
+    load_glue(states, &[]) + &store_glue(states)
+}
+
+/// `store_state` alone.
+pub(super) fn store_glue(states: usize) -> String {
+    let mut text = String::from("fn store_state(column: u32, x: State) {\n");
     text += &format!("    let stride = {ROW};\n");
     for quad in 0..states.div_ceil(4) {
         let entries = padded("x", quad, states);
@@ -43,14 +52,14 @@ pub(super) fn state_glue(states: usize) -> String {
     text + "}\n"
 }
 
-/// `load_state` alone, for kernels that may not write states.
-pub(super) fn load_glue(states: usize) -> String {
+/// `load_state` alone, for kernels that may not write states; `more` numbers follow those of the state.
+pub(super) fn load_glue(states: usize, more: &[String]) -> String {
     let mut text = String::from("fn load_state(column: u32) -> State {\n");
     text += &format!("    let stride = {ROW};\n");
     for quad in 0..states.div_ceil(4) {
         text += &format!("    let v{quad} = state[{quad}u * stride + column];\n");
     }
-    let all: Vec<String> = (0..states).map(component).collect();
+    let all: Vec<String> = (0..states).map(component).chain(more.iter().cloned()).collect();
     text + &format!("    return State({});\n}}\n", all.join(", "))
 }
 

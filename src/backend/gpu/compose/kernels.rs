@@ -26,6 +26,8 @@ pub enum Kernel {
     Reduce,
     /// Evaluates what a network sees.
     Observe,
+    /// Evaluates the part of that number of formulas that call networks.
+    Link(u32),
     /// A hidden layer of the network.
     HiddenLayer,
     /// The last layer of the network.
@@ -117,6 +119,12 @@ pub enum Slot {
     Values = 27,
     /// `cells`: the costs of the cells of a map.
     Cells = 28,
+    /// `kept`: numbers that parts of formulas keep for later ones, `[numbers, stride]`.
+    Kept = 30,
+    /// `asked`: vectors of 4 inputs of networks that formulas call.
+    Asked = 31,
+    /// `said`: vectors of 4 outputs of such networks.
+    Said = 32,
 }
 
 impl Kernel {
@@ -147,6 +155,7 @@ impl Kernel {
             Self::Deviation => "deviation",
             Self::Reduce => "reduce",
             Self::Observe => "observe",
+            Self::Link(_) => "link",
             Self::HiddenLayer | Self::OutputLayer => "mlp",
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
@@ -199,6 +208,7 @@ impl Kernel {
             ],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
+            Self::Link(_) => &[(S::State, Read), (S::Kept, ReadWrite)],
             Self::HiddenLayer | Self::OutputLayer => {
                 &[(S::Weights, Read), (S::Source, Read), (S::Sink, ReadWrite)]
             }

@@ -1,5 +1,6 @@
 //! The text of each kernel: constants, recorded formulas and the files of `shaders/`, concatenated.
 
+mod chain;
 mod glue;
 mod kernels;
 mod layers;
@@ -8,6 +9,8 @@ mod mppi;
 mod physics_glue;
 mod plant;
 
+pub use chain::ChainText;
+pub(super) use chain::{AskShape, ChainSizes};
 pub use kernels::{
     Access, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
 };

@@ -82,7 +82,7 @@ pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String
 }
 
 /// `parameters`: the parameters of the model, from constant memory.
-fn parameter_glue(count: usize) -> String {
+pub(super) fn parameter_glue(count: usize) -> String {
     let quads = count.div_ceil(4);
     let all: Vec<String> =
         (0..count).map(|i| format!("values[{}].{}", i / 4, ["x", "y", "z", "w"][i % 4])).collect();
@@ -98,7 +98,7 @@ fn parameter_glue(count: usize) -> String {
 }
 
 /// `seconds_at`: the time at a step.
-fn seconds_glue(period: f32) -> String {
+pub(super) fn seconds_glue(period: f32) -> String {
     format!("fn seconds_at(t: u32) -> f32 {{\n    return f32(t) * {period:?}f;\n}}\n")
 }
 

@@ -1,7 +1,8 @@
 //! The text of the kernels of measures, pairs and networks.
 
-use super::glue::{FINITE, PARAMS, RNG, component, constants, finite_glue, state_glue};
-use super::glue::{listed_glue, load_glue, recorded_pair};
+use super::chain::ChainText;
+use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
+use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
 use super::kernels::{Access, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
 use super::physics_glue::{Driver, Outline, physics_glue};
@@ -28,6 +29,8 @@ const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
 pub struct PlantText {
     outline: Outline,
     physics: Physics,
+    /// Where formulas call networks.
+    chain: Option<ChainText>,
 }
 
 impl PlantText {
@@ -35,22 +38,26 @@ impl PlantText {
     ///
     /// # Errors
     /// [`Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
-    /// what is not known there, or the network does not fit.
+    /// what is not known there, or the network does not fit; [`Error::Device`] if more networks follow
+    /// one another inside formulas than an adapter takes.
     pub fn new(model: &Model, controller: &Controller) -> Result<Self> {
         check_formulas(model, controller)?;
         let physics = Physics::new(model, controller);
         check_reads(&physics)?;
-        Ok(Self {
-            outline: Outline {
-                states: model.states.len(),
-                controls: model.controls.len(),
-                parameters: model.parameters.len(),
-                period: model.period.unwrap_or(0.0),
-                contexts: 0,
-                driver: controller.network().map(Driver::new),
-            },
-            physics,
-        })
+        let mut outline = Outline {
+            states: model.states.len(),
+            controls: model.controls.len(),
+            parameters: model.parameters.len(),
+            period: model.period.unwrap_or(0.0),
+            contexts: 0,
+            driver: controller.network().map(Driver::new),
+        };
+        let chain = ChainText::new(&outline, model, controller)?;
+        if chain.is_some() {
+            // The network that drives is one of those that the chain calls.
+            outline.driver = None;
+        }
+        Ok(Self { outline, physics, chain })
     }
 
     /// The same texts where the rollouts run the layers of a network themselves.
@@ -60,6 +67,11 @@ impl PlantText {
             driver.fused = fused;
         }
         self
+    }
+
+    /// The parts between networks, where formulas call some.
+    pub fn chain(&self) -> Option<&ChainText> {
+        self.chain.as_ref()
     }
 
     /// Number of states.
@@ -91,6 +103,13 @@ impl PlantText {
     /// What `kernel` binds.
     pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
         let mut list = kernel.bindings(self.outline.driver.is_some());
+        match (&self.chain, kernel) {
+            (Some(chain), Kernel::Link(number)) => return chain.bindings(&self.outline, number),
+            (Some(_), Kernel::ReachAvoid | Kernel::Deviation) => {
+                list.push((Slot::Kept, Access::Read));
+            }
+            _ => {}
+        }
         if self.fused().is_some() {
             let control = list.iter_mut().filter(|(slot, _)| *slot == Slot::Control);
             control.for_each(|(slot, _)| *slot = Slot::Weights);
@@ -109,7 +128,7 @@ impl PlantText {
         }
     }
 
-    /// The WGSL module of `kernel`, one of [`Kernel::ROLLOUT`]; for those of MPPI see
+    /// The WGSL module of `kernel`, one of [`Kernel::ROLLOUT`], or of a link of [`PlantText::chain`]; for those of MPPI see
     /// [`super::MppiText`].
     ///
     /// # Panics
@@ -121,7 +140,7 @@ impl PlantText {
             Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
             Kernel::ReachAvoid => vec![self.rollout(kernel), REACH_AVOID.to_owned()],
             Kernel::Deviation => {
-                vec![self.rollout(kernel), recorded_distance(states), DEVIATION.to_owned()]
+                vec![self.rollout(kernel), self.distance(), DEVIATION.to_owned()]
             }
             Kernel::Compact => vec![folds(), COMPACT.to_owned()],
             Kernel::Reduce => vec![REDUCE.to_owned()],
@@ -130,9 +149,18 @@ impl PlantText {
                 vec![layer_text(activations, kernel == Kernel::OutputLayer)]
             }
             Kernel::Observe => vec![self.observation(), OBSERVE.to_owned()],
+            Kernel::Link(number) if self.chain.is_some() => {
+                self.chain.iter().map(|chain| chain.link(&self.outline, number)).collect()
+            }
             other => panic!("{other:?} is no kernel of a plant"),
         };
-        let sizes = constants(states, self.outline.controls);
+        let length = match (kernel, &self.chain) {
+            (Kernel::ReachAvoid | Kernel::Deviation, Some(_)) => {
+                ChainText::state_length(&self.outline)
+            }
+            _ => states,
+        };
+        let sizes = constants_with(states, self.outline.controls, length);
         let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts].concat().join("\n")
     }
@@ -152,8 +180,30 @@ impl PlantText {
             self.fused().is_some()
         );
         let states = self.outline.states;
-        let glue = [state_glue(states), finite_glue(states), self.functions(kernel)].concat();
-        [FINITE, FOLD, &lanes, &glue, &self.drive(), JUDGE].join("\n")
+        let moves = match &self.chain {
+            Some(_) => [store_glue(states), ChainText::rollout_glue(&self.outline)].concat(),
+            None => [state_glue(states), self.functions(kernel), self.drive()].join("\n"),
+        };
+        [FINITE, FOLD, &lanes, &finite_glue(states), &moves, JUDGE].join("\n")
+    }
+
+    /// `state_distance`, the Euclidean distance of two states.
+    fn distance(&self) -> String {
+        let states = self.outline.states;
+        // A kernel's state may be longer than what is stored of it.
+        let passed = |name: &str| match (states, &self.chain) {
+            (1, _) => format!("{name}[0]"),
+            (_, None) => name.to_owned(),
+            (_, Some(_)) => {
+                let all: Vec<String> = (0..states).map(|i| format!("{name}[{i}]")).collect();
+                format!("array<f32, {states}>({})", all.join(", "))
+            }
+        };
+        let (recorded, a, b) = (recorded_distance(states), passed("a"), passed("b"));
+        format!(
+            "{recorded}\nfn state_distance(a: State, b: State) -> f32 {{\n    \
+             return distance_of({a}, {b});\n}}\n"
+        )
     }
 
     /// What evaluates the inputs of a network.
@@ -164,7 +214,8 @@ impl PlantText {
             let entries = super::glue::padded("seen", quad, self.seen());
             store += &format!("    sink[{quad}u * params.stride + column] = {entries};\n");
         }
-        [load_glue(self.outline.states), self.functions(Kernel::Observe), store + "}\n"].join("\n")
+        [load_glue(self.outline.states, &[]), self.functions(Kernel::Observe), store + "}\n"]
+            .join("\n")
     }
 
     /// Numbers that the network sees.
@@ -183,6 +234,8 @@ impl PlantText {
     /// The recorded functions that `kernel` calls.
     fn roles(&self, kernel: Kernel) -> Vec<Role> {
         let roles = match kernel {
+            // The links of the chain have them in parts.
+            _ if self.chain.is_some() => Vec::new(),
             Kernel::Observe => vec![Role::Observe],
             Kernel::ReachAvoid | Kernel::Deviation => {
                 let mut roles =
@@ -294,7 +347,7 @@ fn recorded_normals() -> String {
     [function_with("ln_unit", &[("u", 1)], &logarithm, apart), recorded_pair()].join("\n")
 }
 
-/// `state_distance`, the Euclidean distance of two states.
+/// `distance_of`, the Euclidean distance of two states.
 fn recorded_distance(states: usize) -> String {
     let graph = record(2 * states, |both| {
         let (nominal, perturbed) = both.split_at(states);
@@ -304,10 +357,5 @@ fn recorded_distance(states: usize) -> String {
         });
         vec![square.sqrt()]
     });
-    let recorded = function("distance_of", &[("a", states), ("b", states)], &graph);
-    let call = if states == 1 { "a[0], b[0]" } else { "a, b" };
-    format!(
-        "{recorded}\nfn state_distance(a: State, b: State) -> f32 {{\n    \
-         return distance_of({call});\n}}\n"
-    )
+    function("distance_of", &[("a", states), ("b", states)], &graph)
 }

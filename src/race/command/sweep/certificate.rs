@@ -6,7 +6,7 @@ use super::arguments::SweepArguments;
 use super::grid::{Grid, Target, Values};
 use crate::backend::Backend;
 use crate::cli::folder_of;
-use crate::cli::inputs::inputs;
+use crate::cli::inputs::{inputs, networks};
 use crate::cli::options::Global;
 use crate::cli::progress::Progress;
 use crate::config::{Config, Overrides, PolicySource};
@@ -42,7 +42,7 @@ pub(super) fn run(
     let axes = (grid.records(), points.len() as u64);
     let base = Config::load(&asked.config, &sweep.base)?;
     let policy = base.policy_source(folder_of(&asked.config))?;
-    inputs(&asked.config, &policy, []).spare_folder(out)?;
+    inputs(&asked.config, &policy, networks(&base)).spare_folder(out)?;
     let plant = base.plant(&policy)?;
     let program = backend.prepare(&plant)?;
     let record = certificate_sweep(&program, base.seed, base.to_json()?, axes);

@@ -17,7 +17,7 @@ pub(super) enum Tree {
 }
 
 const UNARY: u32 = 29;
-const BINARY: u32 = 11;
+const BINARY: u32 = 13;
 const TERNARY: u32 = 4;
 
 fn unary<R: Real>(kind: u32, a: R) -> R {
@@ -73,8 +73,18 @@ fn binary<R: Real>(kind: u32, a: R, b: R) -> R {
         7 => a.hypot(b),
         8 => a.atan2(b),
         9 => a.atan2(b.abs() + R::lit(0.5)),
+        10 => network(a, b, |x| x.if_lt(R::lit(0.0), R::lit(0.0), x)),
+        11 => network(a, b, R::tanh),
         _ => a.if_lt(b, a, b),
     }
+}
+
+/// A network of two layers with three neurons of an activation.
+fn network<R: Real>(a: R, b: R, activation: fn(R) -> R) -> R {
+    let weight = [0.8, -1.3, 0.6, 0.9, -0.7, -0.4];
+    let hidden = R::dense(&weight, &[0.1, -0.3, 0.2], &[a, b]);
+    let hidden: Vec<R> = hidden.into_iter().map(activation).collect();
+    R::dense(&[1.1, -0.5, 0.7], &[-0.2], &hidden)[0]
 }
 
 fn ternary<R: Real>(kind: u32, a: R, b: R, c: R) -> R {
