@@ -268,7 +268,8 @@ fn answers_say_what_they_are_about() {
     assert_eq!(record["gamma"], 0.95);
     let text = serde_json::to_string(&record["provenance"]["config"]).unwrap();
     assert!(!text.contains("00000"), "a number of f32 as it was written: {text}");
-    let rows = document(&["query", &out, "--states", &states, "--backend", "cpu"]);
+    let answers = document(&["query", &out, "--states", &states, "--backend", "cpu"]);
+    let rows = &answers["rows"];
     assert_eq!((&rows[0]["index"], &rows[1]["index"]), (&0.into(), &1.into()));
 }
 

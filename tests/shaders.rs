@@ -622,3 +622,21 @@ fn only_the_gpu_backend_names_wgpu() {
     }
     assert!(inside > 0, "the search finds nothing, not even where it must");
 }
+
+/// Elsewhere a pipe would be waited for, and a device read until memory ends.
+#[test]
+fn only_one_file_reads_files() {
+    let ways = ["fs::read(", "fs::read)", "fs::{read", "read_to_string", "File::open", "OpenOptions"];
+    let mut inside = 0;
+    for (name, code) in sources() {
+        let code = code.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        let found = ways.iter().filter(|way| code.contains(**way));
+        if name == "files/plain.rs" {
+            inside += found.count();
+        } else if !name.contains("tests") {
+            let found: Vec<_> = found.collect();
+            assert!(found.is_empty(), "{name} reads files by {found:?}; `files/plain.rs` does");
+        }
+    }
+    assert!(inside > 0, "the search finds nothing, not even where it must");
+}

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::options::{BackendName, Global};
 use super::remembered::hardware;
-use super::{Outcome, report};
+use super::{Outcome, document, report};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{Adapter, AdapterKind, Choice, Gpu, adapters};
@@ -108,7 +108,7 @@ pub(super) fn list(global: &Global) -> Result<Outcome> {
     let chosen = adapters.iter().find(|adapter| is_hardware(adapter));
     let auto = chosen.map_or("cpu".to_owned(), |adapter| adapter.name.clone());
     let listing = Listing { cpu, adapters, auto };
-    report(global, &listing, || {
+    report(global, &document(&listing), || {
         let mut text = format!("cpu  {}\n", listing.cpu);
         for adapter in &listing.adapters {
             text += &format!("gpu  {adapter}\n");

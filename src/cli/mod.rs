@@ -30,6 +30,9 @@ use crate::files::json;
 use args::{Arguments, Command, PolicyCommand};
 use options::Global;
 
+/// Version of the layout of each [`Document`].
+const SCHEMA: u32 = 1;
+
 /// What a command that ran to its end came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
@@ -82,6 +85,19 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Bench(asked) => bench::run(global, asked),
         Command::Devices => devices::list(global),
     }
+}
+
+/// A document of a command that is no record with a version of its own.
+#[derive(Serialize)]
+struct Document<'a, T> {
+    schema: u32,
+    #[serde(flatten)]
+    content: &'a T,
+}
+
+/// `content` with the version of its layout.
+fn document<T>(content: &T) -> Document<'_, T> {
+    Document { schema: SCHEMA, content }
 }
 
 /// Prints `value` as JSON with `--json`, nothing with `-q`, else `text`.

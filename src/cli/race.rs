@@ -11,7 +11,7 @@ use super::args::RaceArguments;
 use super::options::Global;
 use super::progress::Progress;
 use super::race_input::{RaceInput, names, noise_seeds};
-use super::{Outcome, devices, report};
+use super::{Outcome, devices, document, report};
 use crate::error::Result;
 use crate::experiment::record::{ControllerRecord, JudgedRecord, RaceRecord};
 use crate::experiment::run::{Experiment, TimingRecord};
@@ -91,7 +91,7 @@ fn estimate(global: &Global, experiment: &Experiment<'_>) {
 fn write(out: &Path, record: &RaceRecord, timing: &Timing) -> Result<Vec<PathBuf>> {
     let mut staged = Staged::new(out)?;
     staged.add("report.html", race_html(record).as_bytes())?;
-    staged.add("timing.json", json("timing.json", timing)?.as_bytes())?;
+    staged.add("timing.json", json("timing.json", &document(timing))?.as_bytes())?;
     staged.add("results.json", json("results.json", record)?.as_bytes())?;
     staged.publish()
 }

@@ -111,12 +111,7 @@ fn check_level(
         let refused = |problem: String| Err(Error::invalid(origin, problem));
         match (valid.get(key), value) {
             (None, _) => {
-                let siblings: Vec<String> = valid.keys().cloned().collect();
-                let all = paths(root, "");
-                let nearest = match close(key, &siblings) {
-                    Some(sibling) => format!("{prefix}{sibling}"),
-                    None => nearest(&path, &all).to_owned(),
-                };
+                let nearest = suggestion(root, valid, prefix, key);
                 return refused(format!(
                     "unknown key `{path}`; the nearest valid key is `{nearest}`"
                 ));
@@ -169,6 +164,23 @@ fn paths(table: &Table, prefix: &str) -> Vec<String> {
         }
     };
     table.iter().flat_map(path).collect()
+}
+
+/// The valid key that was most likely meant by `key`, which the section `valid` at `prefix` does not
+/// have: a slip of the fingers, one of that name in another section, else the nearest of the section.
+fn suggestion(root: &Table, valid: &Table, prefix: &str, key: &str) -> String {
+    let siblings: Vec<String> = valid.keys().cloned().collect();
+    if let Some(sibling) = close(key, &siblings) {
+        return format!("{prefix}{sibling}");
+    }
+    let (path, all) = (format!("{prefix}{key}"), paths(root, ""));
+    let namesakes = all.iter().filter(|path| path.rsplit('.').next() == Some(key));
+    let namesakes: Vec<String> = namesakes.cloned().collect();
+    match (namesakes.is_empty(), prefix.is_empty() || siblings.is_empty()) {
+        (false, _) => nearest(&path, &namesakes).to_owned(),
+        (true, true) => nearest(&path, &all).to_owned(),
+        (true, false) => format!("{prefix}{}", nearest(key, &siblings)),
+    }
 }
 
 /// The candidate that is a slip or two away from `key`, if there is one.

@@ -1,11 +1,15 @@
 //! The layers of a configuration: the file, what is set over it, and which of them is to blame.
 
+use std::path::Path;
+
 use toml::Table;
 
 use super::counts;
 use super::section::{Config, Profile};
+use super::sources::Sources;
 use super::{defaults, keys, model};
 use crate::error::{Error, Result};
+use crate::model::text::Origin;
 
 /// A document with the name that errors have for it.
 pub(super) type Layer = (String, Table);
@@ -53,7 +57,9 @@ impl Layers {
     fn merged(&self, taken: impl Fn(usize) -> bool, origin: &str) -> Result<Config> {
         let mut given = self.given(&taken);
         self.name_profile(&mut given);
-        let mut merged = defaults(&given, origin, self.text.as_deref())?;
+        // Of a setting, the file does not know the line.
+        let text = self.text.as_deref().filter(|_| origin == self.file.0);
+        let mut merged = defaults(&given, origin, text)?;
         let mut valid = keys::with_optional(&merged);
         keys::check_known(&valid, &self.file.1, &self.file.0)?;
         if model::is_described(&self.file.1) {
@@ -94,6 +100,14 @@ impl Layers {
         if let Some(profile) = self.profile {
             given.insert("profile".to_owned(), profile.name().into());
         }
+    }
+
+    /// Where the values of the configuration were written.
+    pub(super) fn sources(self) -> Sources {
+        let (name, given) = self.file;
+        let file = Origin::new(&name, Path::new(""));
+        let file = self.text.iter().fold(file, |file, text| file.with_text(text));
+        Sources { file: Some(file), given, sets: self.sets }
     }
 
     /// Whether the file or a set has the section `train`.

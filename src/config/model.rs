@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::plant::PolicySource;
 use super::profile;
 use super::section::{Config, PolicySection, Profile};
+use super::sources::UNNAMED;
 use crate::error::{Error, Result};
 use crate::model::Plant;
 use crate::model::text::{Origin, read_table};
@@ -80,7 +81,7 @@ impl Config {
             ("model".to_owned(), Value::Table(model.clone())),
             ("policy".to_owned(), Value::Table(section)),
         ]);
-        let described = read_table(&table, &Origin::new("configuration", folder))?;
+        let described = read_table(&table, &Origin::new(UNNAMED, folder))?;
         let controller = match network {
             Some(network) => described.controller_of(network)?,
             None => described.controller()?,

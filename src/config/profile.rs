@@ -5,6 +5,7 @@ use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection, SystemSection,
 };
+use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
@@ -169,6 +170,7 @@ fn common(
         },
         race: None,
         train: None,
+        sources: Sources::default(),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::experiment::settings::RaceSettings;
@@ -54,6 +55,9 @@ pub struct Config {
     /// Training; what a certificate or race stores of its configuration has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train: Option<TrainSettings>,
+    /// Where the values were written; nowhere for a configuration that was stored.
+    #[serde(skip)]
+    pub(super) sources: Sources,
 }
 
 /// Which defaults fill in what a file leaves out.

@@ -1,8 +1,10 @@
 //! A folder that holds the results of one piece of work, and says which.
 
-use std::path::Path;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 
-use super::{Staged, check_room};
+use super::made::Made;
+use super::{RECORD_BYTES, Staged, check_room, named, open, read_text};
 use crate::error::{Error, Result};
 
 /// Name of the file that says which work a folder holds.
@@ -60,21 +62,56 @@ const KINDS: [Kind; 4] = [
 /// Files that several kinds have: the page, and at last the manifest.
 const SHARED: [&str; 2] = ["report.html", MANIFEST];
 
-/// Makes sure that `folder` holds the work that `manifest` describes, or none, and has room for
-/// `need` bytes more, and says so in it.
+/// A folder that says which work it holds.
 ///
-/// # Errors
-/// [`Error::File`] if something else is there, [`Error::Write`] if the folder cannot be written,
-/// [`Error::NoRoom`].
-pub(crate) fn claim_folder(folder: &Path, manifest: &str, need: u64) -> Result<()> {
-    let mut staged = Staged::new(folder)?;
-    let claimed = is_free(folder, manifest)?;
-    check_room(folder, need)?;
-    if claimed == Claimed::Already {
-        return Ok(());
+/// Dropped before anything of the work is in it, it leaves the folder as it was.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    /// What this run wrote and made; none if the folder said so already.
+    own: Option<(PathBuf, Made)>,
+}
+
+impl Claim {
+    /// Makes sure that `folder` holds the work that `manifest` describes, or none, and has room for
+    /// `need` bytes more, and says so in it.
+    ///
+    /// # Errors
+    /// [`Error::File`] if something else is there, [`Error::Write`] if the folder cannot be written,
+    /// [`Error::NoRoom`].
+    pub(crate) fn new(folder: &Path, manifest: &str, need: u64) -> Result<Self> {
+        let folder = named(folder);
+        let made = Made::folder(folder)
+            .map_err(|source| Error::Write { path: folder.to_owned(), source })?;
+        let mut staged = Staged::new(folder)?;
+        let claimed = is_free(folder, manifest)?;
+        check_room(folder, need)?;
+        if claimed == Claimed::Already {
+            return Ok(Self { own: None });
+        }
+        staged.add(MANIFEST, manifest.as_bytes())?;
+        staged.publish()?;
+        Ok(Self { own: Some((folder.to_owned(), made)) })
     }
-    staged.add(MANIFEST, manifest.as_bytes())?;
-    staged.publish().map(drop)
+
+    /// Keeps the claim though nothing may be in the folder yet.
+    pub(crate) fn keep(&mut self) {
+        self.own = None;
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        let Some((folder, _)) = &self.own else { return };
+        for kind in &KINDS {
+            if let Some((name, _)) = kind.folder {
+                // One that holds something stays.
+                _ = std::fs::remove_dir(folder.join(name));
+            }
+        }
+        if found(folder).is_none() {
+            _ = std::fs::remove_file(folder.join(MANIFEST));
+        }
+    }
 }
 
 /// Whether a folder says already which work it holds.
@@ -92,10 +129,8 @@ pub(crate) enum Claimed {
 /// [`Error::File`] naming what else is there, and what to do; [`Error::Write`] if nothing can be.
 pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
     let path = folder.join(MANIFEST);
-    if path.metadata().is_ok_and(|about| !about.is_file()) {
-        return Err(Error::file(&path, "it is no file, which it has to be; give another --out"));
-    }
-    match std::fs::read_to_string(&path) {
+    spare_folders(folder)?;
+    match read_text(&path, RECORD_BYTES) {
         Ok(text) if text == manifest => return Ok(Claimed::Already),
         Ok(_) => {
             let problem = format!(
@@ -106,7 +141,10 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
             return Err(Error::file(&path, problem));
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(source) => return Err(Error::Write { path, source }),
+        Err(error) => {
+            let problem = format!("{error}; give another --out, or --overwrite to remove it");
+            return Err(Error::file(&path, problem));
+        }
     }
     match found(folder) {
         None => Ok(Claimed::NotYet),
@@ -115,6 +153,38 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
                 "something else is here, by its name of {words}; give another --out, or \
                  --overwrite to remove it"
             );
+            Err(Error::file(&folder.join(name), problem))
+        }
+    }
+}
+
+/// Refuses folders in the places of files of results, which nothing could replace.
+fn spare_folders(folder: &Path) -> Result<()> {
+    let files = KINDS.iter().flat_map(|kind| kind.files).chain(&SHARED);
+    files.map(|name| folder.join(name)).try_for_each(|path| spare_folder(&path))
+}
+
+/// Refuses a folder at `path`, where a file has to go.
+pub(super) fn spare_folder(path: &Path) -> Result<()> {
+    match path.symlink_metadata().is_ok_and(|about| about.is_dir()) {
+        true => {
+            let problem = "a folder is in the place of a file of the results; move it, or write to \
+                           another place";
+            Err(Error::file(path, problem))
+        }
+        false => Ok(()),
+    }
+}
+
+/// Refuses to write into `folder` where results of a piece of work are.
+///
+/// # Errors
+/// [`Error::File`] naming them, and what to do.
+pub(crate) fn spare_results(folder: &Path) -> Result<()> {
+    match found(folder) {
+        None => Ok(()),
+        Some((name, words)) => {
+            let problem = format!("something else is here, by its name of {words}; give another folder");
             Err(Error::file(&folder.join(name), problem))
         }
     }
@@ -135,6 +205,7 @@ fn found(folder: &Path) -> Option<(&'static str, &'static str)> {
 /// # Errors
 /// [`Error::Write`] if one cannot be removed.
 pub(crate) fn make_way(folder: &Path, manifest: &str) -> Result<()> {
+    spare_folders(folder)?;
     if is_free(folder, manifest).is_ok() {
         return Ok(());
     }
@@ -185,16 +256,34 @@ pub(crate) fn spare_existing(path: &Path, existing: Existing) -> Result<()> {
     Err(Error::file(path, "it is there already; give another name, or --overwrite to replace it"))
 }
 
-/// The same where `bytes` are to be written, which replace nothing if they are there already.
+/// The same where the file `written` is to take the place, which replaces nothing if its bytes are
+/// there already.
 ///
 /// # Errors
 /// As [`spare_existing`].
-pub(super) fn spare_other(path: &Path, bytes: &[u8], existing: Existing) -> Result<()> {
-    // A pipe would be waited for.
-    let is_file = path.symlink_metadata().is_ok_and(|about| about.is_file());
-    match is_file && std::fs::read(path).is_ok_and(|found| found == bytes) {
+pub(super) fn spare_other(path: &Path, written: &Path, existing: Existing) -> Result<()> {
+    let is_link = path.is_symlink();
+    match !is_link && same_bytes(path, written).unwrap_or(false) {
         true => Ok(()),
         false => spare_existing(path, existing),
+    }
+}
+
+/// Whether two plain files hold the same bytes.
+fn same_bytes(one: &Path, other: &Path) -> std::io::Result<bool> {
+    let (one, other) = (open(one)?, open(other)?);
+    if one.metadata()?.len() != other.metadata()?.len() {
+        return Ok(false);
+    }
+    let [mut one, mut other] = [one, other].map(BufReader::new);
+    loop {
+        let (here, there) = (one.fill_buf()?, other.fill_buf()?);
+        let count = here.len().min(there.len());
+        if count == 0 || here[..count] != there[..count] {
+            return Ok(here.is_empty() && there.is_empty());
+        }
+        one.consume(count);
+        other.consume(count);
     }
 }
 
@@ -228,13 +317,44 @@ mod tests {
     }
 
     #[test]
+    fn a_claim_without_work_leaves_the_folder_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let new = folder.path().join("new/inner");
+        drop(Claim::new(&new, "work", 0).unwrap());
+        assert!(!folder.path().join("new").exists());
+        drop(Claim::new(folder.path(), "work", 0).unwrap());
+        assert!(folder.path().exists() && !folder.path().join(MANIFEST).exists());
+        let claim = Claim::new(&new, "work", 0).unwrap();
+        std::fs::create_dir(new.join("races")).unwrap();
+        std::fs::write(new.join("races/a.npz"), "race").unwrap();
+        drop(claim);
+        assert!(new.join("races/a.npz").exists() && new.join(MANIFEST).exists());
+        std::fs::remove_file(new.join("races/a.npz")).unwrap();
+        // An earlier run's claim is not this one's to take back.
+        drop(Claim::new(&new, "work", 0).unwrap());
+        assert!(new.join(MANIFEST).exists());
+    }
+
+    #[test]
+    fn folders_in_the_places_of_files_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("results.json")).unwrap();
+        std::fs::write(folder.path().join("timing.json"), "mine").unwrap();
+        for refused in [is_free(folder.path(), "work").map(drop), make_way(folder.path(), "work")] {
+            let message = refused.unwrap_err().to_string();
+            assert!(message.contains("results.json: a folder"), "{message}");
+        }
+        assert!(folder.path().join("timing.json").exists());
+    }
+
+    #[test]
     fn every_kind_of_result_is_told_by_its_names() {
         for kind in &KINDS {
             for name in kind.files.iter().chain(&SHARED[..1]) {
                 let folder = tempfile::tempdir().unwrap();
                 is_free(folder.path(), "work").unwrap();
                 std::fs::write(folder.path().join(name), "mine").unwrap();
-                assert!(claim_folder(folder.path(), "work", 0).is_err(), "{name}");
+                assert!(Claim::new(folder.path(), "work", 0).is_err(), "{name}");
                 assert_eq!(std::fs::read(folder.path().join(name)).unwrap(), b"mine");
             }
         }

@@ -9,7 +9,7 @@ use super::settings::Settings;
 use super::{deviation, global, growth, sampling, verify};
 use crate::error::Result;
 use crate::model::{Model, Plant};
-use crate::rollout::{GENERATOR, StateList};
+use crate::rollout::{GENERATOR, HUGE, StateList};
 
 /// `stored` with everything that follows from `settings` and its own counts computed again: claims,
 /// intervals, constants, the ledger, margins of the states, words. What rollouts came to is taken
@@ -78,6 +78,7 @@ pub(super) fn statements(
         claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
     statements.insert(2, share_statement(global, settings));
     statements.extend(growth_statement(growth));
+    statements.extend(broken_statement(deviation));
     statements
 }
 
@@ -107,6 +108,17 @@ fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
         global.accepted,
         global.draws
     )
+}
+
+/// That rollouts of the deviation bound met states that are not finite.
+fn broken_statement(deviation: &DeviationRecord) -> Option<String> {
+    let (broken, pairs) = (deviation.non_finite, deviation.claim.scenarios);
+    (broken > 0).then(|| {
+        format!(
+            "The deviation bound is none: {broken} of {pairs} pairs met a state that is not finite, \
+             which counts as a distance of {HUGE:e}; no claim follows from it."
+        )
+    })
 }
 
 /// What came of the growth, where it is not a claim.

@@ -106,9 +106,10 @@ impl Sweep<'_> {
     /// SHA-256 of a point that can be certified.
     fn checked(&self, values: &Values) -> Result<String> {
         let (config, policy, rule) = self.point(values)?;
-        let plant = config.plant(&policy)?;
-        let (settings, stored) = counted(&config, &plant, rule)?;
-        check_settings(&settings)?;
+        let blamed = |error| self.grid.blamed(error, values);
+        let plant = config.plant(&policy).map_err(blamed)?;
+        let (settings, stored) = counted(&config, &plant, rule).map_err(blamed)?;
+        check_settings(&settings).map_err(|error| blamed(config.placed(error)))?;
         let program = self.backend.prepare(&plant)?;
         Ok(certificate_sha256(&program, settings.seed, stored))
     }

@@ -1,6 +1,7 @@
 //! The figures of the report, one per file.
 
 mod certified;
+mod course;
 mod deviation;
 mod growth;
 mod paths;
@@ -25,9 +26,13 @@ pub(super) fn all(record: &Record) -> [Figure; 5] {
     ]
 }
 
-/// Said where the arrays of a slice do not fit its axes.
-fn no_slice() -> Result<String, String> {
-    Err("The record holds no slice that can be drawn.".to_owned())
+/// Said where there is one state alone, or where the arrays of a slice do not fit its axes.
+fn no_slice(record: &Record) -> Result<String, String> {
+    let reason = match record.system.states.len() {
+        1 => "A slice shows two states, and the system has one.",
+        _ => "The record holds no slice that can be drawn.",
+    };
+    Err(reason.to_owned())
 }
 
 /// Path data of all zero lines of a field.
