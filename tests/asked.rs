@@ -96,7 +96,7 @@ fn settings_are_blamed_by_their_own_name() {
     certify(&["deviation.joint=all", "seed=3"], &["error: --set deviation.joint=all: "], "mine");
     certify(&["system.name=dubins"], &["error: --set system.name=dubins: "], "mine.toml");
     certify(&["profile=fast"], &["error: --set profile=fast: ", "rigorous"], "mine.toml");
-    certify(&["policy.file=x"], &["error: policy: both"], "");
+    certify(&["policy.file=x"], &["error: --set policy.file=x: policy: both"], "");
     // What is wrong in the file stays its own, whatever is set over other keys.
     std::fs::write(&config, "system.name = 'double-integrator'\nseed = 'one'\n").unwrap();
     certify(&["rollout.horizon=20"], &["mine.toml", "seed"], "");

@@ -95,7 +95,8 @@ fn certificates_are_plain_files() {
     refuses(&file("certificate.json"), &["check", &out]);
     refuses(&file("report.html"), &["check", &out]);
     refuses(&file("slice.npy"), &["check", &out]);
-    let again: Vec<&str> = certify.iter().copied().filter(|a| !["--backend", "cpu", "-q"].contains(a)).collect();
+    let again: Vec<&str> =
+        certify.iter().copied().filter(|a| !["--backend", "cpu", "-q"].contains(a)).collect();
     refuses(&file("experiment.json"), &again);
     done(&["check", &out, "--backend", "cpu", "-q"]);
 }

@@ -626,7 +626,8 @@ fn only_the_gpu_backend_names_wgpu() {
 /// Elsewhere a pipe would be waited for, and a device read until memory ends.
 #[test]
 fn only_one_file_reads_files() {
-    let ways = ["fs::read(", "fs::read)", "fs::{read", "read_to_string", "File::open", "OpenOptions"];
+    let ways =
+        ["fs::read(", "fs::read)", "fs::{read", "read_to_string", "File::open", "OpenOptions"];
     let mut inside = 0;
     for (name, code) in sources() {
         let code = code.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();

@@ -122,8 +122,9 @@ fn check_level(
             (Some(Value::Table(_)), _) => {
                 return refused(format!("`{path}` is a section, not a value"));
             }
-            (Some(default), _) if prefix == "system." && !same_kind(default, value) => {
-                // A section that is read by its `name` does not say which key was wrong.
+            (Some(default), _) if of_one_kind(&path) && !same_kind(default, value) => {
+                // A section that is read by its `name` does not say which key was wrong, nor a list
+                // of words what was expected.
                 let expected = default.type_str();
                 return refused(format!("`{path}` is {value}, expected a {expected}"));
             }
@@ -147,6 +148,11 @@ pub(super) fn check_finite(path: &str, value: &Value) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Whether all values of the key `path` are of the kind of its default.
+fn of_one_kind(path: &str) -> bool {
+    path.starts_with("system.") || path.starts_with("deviation.") || path == "growth.boundary"
 }
 
 /// Whether `value` can stand where `default` stands; a whole number is a float too.

@@ -131,7 +131,10 @@ pub struct PolicySection {
 
 /// A policy that is a formula.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected the name of a formula, or a section with a formula for each control"
+)]
 pub enum FormulaSection {
     /// One that the program carries, by name.
     Name(String),

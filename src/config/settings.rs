@@ -132,7 +132,12 @@ impl Config {
             Coordinates::Named(names) => {
                 let mut varies = vec![false; axes.len()];
                 for name in names {
-                    varies[state_index(place, name, axes)?] = true;
+                    let state = state_index(place, name, axes)?;
+                    if varies[state] {
+                        let problem = format!("`{name}` is there twice; name each state once");
+                        return Err(Error::invalid(place, problem));
+                    }
+                    varies[state] = true;
                 }
                 Ok(varies)
             }

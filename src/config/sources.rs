@@ -10,8 +10,20 @@ use crate::model::text::Origin;
 pub(super) const UNNAMED: &str = "configuration";
 /// Sections and keys that a configuration begins with.
 const SECTIONS: [&str; 14] = [
-    "profile", "seed", "system", "model", "policy", "rollout", "box", "constants", "deviation",
-    "global", "slice", "state", "growth", "race",
+    "profile",
+    "seed",
+    "system",
+    "model",
+    "policy",
+    "rollout",
+    "box",
+    "constants",
+    "deviation",
+    "global",
+    "slice",
+    "state",
+    "growth",
+    "race",
 ];
 
 /// The file and the settings over it; neither for a configuration that was stored.
@@ -63,7 +75,8 @@ fn is_key(path: &str) -> bool {
 
 /// Whether `table` has the dotted key `path`.
 fn has(table: &Table, path: &str) -> bool {
-    let (first, rest) = path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)));
+    let (first, rest) =
+        path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)));
     match (table.get(first), rest) {
         (None, _) => false,
         (Some(_), None) => true,

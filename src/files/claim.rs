@@ -129,7 +129,7 @@ pub(crate) enum Claimed {
 /// [`Error::File`] naming what else is there, and what to do; [`Error::Write`] if nothing can be.
 pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
     let path = folder.join(MANIFEST);
-    spare_folders(folder)?;
+    spare_others(folder)?;
     match read_text(&path, RECORD_BYTES) {
         Ok(text) if text == manifest => return Ok(Claimed::Already),
         Ok(_) => {
@@ -158,10 +158,20 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
     }
 }
 
-/// Refuses folders in the places of files of results, which nothing could replace.
-fn spare_folders(folder: &Path) -> Result<()> {
+/// Refuses folders in the places of files of results, and the other way round: nothing could replace
+/// them.
+fn spare_others(folder: &Path) -> Result<()> {
     let files = KINDS.iter().flat_map(|kind| kind.files).chain(&SHARED);
-    files.map(|name| folder.join(name)).try_for_each(|path| spare_folder(&path))
+    files.map(|name| folder.join(name)).try_for_each(|path| spare_folder(&path))?;
+    for (name, _) in KINDS.iter().filter_map(|kind| kind.folder) {
+        let path = folder.join(name);
+        if path.symlink_metadata().is_ok_and(|about| !about.is_dir() && !about.is_symlink()) {
+            let problem = "a file is in the place of a folder of the results; move it, or write to \
+                           another place";
+            return Err(Error::file(&path, problem));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a folder at `path`, where a file has to go.
@@ -184,7 +194,8 @@ pub(crate) fn spare_results(folder: &Path) -> Result<()> {
     match found(folder) {
         None => Ok(()),
         Some((name, words)) => {
-            let problem = format!("something else is here, by its name of {words}; give another folder");
+            let problem =
+                format!("something else is here, by its name of {words}; give another folder");
             Err(Error::file(&folder.join(name), problem))
         }
     }
@@ -194,10 +205,18 @@ pub(crate) fn spare_results(folder: &Path) -> Result<()> {
 fn found(folder: &Path) -> Option<(&'static str, &'static str)> {
     let is_there = |name: &str| folder.join(name).symlink_metadata().is_ok();
     let of_kind = KINDS.iter().find_map(|kind| {
-        let name = kind.files.iter().copied().chain(kind.folder.map(|(name, _)| name));
-        name.into_iter().find(|name| is_there(name)).map(|name| (name, kind.words))
+        let inner = kind.folder.filter(|(name, endings)| holds(&folder.join(name), endings));
+        let file = kind.files.iter().copied().find(|name| is_there(name));
+        file.or(inner.map(|(name, _)| name)).map(|name| (name, kind.words))
     });
     of_kind.or_else(|| is_there(SHARED[0]).then_some((SHARED[0], "a report")))
+}
+
+/// Whether `folder` is a link or has files whose names end so.
+fn holds(folder: &Path, endings: &[&str]) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let ends = |name: &str| endings.iter().any(|ending| name.ends_with(ending));
+    folder.is_symlink() || entries.any(|entry| ends(&entry.file_name().to_string_lossy()))
 }
 
 /// Removes the results of other work than `manifest` describes from `folder`, and nothing else.
@@ -205,7 +224,7 @@ fn found(folder: &Path) -> Option<(&'static str, &'static str)> {
 /// # Errors
 /// [`Error::Write`] if one cannot be removed.
 pub(crate) fn make_way(folder: &Path, manifest: &str) -> Result<()> {
-    spare_folders(folder)?;
+    spare_others(folder)?;
     if is_free(folder, manifest).is_ok() {
         return Ok(());
     }
@@ -250,6 +269,7 @@ fn remove(path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::File`] naming it, and what to do.
 pub(crate) fn spare_existing(path: &Path, existing: Existing) -> Result<()> {
+    spare_folder(path)?;
     if existing == Existing::Replaced || path.symlink_metadata().is_err() {
         return Ok(());
     }
@@ -309,6 +329,8 @@ mod tests {
         assert!(results.iter().all(|name| !at(name).exists()));
         assert!(others.iter().all(|name| at(name).exists()));
         assert!(!at("points").exists() && at("races").exists());
+        // What is left is nobody's results.
+        is_free(folder.path(), "work").unwrap();
         // The work's own results stay.
         std::fs::write(at(MANIFEST), "work").unwrap();
         std::fs::write(at("results.json"), "mine").unwrap();
@@ -336,15 +358,23 @@ mod tests {
     }
 
     #[test]
-    fn folders_in_the_places_of_files_are_refused() {
+    fn folders_in_the_places_of_files_are_refused_and_files_in_those_of_folders() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("results.json")).unwrap();
         std::fs::write(folder.path().join("timing.json"), "mine").unwrap();
-        for refused in [is_free(folder.path(), "work").map(drop), make_way(folder.path(), "work")] {
-            let message = refused.unwrap_err().to_string();
-            assert!(message.contains("results.json: a folder"), "{message}");
-        }
-        assert!(folder.path().join("timing.json").exists());
+        let refused = |words: &str| {
+            for refused in
+                [is_free(folder.path(), "work").map(drop), make_way(folder.path(), "work")]
+            {
+                let message = refused.unwrap_err().to_string();
+                assert!(message.contains(words), "{message}");
+            }
+            assert!(folder.path().join("timing.json").exists());
+        };
+        refused("results.json: a folder");
+        std::fs::remove_dir(folder.path().join("results.json")).unwrap();
+        std::fs::write(folder.path().join("points"), "mine").unwrap();
+        refused("points: a file");
     }
 
     #[test]

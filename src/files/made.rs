@@ -12,9 +12,9 @@ impl Made {
     /// # Errors
     /// Those of the system.
     pub(super) fn folder(folder: &Path) -> std::io::Result<Self> {
-        let missing = folder.ancestors().take_while(|above| {
-            !above.as_os_str().is_empty() && above.symlink_metadata().is_err()
-        });
+        let missing = folder
+            .ancestors()
+            .take_while(|above| !above.as_os_str().is_empty() && above.symlink_metadata().is_err());
         let made = Self(missing.map(Path::to_owned).collect());
         std::fs::create_dir_all(folder)?;
         Ok(made)

@@ -90,7 +90,10 @@ mod tests {
     fn what_never_ends_is_not_read() {
         // Of a file of the kernel, the size is told as 0.
         assert!(!read_text(Path::new("/proc/self/status"), 1 << 20).unwrap().is_empty());
-        assert_eq!(read(Path::new("/proc/self/status"), 9).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        assert_eq!(
+            read(Path::new("/proc/self/status"), 9).unwrap_err().kind(),
+            ErrorKind::FileTooLarge
+        );
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("link");
         std::os::unix::fs::symlink("/dev/zero", &link).unwrap();

@@ -59,9 +59,15 @@ impl Mlp {
             layers.push(read_layer(&tensors, layers.len())?);
         }
         refuse_others(&tensors, layers.len())?;
-        let mlp = Self { layers: layers.into(), activation, output, state_order };
+        let mlp = Self { layers: layers.into(), activation, output, state_order: None };
         mlp.validate()?;
-        Ok(mlp)
+        match state_order {
+            None => Ok(mlp),
+            Some(names) => mlp.with_state_order(names).map_err(|error| match error {
+                Error::Invalid { problem, .. } => format!("metadata `state_order` {problem}"),
+                other => other.to_string(),
+            }),
+        }
     }
 
     /// The bytes of its safetensors file, the same for the same network.

@@ -11,7 +11,7 @@ use super::table::table;
 use crate::backend::Event;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{RECORD_BYTES, Claim, Staged, json, make_way, read_text};
+use crate::files::{Claim, RECORD_BYTES, Staged, json, make_way, read_text};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);

@@ -46,8 +46,7 @@ fn bodies(record: &Record) -> Vec<Body> {
 /// Whether the slice's margins are in the plane of the first body.
 fn overlaid(record: &Record, bodies: &[Body]) -> bool {
     let states = slice_states(record);
-    only_state(record).is_none()
-        && bodies.first().is_some_and(|body| [body.x, body.y] == states)
+    only_state(record).is_none() && bodies.first().is_some_and(|body| [body.x, body.y] == states)
 }
 
 fn class(body: usize, success: bool) -> String {

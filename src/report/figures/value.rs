@@ -20,7 +20,13 @@ const BAR: f64 = 12.0;
 pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
     let Some(grid) = grid else {
         let caption = "Tier and V_check of the state are among the numbers below.".to_owned();
-        return Figure { id: ID, title: TITLE.to_owned(), drawing: no_slice(record), legend: Vec::new(), caption };
+        return Figure {
+            id: ID,
+            title: TITLE.to_owned(),
+            drawing: no_slice(record),
+            legend: Vec::new(),
+            caption,
+        };
     };
     let mut legend = vec![
         (Swatch::Line("zero"), "V_check = 0: boundary of the certified set".to_owned()),
