@@ -250,7 +250,11 @@ fn size_is_refused_in_no_time() {
     assert!(refusal(&long).contains("bytes, at most 1048576 are read"), "{}", refusal(&long));
     let brackets = format!("{}x{}", "(".repeat(10_000), ")".repeat(10_000));
     assert_refused("pull / mass", &brackets, &["model.flow.speed, column 257", "deeper than 256"]);
-    assert_refused("substeps = 2", "substeps = 4000000000", &["model.flow", "at most 65536"]);
+    assert_refused(
+        "substeps = 2",
+        "substeps = 4000000000",
+        &["model.time.substeps", "at most 65536"],
+    );
     let sums = vec!["x"; 10_000].join("+");
     assert_refused("pull / mass", &sums, &["model.flow", "operations in all, at most 65536"]);
     // Each doubles the one before: nodes are shared, nothing grows.
