@@ -143,9 +143,9 @@ fn settings_are_blamed_by_their_own_name() {
     let text = "system.name = 'double-integrator'\npolicy.formula = 'bang-bang'\n\
                 slice.x.step = 1e-9\ngrowth.rounds = 3\n";
     std::fs::write(&config, text).unwrap();
-    certify(&[], &["mine.toml:3: slice.x: 2000000000 values"], "");
+    certify(&[], &["mine.toml:3: slice.x: 2400000000 values"], "");
     certify(&["slice.x.step=0.1", "growth.rounds=0"], &["error: --set growth.rounds=0: 0"], "mine");
-    certify(&["slice.y.state=position"], &["--set slice.y.state=position", "2000000000"], "");
+    certify(&["slice.y.state=position"], &["slice.x: 2400000000 values"], "");
     std::fs::write(&config, "system.name = 'double-integrator'\n").unwrap();
     certify(&[], &["mine.toml: policy: no policy"], "");
     // The nearest key is one of the same section.

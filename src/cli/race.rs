@@ -62,11 +62,12 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
         config: input.config.to_json()?,
         folder: out.clone(),
     };
+    let placed = |error| input.config.placed(error);
     if global.existing == Existing::Replaced {
-        experiment.make_way()?;
+        experiment.make_way().map_err(placed)?;
     }
     estimate(global, &experiment);
-    let (record, controllers) = experiment.run(&progress)?;
+    let (record, controllers) = experiment.run(&progress).map_err(placed)?;
     progress.finish();
     devices::note_events(global, &backend);
     let wall_seconds = begun.elapsed().as_secs_f64();

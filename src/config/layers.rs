@@ -70,13 +70,23 @@ impl Layers {
         }
         keys::overlay(&mut merged, given);
         for section in ["race", "train"] {
-            merged.get(section).map_or(Ok(()), |keys| keys::check_finite(section, keys))?;
+            let checked = merged.get(section).map(|keys| keys::check_finite(section, keys));
+            checked.unwrap_or(Ok(())).map_err(|error| self.placed(error, origin))?;
         }
         // Without a source text, the message ends with a line that names the key.
         let wrong_kind = |e: toml::de::Error| {
             Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
         };
         merged.try_into().map_err(wrong_kind)
+    }
+
+    /// `error` about a key, by the layer `origin`, with the line where that is the file.
+    fn placed(&self, error: Error, origin: &str) -> Error {
+        let Error::Invalid { place, problem } = error else { return error };
+        let file = Origin::new(origin, Path::new(""));
+        let text = self.text.iter().filter(|_| origin == self.file.0);
+        let file = text.fold(file, |file, text| file.with_text(text));
+        Error::Invalid { place: format!("{}: {place}", file.place(&place)), problem }
     }
 
     /// The file with the sets over it whose numbers are `taken`.

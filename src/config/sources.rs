@@ -9,7 +9,7 @@ use crate::model::text::Origin;
 /// What errors about a described plant call the configuration where its text is not at hand.
 pub(super) const UNNAMED: &str = "configuration";
 /// Sections and keys that a configuration begins with.
-const SECTIONS: [&str; 14] = [
+const SECTIONS: [&str; 15] = [
     "profile",
     "seed",
     "system",
@@ -24,6 +24,7 @@ const SECTIONS: [&str; 14] = [
     "state",
     "growth",
     "race",
+    "train",
 ];
 
 /// The file and the settings over it; neither for a configuration that was stored.

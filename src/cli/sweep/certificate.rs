@@ -120,7 +120,8 @@ impl Sweep<'_> {
         let plant = config.plant(&policy)?;
         let (settings, stored) = counted(&config, &plant, rule)?;
         let program = self.backend.prepare(&plant)?;
-        let point = certificate_point(&program, &settings, stored, progress)?;
+        let point = certificate_point(&program, &settings, stored, progress);
+        let point = point.map_err(|error| self.grid.blamed(config.placed(error), values))?;
         Ok(PointResult::Certificate(point))
     }
 }

@@ -133,7 +133,7 @@ impl<'a> Section<'a> {
 
     /// The value at `key` as it was written.
     pub(super) fn written(&self, key: &str) -> String {
-        self.table.get(key).map_or_else(String::new, ToString::to_string)
+        self.table.get(key).map_or_else(String::new, written)
     }
 
     /// The refusal of a value of the wrong kind.
@@ -167,6 +167,17 @@ fn number(value: &Value) -> Option<f32> {
         Value::Float(number) => Some(*number as f32),
         Value::Integer(number) => Some(*number as f32),
         _ => None,
+    }
+}
+
+/// A value as it was written, a large or small number with its exponent.
+fn written(value: &Value) -> String {
+    match value {
+        Value::Float(number) => format!("{number:?}"),
+        Value::Array(list) => {
+            format!("[{}]", list.iter().map(written).collect::<Vec<_>>().join(", "))
+        }
+        other => other.to_string(),
     }
 }
 

@@ -81,7 +81,7 @@ impl Description {
         let formulas = Formulas::new(self, formulas);
         // Counted before anything is recorded: millions of substeps would fill the memory.
         let once = formulas.operations() + formulas.formulas.len();
-        self.check_size(path, once)?;
+        self.check_size(path, once.saturating_mul(stages / self.substeps()))?;
         self.check_size(SUBSTEPS, once.saturating_mul(stages))?;
         let graph = record(self.inputs(), |inputs| {
             let inputs = self.clipped(inputs);
@@ -92,6 +92,14 @@ impl Description {
         });
         self.check_size(path, graph.nodes.len())?;
         Ok(graph)
+    }
+
+    /// Substeps of a step, 1 where it is not integrated.
+    fn substeps(&self) -> usize {
+        match &self.dynamics {
+            Dynamics::Next(_) => 1,
+            Dynamics::Flow(_, rule) => (rule.substeps as usize).max(1),
+        }
     }
 
     /// The inputs with every control within its bounds.
