@@ -1,6 +1,6 @@
 //! A folder that holds the results of one piece of work, and says which.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::made::Made;
@@ -140,7 +140,8 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
             );
             return Err(Error::file(&path, problem));
         }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        // That a file is in the place of the folder, who writes to it says.
+        Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {}
         Err(error) => {
             let problem = format!("{error}; give another --out, or --overwrite to remove it");
             return Err(Error::file(&path, problem));
