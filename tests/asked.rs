@@ -77,6 +77,41 @@ fn options_of_every_command_are_taken_everywhere() {
     }
 }
 
+/// Every document says which layout it has.
+#[test]
+fn every_document_has_the_version_of_its_layout() {
+    let folder = Folder::new();
+    let at = |name: &str| folder.path(name);
+    std::fs::write(at("s.csv"), "0.5,0\n").unwrap();
+    let (states, cert, race) = (at("s.csv"), at("cert"), at("race"));
+    let small = "--set global.draws=500 --set slice.x.step=0.5 --set slice.y.step=0.5";
+    let commands = [
+        "devices".to_owned(),
+        "scenarios --epsilon 0.1 --beta 1e-3".to_owned(),
+        format!("policy inspect {POLICY}"),
+        format!("policy import tests/fixtures/checkpoints/silu.onnx --out {}", at("p.safetensors")),
+        format!("rollout {LINE} --starts {states} --measures {}", at("m.csv")),
+        format!("certify {LINE} --out {cert} {small}"),
+        format!("query {cert} --states {states}"),
+        format!("query {cert} --states {states} --out {}", at("answers")),
+        format!("check {cert}"),
+        format!("race {SMOKE} --starts 2 --controllers mppi --set race.steps=2 --out {race}"),
+        format!("sweep {LINE} --of certificate --radius 0.02 --out {} {small}", at("sweep")),
+        format!("bench --export {}", at("export")),
+    ];
+    for command in &commands {
+        let words: Vec<&str> = command.split_whitespace().chain(["--backend", "cpu"]).collect();
+        assert!(document(&words)["schema"].as_u64().is_some_and(|schema| schema > 0), "{command}");
+    }
+    for file in
+        ["cert/certificate.json", "race/results.json", "race/timing.json", "sweep/sweep.json"]
+    {
+        let text = std::fs::read_to_string(at(file)).unwrap();
+        let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert!(document["schema"].is_u64(), "{file}");
+    }
+}
+
 #[test]
 fn settings_are_blamed_by_their_own_name() {
     let folder = Folder::new();
@@ -97,7 +132,7 @@ fn settings_are_blamed_by_their_own_name() {
     certify(&["deviation.joint=all", "seed=3"], &["error: --set deviation.joint=all: "], "mine");
     certify(&["system.name=dubins"], &["error: --set system.name=dubins: "], "mine.toml");
     certify(&["profile=fast"], &["error: --set profile=fast: ", "rigorous"], "mine.toml");
-    certify(&["policy.file=x"], &["error: policy: both"], "");
+    certify(&["policy.file=x"], &["error: --set policy.file=x: policy: both"], "");
     // What is wrong in the file stays its own, whatever is set over other keys.
     std::fs::write(&config, "system.name = 'double-integrator'\nseed = 'one'\n").unwrap();
     certify(&["rollout.horizon=20"], &["mine.toml", "seed"], "");
@@ -105,6 +140,17 @@ fn settings_are_blamed_by_their_own_name() {
     certify(&[], &["mine.toml: system", "[system]"], "");
     std::fs::write(&config, "profile = 3\nsystem.name = 'double-integrator'\n").unwrap();
     certify(&[], &["mine.toml: profile", "3 is no text"], "");
+    // What shows only once it is used has its line, or the setting.
+    let text = "system.name = 'double-integrator'\npolicy.formula = 'bang-bang'\n\
+                slice.x.step = 1e-9\ngrowth.rounds = 3\n";
+    std::fs::write(&config, text).unwrap();
+    certify(&[], &["mine.toml:3: slice.x: 2400000000 values"], "");
+    certify(&["slice.x.step=0.1", "growth.rounds=0"], &["error: --set growth.rounds=0: 0"], "mine");
+    certify(&["slice.y.state=position"], &["slice.x: 2400000000 values"], "");
+    std::fs::write(&config, "system.name = 'double-integrator'\n").unwrap();
+    certify(&[], &["mine.toml: policy: no policy"], "");
+    // The nearest key is one of the same section.
+    certify(&["state.x=1"], &["--set state.x=1: ", "`state.position`"], "mine.toml");
 }
 
 /// The pairs and the starts of a round that a configuration comes to.
@@ -269,7 +315,8 @@ fn answers_say_what_they_are_about() {
     assert_eq!(record["gamma"], 0.95);
     let text = serde_json::to_string(&record["provenance"]["config"]).unwrap();
     assert!(!text.contains("00000"), "a number of f32 as it was written: {text}");
-    let rows = document(&["query", &out, "--states", &states, "--backend", "cpu"]);
+    let answers = document(&["query", &out, "--states", &states, "--backend", "cpu"]);
+    let rows = &answers["rows"];
     assert_eq!((&rows[0]["index"], &rows[1]["index"]), (&0.into(), &1.into()));
 }
 

@@ -115,7 +115,7 @@ fn a_certificate_is_written_queried_and_checked() {
     let output = reachcast(&["query", dir, "--states", states, "--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(rows[0]["tier"], record["state"]["tier"]);
+    assert_eq!(rows["rows"][0]["tier"], record["state"]["tier"]);
     let plain = text(&reachcast(&["query", dir, "--states", states]).stdout);
     assert!(plain.starts_with("index,tier,check_margin,target_margin\n0,"), "{plain}");
     let answers = folder.path().join("answers");

@@ -234,7 +234,7 @@ fn a_limit_on_files_is_told() {
     let out = folder.path("out");
     limited(&format!("certify {SMOKE} --backend cpu --out {out}"));
     assert!(!Path::new(&measures).exists());
-    assert_eq!(fs::read_dir(&out).unwrap().count(), 0);
+    assert!(!Path::new(&out).exists());
 }
 
 /// The first interruption ends the work at the next chance, the second the program at once.

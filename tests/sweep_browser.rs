@@ -177,3 +177,25 @@ fn what_has_no_number_is_sorted_last_both_ways() {
         assert_eq!(cells, expected);
     }
 }
+
+/// Paper does not scroll, and nothing on it is unfolded. US letter and A4 on their side are 960 pixels
+/// wide and more.
+#[test]
+fn printed_pages_are_whole() {
+    if !browser() {
+        return;
+    }
+    let mut long = sweeps::races();
+    long.axes[2].name = "a-name-without-any-place-to-break-it".repeat(2);
+    for record in [sweeps::races(), sweeps::certificates(), long] {
+        let mut live = Live::open(&sweep_html(&record), [960, 900]);
+        live.print();
+        let cut = "[...document.querySelectorAll('.scroll, pre')].filter(e => \
+                   e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1).length";
+        assert_eq!(live.value(cut), 0);
+        let folded = "[...document.querySelectorAll('details > :not(summary)')]\
+                      .filter(e => !e.checkVisibility() || e.getBoundingClientRect().height < 1).length";
+        assert_eq!(live.value(folded), 0);
+        assert_eq!(live.value("document.querySelectorAll('.scroll.tall, details').length"), 2);
+    }
+}

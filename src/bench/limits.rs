@@ -1,6 +1,7 @@
 //! What the machine can do at most: matrix products, memory, and the way to an adapter and back.
 
 use std::hint::black_box;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
@@ -8,6 +9,7 @@ use super::measure::{Protocol, Timing, measure};
 use crate::backend::Backend;
 use crate::backend::gpu::DeviceLimits;
 use crate::error::Result;
+use crate::files::{CONFIG_BYTES, read_text};
 use crate::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
 use crate::system::{BangBang, DoubleIntegrator};
 
@@ -155,7 +157,7 @@ pub fn multiply(y: &mut [f32], w: &[f32], x: &[f32], [outputs, inputs, lanes]: [
 fn largest_cache() -> usize {
     let size = |index: usize| {
         let path = format!("/sys/devices/system/cpu/cpu0/cache/index{index}/size");
-        let kibibytes = std::fs::read_to_string(path).ok()?;
+        let kibibytes = read_text(Path::new(&path), CONFIG_BYTES).ok()?;
         kibibytes.trim().strip_suffix('K')?.parse::<usize>().ok().map(|size| size << 10)
     };
     (0..8).filter_map(size).max().unwrap_or(0)

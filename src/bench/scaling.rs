@@ -1,12 +1,14 @@
 //! Batches of growing size in one process: time should grow linearly, memory not at all.
 
 use std::hint::black_box;
+use std::path::Path;
 
 use super::measure::{Protocol, measure};
 use super::record::ScalingRecord;
 use super::workload::Batch;
 use crate::backend::{Backend, Program};
 use crate::error::Result;
+use crate::files::{CONFIG_BYTES, read_text};
 use crate::rollout::{Query, ReachAvoidTask, Starts, Tightening};
 use crate::scenario::Watch;
 
@@ -64,7 +66,7 @@ fn reset_peak() {
 
 /// Most memory that the process held since the last reset, bytes; where the system tells.
 fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let status = read_text(Path::new("/proc/self/status"), CONFIG_BYTES).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kibibytes| kibibytes << 10)
 }

@@ -8,12 +8,12 @@ use serde::Serialize;
 use super::args::BenchArguments;
 use super::options::Global;
 use super::progress::Progress;
-use super::{Outcome, devices, report};
+use super::{Outcome, devices, document, report};
 use crate::bench::measure::Timing;
 use crate::bench::record::{BenchRecord, KernelRecord, ScalingRecord, WorkloadRecord};
 use crate::bench::run::{self as benchmark, Asked};
 use crate::error::Result;
-use crate::files::{Staged, check_room, json, spare_existing};
+use crate::files::{Staged, check_room, json, spare_existing, spare_results};
 use crate::studies;
 
 /// Room for the record, bytes.
@@ -32,7 +32,10 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     let threads = global.common.threads.map(usize::from);
     let asked = Asked { quick: asked.quick, filter: asked.workload.clone(), seed, threads };
     let progress = Progress::new(global);
-    global.out.as_ref().map_or(Ok(()), |out| spare_existing(&out.join(RECORD), global.existing))?;
+    if let Some(out) = &global.out {
+        spare_results(out)?;
+        spare_existing(&out.join(RECORD), global.existing)?;
+    }
     // Before the work: a folder that cannot be written to would waste it.
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     global.out.as_deref().map_or(Ok(()), |out| check_room(out, RECORD_BYTES))?;
@@ -57,10 +60,12 @@ struct Exported {
 
 /// Writes what the workloads run on.
 fn write_out(global: &Global, seed: u64, folder: &Path) -> Result<Outcome> {
+    spare_results(folder)?;
     let files = studies::export(&devices::open(global)?, seed, folder, global.existing)?;
     let files = files.iter().map(|file| file.display().to_string()).collect();
     let exported = Exported { seed, files };
-    report(global, &exported, || exported.files.iter().map(|file| format!("{file}\n")).collect())?;
+    let lines = || exported.files.iter().map(|file| format!("{file}\n")).collect();
+    report(global, &document(&exported), lines)?;
     Ok(Outcome::Done)
 }
 

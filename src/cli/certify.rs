@@ -74,7 +74,7 @@ impl Certify<'_> {
     /// The certificate, and the folder that its files are staged for.
     fn run(self, plant: &Plant) -> Result<(Record, Staged)> {
         let settings = self.config.settings(&plant.model.states)?;
-        check_settings(&settings)?;
+        check_settings(&settings).map_err(|error| self.config.placed(error))?;
         let stored = self.config.to_json()?;
         if self.global.existing == Existing::Kept {
             is_free(self.out, self.manifest)?;
@@ -85,7 +85,8 @@ impl Certify<'_> {
         let staged = Staged::new(self.out)?;
         check_room(self.out, estimate(&settings))?;
         let program = backend.prepare(plant)?;
-        let mut record = scenario::certify(&program, &settings, stored, &progress)?;
+        let record = scenario::certify(&program, &settings, stored, &progress);
+        let mut record = record.map_err(|error| self.config.placed(error))?;
         record.timing.threads = devices::threads(self.global);
         devices::note_events(self.global, &backend);
         progress.check()?;

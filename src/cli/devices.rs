@@ -5,7 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use super::options::{BackendName, Global};
-use super::{Outcome, report};
+use super::{Outcome, document, report};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{Adapter, Choice, Gpu, adapters, has_hardware};
@@ -100,7 +100,7 @@ pub(crate) fn list(global: &Global) -> Result<Outcome> {
     let chosen = adapters.iter().find(|adapter| adapter.is_hardware());
     let auto = chosen.map_or("cpu".to_owned(), |adapter| adapter.name.clone());
     let listing = Listing { cpu, adapters, auto };
-    report(global, &listing, || {
+    report(global, &document(&listing), || {
         let mut text = format!("cpu  {}\n", listing.cpu);
         for adapter in &listing.adapters {
             text += &format!("gpu  {adapter}\n");

@@ -24,7 +24,7 @@ use clap::Parser;
 use crate::error::Result;
 use args::{Arguments, Command, PolicyCommand};
 use output::plain;
-pub(crate) use output::{Outcome, folder_of, report};
+pub(crate) use output::{Outcome, document, folder_of, report};
 
 /// Runs the command line and returns its exit code: 0 done, 1 failed, 2 wrong usage,
 /// configuration or input, 3 ran but the claim asked for was not obtained.

@@ -9,6 +9,9 @@ use super::options::Global;
 use crate::error::{Error, Result};
 use crate::files::json;
 
+/// Version of the layout of each [`Document`].
+const SCHEMA: u32 = 1;
+
 /// What a command that ran to its end came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -16,6 +19,19 @@ pub(crate) enum Outcome {
     Done,
     /// The claim asked for was not obtained.
     NotObtained,
+}
+
+/// A document of a command that is no record with a version of its own.
+#[derive(Serialize)]
+pub(crate) struct Document<'a, T> {
+    schema: u32,
+    #[serde(flatten)]
+    content: &'a T,
+}
+
+/// `content` with the version of its layout.
+pub(crate) fn document<T>(content: &T) -> Document<'_, T> {
+    Document { schema: SCHEMA, content }
 }
 
 /// Prints `value` as JSON with `--json`, nothing with `-q`, else `text`.

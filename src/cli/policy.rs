@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::args::ImportArguments;
 use super::options::{Global, Keys};
-use super::{Outcome, folder_of, report};
+use super::{Outcome, document, folder_of, report};
 use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
 use crate::files::{Inputs, Staged};
@@ -96,7 +96,7 @@ pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome
         parameter_count: network.parameter_count(),
         digest: network.digest(),
     };
-    report(global, &import, || import_text(&import))?;
+    report(global, &document(&import), || import_text(&import))?;
     Ok(Outcome::Done)
 }
 
@@ -244,7 +244,7 @@ pub(super) fn inspect(global: &Global, file: &Path, config: Option<&Path>) -> Re
         seed,
     };
     let place = config.map_or("from -1 to 1".to_owned(), |path| path.display().to_string());
-    report(global, &inspect, || inspect_text(&inspect, &place))?;
+    report(global, &document(&inspect), || inspect_text(&inspect, &place))?;
     Ok(Outcome::Done)
 }
 

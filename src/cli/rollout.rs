@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::inputs::{inputs, networks};
 use super::options::Global;
 use super::progress::Progress;
-use super::{Outcome, devices, folder_of, report};
+use super::{Outcome, devices, document, folder_of, report};
 use crate::backend::{Event, Program};
 use crate::config::Config;
 use crate::error::Result;
@@ -60,7 +60,7 @@ pub(super) fn run(global: &Global, path: &Path, starts: &Path, measures: &Path) 
     spare_existing(measures, global.existing)?;
     let work = Rollout { global, spec, starts, measures };
     let summary = work.run(&config.plant(&policy)?)?;
-    report(global, &summary, || text(&summary))?;
+    report(global, &document(&summary), || text(&summary))?;
     Ok(Outcome::Done)
 }
 

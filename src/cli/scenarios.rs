@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::args::ScenarioArguments;
 use super::options::Global;
-use super::{Outcome, report};
+use super::{Outcome, document, report};
 use crate::error::{Error, Result};
 use crate::scenario::bound::{
     per_round, required_scenarios, required_with_failures, simple_scenarios,
@@ -51,7 +51,7 @@ pub(super) fn run(global: &Global, asked: ScenarioArguments) -> Result<Outcome> 
         failures,
         with_failures: with_failures.transpose().map_err(flag)?,
     };
-    report(global, &counts, || text(&counts))?;
+    report(global, &document(&counts), || text(&counts))?;
     Ok(Outcome::Done)
 }
 

@@ -8,10 +8,10 @@ use serde::Serialize;
 use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::inputs::networks;
 use super::progress::Progress;
-use super::{Outcome, devices, report};
+use super::{Outcome, devices, document, report};
 use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
-use crate::files::{Existing, Inputs, Staged, StateReader};
+use crate::files::{Existing, Inputs, RECORD_BYTES, Staged, StateReader, read, read_text};
 use crate::scenario::record::Record;
 use crate::scenario::{self, CheckReport, Figure, Finding, QueryRow};
 
@@ -34,7 +34,7 @@ impl Stored {
     /// Reads what `certify` wrote to `folder`.
     fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CERTIFICATE);
-        let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+        let text = read_text(&path, RECORD_BYTES).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;
         let config = Config::from_json(&record.provenance.config)?.with_copies(folder)?;
         let policy = match &config.policy.file {
@@ -65,10 +65,10 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     let rows = ask(global, &stored, states)?;
     match staged {
-        None => report(global, &numbered(&rows), || csv(&rows))?,
+        None => report(global, &document(&answers(&rows)), || csv(&rows))?,
         Some(staged) => {
             let path = write(staged, &rows, global.existing)?;
-            report(global, &numbered(&rows), || counts(&rows, &path))?;
+            report(global, &document(&answers(&rows)), || counts(&rows, &path))?;
         }
     }
     Ok(Outcome::Done)
@@ -102,8 +102,15 @@ struct Numbered<'a> {
     row: &'a QueryRow,
 }
 
-fn numbered(rows: &[QueryRow]) -> Vec<Numbered<'_>> {
-    rows.iter().enumerate().map(|(index, row)| Numbered { index, row }).collect()
+/// What `query --json` prints.
+#[derive(Serialize)]
+struct Answers<'a> {
+    rows: Vec<Numbered<'a>>,
+}
+
+fn answers(rows: &[QueryRow]) -> Answers<'_> {
+    let numbered = rows.iter().enumerate().map(|(index, row)| Numbered { index, row });
+    Answers { rows: numbered.collect() }
 }
 
 /// A line per state.
@@ -137,7 +144,7 @@ pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
     if found.holds {
         found.add(files(folder, &stored.record)?);
     }
-    report(global, &found, || findings(&found))?;
+    report(global, &document(&found), || findings(&found))?;
     Ok(if found.holds { Outcome::Done } else { Outcome::NotObtained })
 }
 
@@ -150,7 +157,7 @@ fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
     }
     for (name, bytes) in derived_files(record) {
         let path = folder.join(name);
-        let found = match std::fs::read(&path) {
+        let found = match read(&path, RECORD_BYTES) {
             Ok(found) => found,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => continue,
             Err(error) => return Err(Error::file(&path, error)),

@@ -111,12 +111,7 @@ fn check_level(
         let refused = |problem: String| Err(Error::invalid(origin, problem));
         match (valid.get(key), value) {
             (None, _) => {
-                let siblings: Vec<String> = valid.keys().cloned().collect();
-                let all = paths(root, "");
-                let nearest = match close(key, &siblings) {
-                    Some(sibling) => format!("{prefix}{sibling}"),
-                    None => nearest(&path, &all).to_owned(),
-                };
+                let nearest = suggestion(root, valid, prefix, key);
                 return refused(format!(
                     "unknown key `{path}`; the nearest valid key is `{nearest}`"
                 ));
@@ -127,8 +122,9 @@ fn check_level(
             (Some(Value::Table(_)), _) => {
                 return refused(format!("`{path}` is a section, not a value"));
             }
-            (Some(default), _) if prefix == "system." && !same_kind(default, value) => {
-                // A section that is read by its `name` does not say which key was wrong.
+            (Some(default), _) if of_one_kind(&path) && !same_kind(default, value) => {
+                // A section that is read by its `name` does not say which key was wrong, nor a list
+                // of words what was expected.
                 let expected = default.type_str();
                 return refused(format!("`{path}` is {value}, expected a {expected}"));
             }
@@ -154,6 +150,11 @@ pub(super) fn check_finite(path: &str, value: &Value) -> Result<()> {
     }
 }
 
+/// Whether all values of the key `path` are of the kind of its default.
+fn of_one_kind(path: &str) -> bool {
+    path.starts_with("system.") || path.starts_with("deviation.") || path == "growth.boundary"
+}
+
 /// Whether `value` can stand where `default` stands; a whole number is a float too.
 fn same_kind(default: &Value, value: &Value) -> bool {
     default.same_type(value) || (default.is_float() && value.is_integer())
@@ -169,6 +170,23 @@ fn paths(table: &Table, prefix: &str) -> Vec<String> {
         }
     };
     table.iter().flat_map(path).collect()
+}
+
+/// The valid key that was most likely meant by `key`, which the section `valid` at `prefix` does not
+/// have: a slip of the fingers, one of that name in another section, else the nearest of the section.
+fn suggestion(root: &Table, valid: &Table, prefix: &str, key: &str) -> String {
+    let siblings: Vec<String> = valid.keys().cloned().collect();
+    if let Some(sibling) = close(key, &siblings) {
+        return format!("{prefix}{sibling}");
+    }
+    let (path, all) = (format!("{prefix}{key}"), paths(root, ""));
+    let namesakes = all.iter().filter(|path| path.rsplit('.').next() == Some(key));
+    let namesakes: Vec<String> = namesakes.cloned().collect();
+    match (namesakes.is_empty(), prefix.is_empty() || siblings.is_empty()) {
+        (false, _) => nearest(&path, &namesakes).to_owned(),
+        (true, true) => nearest(&path, &all).to_owned(),
+        (true, false) => format!("{prefix}{}", nearest(key, &siblings)),
+    }
 }
 
 /// The candidate that is a slip or two away from `key`, if there is one.

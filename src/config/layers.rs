@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::counts;
 use super::section::{Config, Profile};
+use super::sources::Sources;
 use super::{keys, model};
 use crate::error::{Error, Result};
 use crate::model::text::Origin;
@@ -58,7 +59,9 @@ impl Layers {
     fn merged(&self, taken: impl Fn(usize) -> bool, origin: &str) -> Result<Config> {
         let mut given = self.given(&taken);
         self.name_profile(&mut given);
-        let mut merged = defaults(&given, origin, self.text.as_deref())?;
+        // Of a setting, the file does not know the line.
+        let text = self.text.as_deref().filter(|_| origin == self.file.0);
+        let mut merged = defaults(&given, origin, text)?;
         let mut valid = keys::with_optional(&merged);
         keys::check_known(&valid, &self.file.1, &self.file.0)?;
         if model::is_described(&self.file.1) {
@@ -69,13 +72,23 @@ impl Layers {
         }
         keys::overlay(&mut merged, given);
         for section in ["race", "train"] {
-            merged.get(section).map_or(Ok(()), |keys| keys::check_finite(section, keys))?;
+            let checked = merged.get(section).map(|keys| keys::check_finite(section, keys));
+            checked.unwrap_or(Ok(())).map_err(|error| self.placed(error, origin))?;
         }
         // Without a source text, the message ends with a line that names the key.
         let wrong_kind = |e: toml::de::Error| {
             Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
         };
         merged.try_into().map_err(wrong_kind)
+    }
+
+    /// `error` about a key, by the layer `origin`, with the line where that is the file.
+    fn placed(&self, error: Error, origin: &str) -> Error {
+        let Error::Invalid { place, problem } = error else { return error };
+        let file = Origin::new(origin, Path::new(""));
+        let text = self.text.iter().filter(|_| origin == self.file.0);
+        let file = text.fold(file, |file, text| file.with_text(text));
+        Error::Invalid { place: format!("{}: {place}", file.place(&place)), problem }
     }
 
     /// The file with the sets over it whose numbers are `taken`.
@@ -99,6 +112,14 @@ impl Layers {
         if let Some(profile) = self.profile {
             given.insert("profile".to_owned(), profile.name().into());
         }
+    }
+
+    /// Where the values of the configuration were written.
+    pub(super) fn sources(self) -> Sources {
+        let (name, given) = self.file;
+        let file = Origin::new(&name, Path::new(""));
+        let file = self.text.iter().fold(file, |file, text| file.with_text(text));
+        Sources { file: Some(file), given, sets: self.sets }
     }
 
     /// Whether the file or a set has the section `train`.

@@ -8,6 +8,7 @@ mod plant;
 pub(crate) mod profile;
 mod section;
 mod settings;
+mod sources;
 #[cfg(test)]
 mod tests;
 pub(crate) mod train;
@@ -32,6 +33,8 @@ use serde::Deserialize;
 use toml::Table;
 
 use crate::error::{Error, Result};
+use crate::files::{CONFIG_BYTES, read_text};
+use crate::model::text::Origin;
 use crate::studies::SYSTEMS;
 use layers::Layers;
 
@@ -54,7 +57,7 @@ impl Config {
     /// is unknown, with the nearest valid one, or that has a value of the wrong kind, or in the
     /// sections `race` and `train` a number that is not finite.
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+        let text = read_text(path, CONFIG_BYTES).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::from_layers(table, Some(text), (&path.display().to_string(), folder), overrides)
@@ -86,8 +89,16 @@ impl Config {
         config.networks = config.networks_beside(&place)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
         // What is about to be trained is not there yet.
-        config.policy.check(layers.trains())?;
+        let checked = config.policy.check(layers.trains());
+        config.sources = layers.sources();
+        checked.map_err(|error| config.placed(error))?;
         Ok(config)
+    }
+
+    /// `error` with the file and the line, or the setting, that the key it names was written in.
+    #[must_use]
+    pub fn placed(&self, error: Error) -> Error {
+        self.sources.placed(error)
     }
 
     /// The configuration as a certificate or a race stores it, every default filled in, without the

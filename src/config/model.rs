@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::plant::PolicySource;
 use super::profile;
 use super::section::{Config, PolicySection, Profile};
+use super::sources::UNNAMED;
 use crate::error::{Error, Result};
 use crate::files::NETWORK_COPIES;
 use crate::model::Plant;
@@ -94,7 +95,7 @@ impl Config {
     /// not fit.
     pub fn with_copies(mut self, folder: &Path) -> Result<Self> {
         if let Some(model) = &self.model {
-            let origin = Origin::new("configuration", folder);
+            let origin = Origin::new(UNNAMED, folder);
             let description = self.description(model, &self.policy, &origin)?;
             self.networks = description.networks(|i, _| folder.join(copy_name(i)))?;
         }
@@ -129,7 +130,7 @@ impl Config {
             }
             PolicySource::Formula(_) => (self.policy.clone(), Path::new(""), None),
         };
-        let described = self.description(model, &section, &Origin::new("configuration", folder))?;
+        let described = self.description(model, &section, &Origin::new(UNNAMED, folder))?;
         let described = described.with_networks(self.networks.clone());
         let controller = match network {
             Some(network) => described.controller_of(network)?,

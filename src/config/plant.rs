@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::section::{Config, FormulaSection};
 use crate::error::{Error, Result};
+use crate::files::{RECORD_BYTES, read};
 use crate::model;
 use crate::policy::{Mlp, Policy};
 use crate::rollout::Plant;
@@ -64,7 +65,7 @@ impl PolicySource {
     /// # Errors
     /// [`Error::File`] if it is missing, damaged, or has a weight that is not finite.
     pub fn read(path: PathBuf) -> Result<Self> {
-        let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
+        let bytes = read(&path, RECORD_BYTES).map_err(|e| Error::file(&path, e))?;
         let network = Mlp::from_bytes(&bytes).map_err(|problem| Error::file(&path, problem))?;
         Ok(Self::Network { path, bytes, network })
     }
@@ -76,13 +77,14 @@ impl Config {
     /// # Errors
     /// Those of [`PolicySource::read`]; [`Error::Invalid`] without file and formula.
     pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
+        let missing = || self.placed(Error::invalid("policy", "neither `file` nor `formula`"));
         match (&self.policy.file, &self.policy.formula) {
             (Some(file), _) => PolicySource::read(folder.join(file)),
             (None, Some(FormulaSection::Name(name))) => Ok(PolicySource::Formula(name.clone())),
             (None, Some(FormulaSection::Controls(_))) => {
                 Ok(PolicySource::Formula("formula".to_owned()))
             }
-            (None, None) => Err(Error::invalid("policy", "neither `file` nor `formula`")),
+            (None, None) => Err(missing()),
         }
     }
 
@@ -91,6 +93,10 @@ impl Config {
     /// # Errors
     /// Those of [`Config::with_plant`].
     pub fn plant(&self, policy: &PolicySource) -> Result<model::Plant> {
+        self.built(policy).map_err(|error| self.placed(error))
+    }
+
+    fn built(&self, policy: &PolicySource) -> Result<model::Plant> {
         if let Some(model) = &self.model {
             return self.described_plant(model, policy);
         }

@@ -4,6 +4,7 @@ use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
 };
+use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
@@ -112,6 +113,7 @@ pub(crate) fn common(
         },
         study: None,
         train: None,
+        sources: Sources::default(),
     }
 }
 

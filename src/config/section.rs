@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::model::text::NetworkFile;
@@ -57,6 +58,9 @@ pub struct Config {
     /// Training; what a certificate or race stores of its configuration has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train: Option<TrainSettings>,
+    /// Where the values were written; nowhere for a configuration that was stored.
+    #[serde(skip)]
+    pub(super) sources: Sources,
 }
 
 /// Which defaults fill in what a file leaves out.
@@ -104,7 +108,10 @@ pub struct PolicySection {
 
 /// A policy that is a formula.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected the name of a formula, or a section with a formula for each control"
+)]
 pub enum FormulaSection {
     /// One that the program carries, by name.
     Name(String),

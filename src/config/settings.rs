@@ -25,6 +25,10 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`] if the horizon is 0 or too long, or gamma is outside (0, 1].
     pub fn spec(&self) -> Result<RolloutSpec> {
+        self.checked_spec().map_err(|error| self.placed(error))
+    }
+
+    fn checked_spec(&self) -> Result<RolloutSpec> {
         let spec = RolloutSpec::new(self.rollout.horizon, self.rollout.gamma as f32);
         spec.map_err(|error| match error {
             Error::Invalid { place, problem } => {
@@ -40,6 +44,10 @@ impl Config {
     /// [`Error::Invalid`] naming the key whose value is out of range, not finite or no name of a
     /// state. Whether the scenarios are enough is for [`crate::scenario::certify`] to say.
     pub fn settings(&self, axes: &[Axis]) -> Result<Settings> {
+        self.checked(axes).map_err(|error| self.placed(error))
+    }
+
+    fn checked(&self, axes: &[Axis]) -> Result<Settings> {
         let (low, high) = self.corners(axes)?;
         let constant = |key: &str, constant: Constant| match constant {
             Constant::Computed => Ok(None),
@@ -47,7 +55,7 @@ impl Config {
         };
         Ok(Settings {
             seed: self.seed,
-            spec: self.spec()?,
+            spec: self.checked_spec()?,
             low,
             high,
             constants: ConstantSettings {
@@ -59,7 +67,7 @@ impl Config {
                 draws: sample_size("global.draws", self.global.draws)?,
                 beta: share("global.beta", self.global.beta)?,
             },
-            slice: if axes.len() > 1 { Some(self.slice_axes(axes)?) } else { None },
+            slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
         })
@@ -124,7 +132,12 @@ impl Config {
             Coordinates::Named(names) => {
                 let mut varies = vec![false; axes.len()];
                 for name in names {
-                    varies[state_index(place, name, axes)?] = true;
+                    let state = state_index(place, name, axes)?;
+                    if varies[state] {
+                        let problem = format!("`{name}` is there twice; name each state once");
+                        return Err(Error::invalid(place, problem));
+                    }
+                    varies[state] = true;
                 }
                 Ok(varies)
             }
@@ -144,6 +157,21 @@ impl Config {
             let problem = format!("{} states; expected 4, x, vx, y, vy, or none", indices.len());
             Error::invalid(place, problem)
         })
+    }
+
+    /// The slice; none of a single state, which has no second one to draw it against.
+    fn slice(&self, axes: &[Axis]) -> Result<Option<[SliceAxis; 2]>> {
+        match axes {
+            [only] if self.sources.give("slice") => {
+                let problem = format!(
+                    "a slice shows two states, and there is one, `{}`: leave the section out",
+                    only.name
+                );
+                Err(Error::invalid("slice", problem))
+            }
+            [_] => Ok(None),
+            _ => self.slice_axes(axes).map(Some),
+        }
     }
 
     /// The two axes of the slice.
@@ -186,7 +214,11 @@ fn slice_axis(place: &str, section: &SliceAxisSection, axes: &[Axis]) -> Result<
     let value = |i: u32| (section.from + f64::from(i) * section.step) as f32;
     let values: Vec<f32> = (0..count as u32).map(value).collect();
     if values.windows(2).any(|pair| pair[0] >= pair[1]) {
-        let problem = format!("{} is lost in the rounding of the values", section.step);
+        let problem = format!(
+            "{} is lost in the rounding of values as large as {} and {}; take a larger step, or \
+             coordinates relative to an origin nearby",
+            section.step, section.from, section.to
+        );
         return Err(Error::invalid(format!("{place}.step"), problem));
     }
     Ok(SliceAxis { state, values })

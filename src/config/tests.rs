@@ -263,7 +263,8 @@ fn values_out_of_range_name_their_key() {
         ("growth.heading=['ego_x']", "growth.heading: 1 states"),
     ] {
         let message = refusal(&[set]);
-        assert!(message.contains(words), "{set}: {message}");
+        assert!(message.starts_with(&format!("--set {set}: ")), "{set}: {message}");
+        assert!(words.split(": ").all(|word| message.contains(word)), "{set}: {message}");
     }
     let point = |name: &str| format!("box.{name}=[0, 0]");
     let frozen = ["position", "velocity"].map(point);

@@ -119,7 +119,7 @@ impl Config {
     pub fn train_settings(&self) -> Result<&TrainSettings> {
         let settings = self.train.as_ref();
         let settings = settings.ok_or_else(|| Error::invalid("train", "no such section"))?;
-        settings.check()?;
+        settings.check().map_err(|error| self.placed(error))?;
         Ok(settings)
     }
 

@@ -1,8 +1,10 @@
 //! A folder that holds the results of one piece of work, and says which.
 
-use std::path::Path;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
 
-use super::{Staged, check_room};
+use super::made::Made;
+use super::{RECORD_BYTES, Staged, check_room, named, open, read_text};
 use crate::error::{Error, Result};
 
 /// Name of the file that says which work a folder holds.
@@ -65,21 +67,56 @@ const CERTIFICATE: [&str; 12] = {
 /// Files that several kinds have: the page, and at last the manifest.
 const SHARED: [&str; 2] = ["report.html", MANIFEST];
 
-/// Makes sure that `folder` holds the work that `manifest` describes, or none, and has room for
-/// `need` bytes more, and says so in it.
+/// A folder that says which work it holds.
 ///
-/// # Errors
-/// [`Error::File`] if something else is there, [`Error::Write`] if the folder cannot be written,
-/// [`Error::NoRoom`].
-pub(crate) fn claim_folder(folder: &Path, manifest: &str, need: u64) -> Result<()> {
-    let mut staged = Staged::new(folder)?;
-    let claimed = is_free(folder, manifest)?;
-    check_room(folder, need)?;
-    if claimed == Claimed::Already {
-        return Ok(());
+/// Dropped before anything of the work is in it, it leaves the folder as it was.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    /// What this run wrote and made; none if the folder said so already.
+    own: Option<(PathBuf, Made)>,
+}
+
+impl Claim {
+    /// Makes sure that `folder` holds the work that `manifest` describes, or none, and has room for
+    /// `need` bytes more, and says so in it.
+    ///
+    /// # Errors
+    /// [`Error::File`] if something else is there, [`Error::Write`] if the folder cannot be written,
+    /// [`Error::NoRoom`].
+    pub(crate) fn new(folder: &Path, manifest: &str, need: u64) -> Result<Self> {
+        let folder = named(folder);
+        let made = Made::folder(folder)
+            .map_err(|source| Error::Write { path: folder.to_owned(), source })?;
+        let mut staged = Staged::new(folder)?;
+        let claimed = is_free(folder, manifest)?;
+        check_room(folder, need)?;
+        if claimed == Claimed::Already {
+            return Ok(Self { own: None });
+        }
+        staged.add(MANIFEST, manifest.as_bytes())?;
+        staged.publish()?;
+        Ok(Self { own: Some((folder.to_owned(), made)) })
     }
-    staged.add(MANIFEST, manifest.as_bytes())?;
-    staged.publish().map(drop)
+
+    /// Keeps the claim though nothing may be in the folder yet.
+    pub(crate) fn keep(&mut self) {
+        self.own = None;
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        let Some((folder, _)) = &self.own else { return };
+        for kind in &KINDS {
+            if let Some((name, _)) = kind.folder {
+                // One that holds something stays.
+                _ = std::fs::remove_dir(folder.join(name));
+            }
+        }
+        if found(folder).is_none() {
+            _ = std::fs::remove_file(folder.join(MANIFEST));
+        }
+    }
 }
 
 /// Whether a folder says already which work it holds.
@@ -97,10 +134,8 @@ pub(crate) enum Claimed {
 /// [`Error::File`] naming what else is there, and what to do; [`Error::Write`] if nothing can be.
 pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
     let path = folder.join(MANIFEST);
-    if path.metadata().is_ok_and(|about| !about.is_file()) {
-        return Err(Error::file(&path, "it is no file, which it has to be; give another --out"));
-    }
-    match std::fs::read_to_string(&path) {
+    spare_others(folder)?;
+    match read_text(&path, RECORD_BYTES) {
         Ok(text) if text == manifest => return Ok(Claimed::Already),
         Ok(_) => {
             let problem = format!(
@@ -110,8 +145,12 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
             );
             return Err(Error::file(&path, problem));
         }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(source) => return Err(Error::Write { path, source }),
+        // That a file is in the place of the folder, who writes to it says.
+        Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {}
+        Err(error) => {
+            let problem = format!("{error}; give another --out, or --overwrite to remove it");
+            return Err(Error::file(&path, problem));
+        }
     }
     match found(folder) {
         None => Ok(Claimed::NotYet),
@@ -125,14 +164,53 @@ pub(crate) fn is_free(folder: &Path, manifest: &str) -> Result<Claimed> {
     }
 }
 
+/// Refuses folders in the places of files of results, and the other way round: nothing could replace
+/// them.
+fn spare_others(folder: &Path) -> Result<()> {
+    let files = KINDS.iter().flat_map(|kind| kind.files).chain(&SHARED);
+    files.map(|name| folder.join(name)).try_for_each(|path| spare_folder(&path))?;
+    for (name, _) in KINDS.iter().filter_map(|kind| kind.folder) {
+        let path = folder.join(name);
+        if path.symlink_metadata().is_ok_and(|about| !about.is_dir() && !about.is_symlink()) {
+            let problem = "a file is in the place of a folder of the results; move it, or write to \
+                           another place";
+            return Err(Error::file(&path, problem));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to write into `folder` where results of a piece of work are.
+///
+/// # Errors
+/// [`Error::File`] naming them, and what to do.
+pub(crate) fn spare_results(folder: &Path) -> Result<()> {
+    match found(folder) {
+        None => Ok(()),
+        Some((name, words)) => {
+            let problem =
+                format!("something else is here, by its name of {words}; give another folder");
+            Err(Error::file(&folder.join(name), problem))
+        }
+    }
+}
+
 /// The first file of results in `folder`, and the kind that it is of.
 fn found(folder: &Path) -> Option<(&'static str, &'static str)> {
     let is_there = |name: &str| folder.join(name).symlink_metadata().is_ok();
     let of_kind = KINDS.iter().find_map(|kind| {
-        let name = kind.files.iter().copied().chain(kind.folder.map(|(name, _)| name));
-        name.into_iter().find(|name| is_there(name)).map(|name| (name, kind.words))
+        let inner = kind.folder.filter(|(name, endings)| holds(&folder.join(name), endings));
+        let file = kind.files.iter().copied().find(|name| is_there(name));
+        file.or(inner.map(|(name, _)| name)).map(|name| (name, kind.words))
     });
     of_kind.or_else(|| is_there(SHARED[0]).then_some((SHARED[0], "a report")))
+}
+
+/// Whether `folder` is a link or has files whose names end so.
+fn holds(folder: &Path, endings: &[&str]) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let ends = |name: &str| endings.iter().any(|ending| name.ends_with(ending));
+    folder.is_symlink() || entries.any(|entry| ends(&entry.file_name().to_string_lossy()))
 }
 
 /// Removes the results of other work than `manifest` describes from `folder`, and nothing else.
@@ -140,6 +218,7 @@ fn found(folder: &Path) -> Option<(&'static str, &'static str)> {
 /// # Errors
 /// [`Error::Write`] if one cannot be removed.
 pub(crate) fn make_way(folder: &Path, manifest: &str) -> Result<()> {
+    spare_others(folder)?;
     if is_free(folder, manifest).is_ok() {
         return Ok(());
     }
@@ -201,11 +280,52 @@ mod tests {
         assert!(results.iter().all(|name| !at(name).exists()));
         assert!(others.iter().all(|name| at(name).exists()));
         assert!(!at("points").exists() && at("races").exists());
+        // What is left is nobody's results.
+        is_free(folder.path(), "work").unwrap();
         // The work's own results stay.
         std::fs::write(at(MANIFEST), "work").unwrap();
         std::fs::write(at("results.json"), "mine").unwrap();
         make_way(folder.path(), "work").unwrap();
         assert!(at("results.json").exists());
+    }
+
+    #[test]
+    fn a_claim_without_work_leaves_the_folder_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let new = folder.path().join("new/inner");
+        drop(Claim::new(&new, "work", 0).unwrap());
+        assert!(!folder.path().join("new").exists());
+        drop(Claim::new(folder.path(), "work", 0).unwrap());
+        assert!(folder.path().exists() && !folder.path().join(MANIFEST).exists());
+        let claim = Claim::new(&new, "work", 0).unwrap();
+        std::fs::create_dir(new.join("races")).unwrap();
+        std::fs::write(new.join("races/a.npz"), "race").unwrap();
+        drop(claim);
+        assert!(new.join("races/a.npz").exists() && new.join(MANIFEST).exists());
+        std::fs::remove_file(new.join("races/a.npz")).unwrap();
+        // An earlier run's claim is not this one's to take back.
+        drop(Claim::new(&new, "work", 0).unwrap());
+        assert!(new.join(MANIFEST).exists());
+    }
+
+    #[test]
+    fn folders_in_the_places_of_files_are_refused_and_files_in_those_of_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("results.json")).unwrap();
+        std::fs::write(folder.path().join("timing.json"), "mine").unwrap();
+        let refused = |words: &str| {
+            for refused in
+                [is_free(folder.path(), "work").map(drop), make_way(folder.path(), "work")]
+            {
+                let message = refused.unwrap_err().to_string();
+                assert!(message.contains(words), "{message}");
+            }
+            assert!(folder.path().join("timing.json").exists());
+        };
+        refused("results.json: a folder");
+        std::fs::remove_dir(folder.path().join("results.json")).unwrap();
+        std::fs::write(folder.path().join("points"), "mine").unwrap();
+        refused("points: a file");
     }
 
     #[test]
@@ -215,7 +335,7 @@ mod tests {
                 let folder = tempfile::tempdir().unwrap();
                 is_free(folder.path(), "work").unwrap();
                 std::fs::write(folder.path().join(name), "mine").unwrap();
-                assert!(claim_folder(folder.path(), "work", 0).is_err(), "{name}");
+                assert!(Claim::new(folder.path(), "work", 0).is_err(), "{name}");
                 assert_eq!(std::fs::read(folder.path().join(name)).unwrap(), b"mine");
             }
         }

@@ -1,7 +1,9 @@
 //! What is there already where a result is to be written: kept, or replaced.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
+use super::plain::open;
 use crate::error::{Error, Result};
 
 /// What becomes of results that are there.
@@ -19,21 +21,52 @@ pub enum Existing {
 /// # Errors
 /// [`Error::File`] naming it, and what to do.
 pub(crate) fn spare_existing(path: &Path, existing: Existing) -> Result<()> {
+    spare_folder(path)?;
     if existing == Existing::Replaced || path.symlink_metadata().is_err() {
         return Ok(());
     }
     Err(Error::file(path, "it is there already; give another name, or --overwrite to replace it"))
 }
 
-/// The same where `bytes` are to be written, which replace nothing if they are there already.
+/// Refuses a folder at `path`, where a file has to go.
+pub(super) fn spare_folder(path: &Path) -> Result<()> {
+    match path.symlink_metadata().is_ok_and(|about| about.is_dir()) {
+        true => {
+            let problem = "a folder is in the place of a file of the results; move it, or write to \
+                           another place";
+            Err(Error::file(path, problem))
+        }
+        false => Ok(()),
+    }
+}
+
+/// The same as [`spare_existing`] where the file `written` is to take the place, which replaces nothing
+/// if its bytes are there already.
 ///
 /// # Errors
 /// As [`spare_existing`].
-pub(super) fn spare_other(path: &Path, bytes: &[u8], existing: Existing) -> Result<()> {
-    // A pipe would be waited for.
-    let is_file = path.symlink_metadata().is_ok_and(|about| about.is_file());
-    match is_file && std::fs::read(path).is_ok_and(|found| found == bytes) {
+pub(super) fn spare_other(path: &Path, written: &Path, existing: Existing) -> Result<()> {
+    let is_link = path.is_symlink();
+    match !is_link && same_bytes(path, written).unwrap_or(false) {
         true => Ok(()),
         false => spare_existing(path, existing),
+    }
+}
+
+/// Whether two plain files hold the same bytes.
+fn same_bytes(one: &Path, other: &Path) -> std::io::Result<bool> {
+    let (one, other) = (open(one)?, open(other)?);
+    if one.metadata()?.len() != other.metadata()?.len() {
+        return Ok(false);
+    }
+    let [mut one, mut other] = [one, other].map(BufReader::new);
+    loop {
+        let (here, there) = (one.fill_buf()?, other.fill_buf()?);
+        let count = here.len().min(there.len());
+        if count == 0 || here[..count] != there[..count] {
+            return Ok(here.is_empty() && there.is_empty());
+        }
+        one.consume(count);
+        other.consume(count);
     }
 }

@@ -11,8 +11,9 @@ mod existing;
 mod inputs;
 mod lines;
 mod list;
-#[cfg(feature = "cli")]
+mod made;
 mod npz;
+mod plain;
 mod states;
 #[cfg(feature = "cli")]
 mod table;
@@ -22,7 +23,7 @@ mod temporary;
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
 #[cfg(feature = "cli")]
-pub(crate) use claim::{MANIFEST, NETWORK_COPIES, claim_folder, is_free, make_way};
+pub(crate) use claim::{Claim, MANIFEST, NETWORK_COPIES, is_free, make_way, spare_results};
 pub use disk::check_room;
 pub use existing::Existing;
 #[cfg(feature = "cli")]
@@ -31,6 +32,7 @@ pub use inputs::Inputs;
 pub use list::{StateList, States};
 #[cfg(feature = "cli")]
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
+pub(crate) use plain::{ARCHIVE_BYTES, CONFIG_BYTES, RECORD_BYTES, open, read, read_text};
 pub use states::StateReader;
 #[cfg(feature = "cli")]
 pub use table::{Column, Table};
@@ -42,7 +44,9 @@ use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
-use existing::spare_other;
+use existing::{spare_folder, spare_other};
+use made::Made;
+use plain::sync;
 use temporary::{clear, temporary};
 
 /// `value` as a JSON document that ends with its line; errors call it `name`.
@@ -56,11 +60,14 @@ pub fn json(name: &str, value: &impl Serialize) -> Result<String> {
 
 /// Files of one folder, written beside their final names and renamed together at the end.
 ///
-/// Dropped before [`Staged::publish`], it leaves nothing behind and older files as they were.
+/// Dropped before [`Staged::publish`], it leaves nothing behind, no folder that it made either, and
+/// older files as they were.
 #[derive(Debug)]
 pub struct Staged {
     folder: PathBuf,
+    // Files are dropped before the folders that they lie in.
     files: Vec<(NamedTempFile, PathBuf)>,
+    _made: Made,
 }
 
 impl Staged {
@@ -72,12 +79,12 @@ impl Staged {
     pub fn new(folder: &Path) -> Result<Self> {
         let folder = named(folder);
         let refused = |source| Error::Write { path: folder.to_owned(), source };
-        std::fs::create_dir_all(folder).map_err(refused)?;
+        let made = Made::folder(folder).map_err(refused)?;
         clear(folder);
         let mut trial = temporary(folder)?;
         // A full disk may have room for a name and for nothing else.
         trial.write_all(&[0; 4096]).and_then(|()| trial.as_file().sync_all()).map_err(refused)?;
-        Ok(Self { folder: folder.to_owned(), files: Vec::new() })
+        Ok(Self { folder: folder.to_owned(), files: Vec::new(), _made: made })
     }
 
     /// The same for the folder `name` in `folder`.
@@ -119,8 +126,7 @@ impl Staged {
     /// [`Error::File`] naming what is there; [`Error::Write`].
     pub fn publish_sparing(self, existing: Existing) -> Result<Vec<PathBuf>> {
         for (file, path) in &self.files {
-            let written = std::fs::read(file.path());
-            spare_other(path, &written.map_err(|e| Error::file(path, e))?, existing)?;
+            spare_other(path, file.path(), existing)?;
         }
         self.publish()
     }
@@ -128,8 +134,10 @@ impl Staged {
     /// Renames all files to their names, in the order in which they were added.
     ///
     /// # Errors
-    /// [`Error::Write`] with the system's reason.
+    /// [`Error::File`] if a folder is in the place of one, before any is renamed; [`Error::Write`]
+    /// with the system's reason.
     pub fn publish(self) -> Result<Vec<PathBuf>> {
+        self.files.iter().try_for_each(|(_, path)| spare_folder(path))?;
         let rename = |(file, path): (NamedTempFile, PathBuf)| match file.persist(&path) {
             Ok(_) => Ok(path),
             Err(error) => Err(Error::Write { path, source: error.error }),
@@ -137,13 +145,6 @@ impl Staged {
         let paths = self.files.into_iter().map(rename).collect();
         sync(&self.folder);
         paths
-    }
-}
-
-/// Makes names in `folder` outlast a power cut, where the system can.
-fn sync(folder: &Path) {
-    if cfg!(unix) {
-        _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
     }
 }
 

@@ -1,7 +1,6 @@
 //! Several named arrays in one .npz file: a zip archive of .npy files, stored as they are.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufReader, Cursor, Write};
 use std::path::Path;
 
@@ -195,7 +194,7 @@ pub fn npz_sha256<'a>(
 /// against its checksum), compressed, or holds another kind of array.
 pub fn read_npz(path: &Path) -> Result<BTreeMap<String, Array>> {
     let at = |problem: String| Error::file(path, problem);
-    let file = File::open(path).map_err(|e| Error::file(path, e))?;
+    let file = super::open(path).map_err(|e| Error::file(path, e))?;
     let size = file.metadata().map_err(|e| Error::file(path, e))?.len();
     let damaged = |e: ZipError| at(format!("not a whole .npz file ({e})"));
     let mut archive = Archive::open(BufReader::new(file), size).map_err(damaged)?;

@@ -1,6 +1,5 @@
 //! States from .npy and .csv files, read in pieces, so that memory does not grow with the file.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +36,7 @@ impl StateReader {
     /// [`Error::File`] if it is missing, or its type or shape is not that of states.
     pub fn open(path: &Path, names: Vec<String>) -> Result<Self> {
         let format = Format::of(path)?;
-        let file = File::open(path).map_err(|e| Error::file(path, e))?;
+        let file = super::open(path).map_err(|e| Error::file(path, e))?;
         let file = BufReader::new(file);
         let rows = match format {
             Format::Csv => Rows::Csv(Lines::new(file)),

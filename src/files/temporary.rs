@@ -1,6 +1,6 @@
 //! Temporary files beside their final names, and what killed runs left of them.
 
-use std::fs::{File, TryLockError};
+use std::fs::TryLockError;
 use std::path::Path;
 
 use tempfile::NamedTempFile;
@@ -63,7 +63,7 @@ fn is_temporary(name: &str) -> bool {
 /// Removes the file unless a run has it locked. One that cannot be opened, locked or removed is
 /// left: it does no harm but that it takes room.
 fn remove_abandoned(path: &Path) {
-    if let Ok(file) = File::open(path)
+    if let Ok(file) = super::open(path)
         && file.try_lock().is_ok()
     {
         _ = std::fs::remove_file(path);

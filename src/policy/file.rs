@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Activation, Layer, Mlp, OutputActivation};
 use crate::error::{Error, Result};
+use crate::files::{RECORD_BYTES, read};
 
 impl Mlp {
     /// Reads a safetensors file.
@@ -20,7 +21,7 @@ impl Mlp {
     /// [`Error::File`] naming the tensor or metadata that is missing, of the wrong type or shape,
     /// or not finite.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let bytes = read(path, RECORD_BYTES).map_err(|e| Error::file(path, e))?;
         Self::from_bytes(&bytes).map_err(|problem| Error::file(path, problem))
     }
 
@@ -58,9 +59,15 @@ impl Mlp {
             layers.push(read_layer(&tensors, layers.len())?);
         }
         refuse_others(&tensors, layers.len())?;
-        let mlp = Self { layers: layers.into(), activation, output, state_order };
+        let mlp = Self { layers: layers.into(), activation, output, state_order: None };
         mlp.validate()?;
-        Ok(mlp)
+        match state_order {
+            None => Ok(mlp),
+            Some(names) => mlp.with_state_order(names).map_err(|error| match error {
+                Error::Invalid { problem, .. } => format!("metadata `state_order` {problem}"),
+                other => other.to_string(),
+            }),
+        }
     }
 
     /// The bytes of its safetensors file, the same for the same network.

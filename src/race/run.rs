@@ -24,7 +24,7 @@ use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, claim_folder, make_way};
+use crate::files::{ARCHIVE_BYTES, Claim, Staged, make_way, read, read_text};
 use crate::policy::Mlp;
 use crate::rollout::States;
 use crate::scenario::sampling::sampling;
@@ -101,7 +101,7 @@ impl Experiment<'_> {
         let names: Vec<Name> = self.names.iter().copied().filter(runs).collect();
         self.check(&names)?;
         let manifest = format!("{:#}\n", self.manifest());
-        claim_folder(&self.folder, &manifest, self.need(&names))?;
+        let mut claim = Claim::new(&self.folder, &manifest, self.need(&names))?;
         Staged::within(&self.folder, RACES)?;
         let (mut summaries, mut timings) = (Vec::new(), Vec::new());
         for name in names {
@@ -110,6 +110,7 @@ impl Experiment<'_> {
             summaries.push((name, summary));
         }
         let record = self.record(&summaries, absent, watch)?;
+        claim.keep();
         Ok((record, timings))
     }
 
@@ -301,7 +302,7 @@ impl Experiment<'_> {
                     let file = events_of(&batch_file(*name, noise_seed, first));
                     let path = self.folder.join(RACES).join(file);
                     if path.exists() {
-                        let text = std::fs::read_to_string(&path);
+                        let text = read_text(&path, ARCHIVE_BYTES);
                         let text = text.map_err(|error| Error::file(&path, error))?;
                         let stored: Vec<Event> = serde_json::from_str(&text)
                             .map_err(|error| Error::file(&path, error))?;
@@ -388,7 +389,8 @@ impl Experiment<'_> {
 pub(super) fn program_sha256() -> &'static str {
     static DIGEST: OnceLock<String> = OnceLock::new();
     DIGEST.get_or_init(|| {
-        let program = std::env::current_exe().and_then(std::fs::read);
+        let read = |path: PathBuf| read(&path, ARCHIVE_BYTES);
+        let program = std::env::current_exe().and_then(read);
         program.map_or_else(|_| "unknown".to_owned(), |bytes| digest::sha256([&bytes[..]]))
     })
 }

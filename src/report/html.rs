@@ -111,10 +111,14 @@ fn limits(record: &Record) -> Vec<String> {
         "It is about the system as modelled and the policy with the recorded digests, within the \
          horizon; not about the machine that the model stands for."
             .to_owned(),
-        "The picture of the slice is made of single rollouts. What lies between two cells was not \
-         computed, and the zero lines are interpolated."
-            .to_owned(),
     ];
+    if !record.slice.check_margin.is_empty() {
+        limits.push(
+            "The picture of the slice is made of single rollouts. What lies between two cells was \
+             not computed, and the zero lines are interpolated."
+                .to_owned(),
+        );
+    }
     match record.deviation.control {
         PairControl::Replay => limits.push(
             "The deviation bound replays the controls of the nominal rollout: it shows that some \

@@ -117,8 +117,15 @@ fn picture(plant: &Plant, settings: &Settings, growth: &GrowthRecord) -> Picture
     }
     let none = Tightening::none(&settings.spec);
     let rollouts = starts.into_iter().map(|start| RolloutRecord {
-        states: replay::states(plant, &start, settings.spec.horizon),
+        states: finite(replay::states(plant, &start, settings.spec.horizon)),
         success: replay::measure(plant, &start, &settings.spec, &none) > 0.0,
     });
     PictureRecord { rollouts: rollouts.collect() }
+}
+
+/// The states before the first that is not finite, which no document holds.
+fn finite(mut states: Vec<Vec<f32>>) -> Vec<Vec<f32>> {
+    let end = states.iter().position(|x| x.iter().any(|value| !value.is_finite()));
+    states.truncate(end.unwrap_or(states.len()));
+    states
 }

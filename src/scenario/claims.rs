@@ -4,7 +4,7 @@ use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, 
 use super::sampling;
 use super::settings::Settings;
 use crate::model::Plant;
-use crate::rollout::StateList;
+use crate::rollout::{HUGE, StateList};
 
 /// Whether every claim that is asked for was obtained.
 pub(super) fn holds(
@@ -30,6 +30,7 @@ pub(super) fn statements(
         claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
     statements.insert(2, share_statement(global, settings));
     statements.extend(growth_statement(growth));
+    statements.extend(broken_statement(deviation));
     statements
 }
 
@@ -59,6 +60,17 @@ fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
         global.accepted,
         global.draws
     )
+}
+
+/// That rollouts of the deviation bound met states that are not finite.
+fn broken_statement(deviation: &DeviationRecord) -> Option<String> {
+    let (broken, pairs) = (deviation.non_finite, deviation.claim.scenarios);
+    (broken > 0).then(|| {
+        format!(
+            "The deviation bound is none: {broken} of {pairs} pairs met a state that is not finite, \
+             which counts as a distance of {HUGE:e}; no claim follows from it."
+        )
+    })
 }
 
 /// What came of the growth, where it is not a claim.

@@ -370,7 +370,7 @@ pub struct Spending {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PictureRecord {
-    /// Each: the states x_0..=x_T, `[T + 1, NX]`, and whether it succeeded.
+    /// Each: the states x_0..=x_T, `[T + 1, NX]`, up to one that is not finite, and whether it succeeded.
     pub rollouts: Vec<RolloutRecord>,
 }
 
@@ -378,7 +378,7 @@ pub struct PictureRecord {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RolloutRecord {
-    /// States, `[T + 1, NX]`.
+    /// States, `[T + 1, NX]`; fewer where one is not finite, which ends them.
     pub states: Vec<Vec<f32>>,
     /// Whether the measure is positive.
     pub success: bool,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::CurvePoint;
 use crate::error::{Error, Result};
-use crate::files::{Staged, json};
+use crate::files::{ARCHIVE_BYTES, Staged, json, read};
 
 /// Name of the file.
 const FILE: &str = "checkpoint.safetensors";
@@ -80,7 +80,7 @@ impl Checkpoint {
     /// [`Error::File`] if it is damaged.
     pub fn read(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(FILE);
-        let bytes = match std::fs::read(&path) {
+        let bytes = match read(&path, ARCHIVE_BYTES) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(Error::file(&path, error)),

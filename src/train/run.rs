@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::checkpoint::{Checkpoint, Progress};
 use super::record::{CurvePoint, NetworkRecord, Origin, TRAIN_SCHEMA, TrainRecord};
 use crate::error::{Error, Result};
-use crate::files::{MANIFEST, claim_folder, json, make_way};
+use crate::files::{Claim, MANIFEST, json, make_way};
 use crate::policy::Mlp;
 use crate::scenario::Watch;
 
@@ -74,7 +74,7 @@ impl Run<'_> {
     /// [`Error::Invalid`] if the loss is not finite, [`Error::Interrupted`] after a checkpoint was
     /// written, and those of the learner.
     pub fn train(&self, learner: &mut dyn Learner, watch: &dyn Watch) -> Result<Trained> {
-        claim_folder(self.folder, &self.manifest()?, ROOM_BYTES)?;
+        let _claim = Claim::new(self.folder, &self.manifest()?, ROOM_BYTES)?;
         let mut standing = match Checkpoint::read(self.folder)? {
             Some(stored) => self.restored(learner, stored)?,
             None => self.begun(learner)?,

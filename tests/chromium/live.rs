@@ -58,6 +58,11 @@ impl Live {
         answer["result"]["value"].clone()
     }
 
+    /// Shows the page as it is printed, on paper as wide as the window.
+    pub(crate) fn print(&mut self) {
+        self.ask("Emulation.setEmulatedMedia", &json!({ "media": "print" }));
+    }
+
     /// Presses a key and lets it go.
     pub(crate) fn key(&mut self, key: &str, code: u32, text: &str) {
         for kind in ["keyDown", "keyUp"] {

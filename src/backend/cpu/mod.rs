@@ -24,6 +24,7 @@ mod spread;
 mod tests;
 mod tile;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use self::deviation::Deviation;
@@ -39,6 +40,7 @@ use self::tile::{Drive, Driven};
 use super::task::check_task;
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
+use crate::files::{CONFIG_BYTES, read_text};
 use crate::policy::{Mlp, Policy};
 use crate::real::simd::Instructions;
 use crate::rollout::{DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask};
@@ -251,7 +253,7 @@ impl Cpu {
 
 /// The processor's name as the system knows it, else its architecture.
 fn model_name() -> String {
-    let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let listed = read_text(Path::new("/proc/cpuinfo"), CONFIG_BYTES).unwrap_or_default();
     let named = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     named.map_or(std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }

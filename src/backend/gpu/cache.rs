@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::digest::sha256;
-use crate::files::Staged;
+use crate::files::{RECORD_BYTES, Staged, read};
 
 /// A folder for the file, or `off`.
 const VARIABLE: &str = "REACHCAST_PIPELINE_CACHE";
@@ -31,7 +31,7 @@ impl PipelineCache {
         }
         let name = wgpu::util::pipeline_cache_key(&device.adapter_info())?;
         let folder = folder()?;
-        let stored = std::fs::read(folder.join(&name)).ok().and_then(whole);
+        let stored = read(&folder.join(&name), RECORD_BYTES).ok().and_then(whole);
         let descriptor =
             wgpu::PipelineCacheDescriptor { label: None, data: stored.as_deref(), fallback: true };
         #[allow(unsafe_code, reason = "the only way to give pipelines back to a driver")]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::cache::folder as cache_folder;
 use super::device::{Adapter, AdapterKind, adapters};
 use crate::digest::sha256;
-use crate::files::Staged;
+use crate::files::{CONFIG_BYTES, Staged, read_text};
 
 /// Name of the file whose content is the key of the machine that was found to have none.
 const FILE: &str = "no-hardware-adapter";
@@ -49,7 +49,7 @@ impl Adapter {
 
 /// The same with the key of the machine and the folder of the memory.
 fn remembered(folder: &Path, key: &str, ask: impl FnOnce() -> bool) -> bool {
-    if std::fs::read_to_string(folder.join(FILE)).is_ok_and(|known| known == key) {
+    if read_text(&folder.join(FILE), CONFIG_BYTES).is_ok_and(|known| known == key) {
         return false;
     }
     let found = ask();
@@ -67,7 +67,7 @@ fn remembered(folder: &Path, key: &str, ask: impl FnOnce() -> bool) -> bool {
 /// What the answer depends on: the program, the start of the system, drivers, devices, variables.
 /// None where the system does not show them.
 fn key() -> Option<String> {
-    let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
+    let boot = read_text(Path::new("/proc/sys/kernel/random/boot_id"), CONFIG_BYTES).ok()?;
     let mut parts = vec![env!("CARGO_PKG_VERSION").to_owned(), boot];
     let own = std::env::home_dir().map(|home| OWN_MANIFESTS.map(|inner| home.join(inner)));
     let folders = MANIFESTS.iter().map(PathBuf::from).chain(own.into_iter().flatten());

@@ -41,7 +41,8 @@ pub(super) fn states(section: &Section<'_>, scope: &mut Scope) -> Result<Vec<Sta
         let missing = || entry.refuse("box", "missing; expected the interval of starts");
         let [low, high] = entry.interval("box")?.ok_or_else(missing)?;
         if !(low.is_finite() && high.is_finite()) {
-            let problem = format!("[{low}, {high}] is not finite as f32: starts are drawn from it");
+            let written = entry.written("box");
+            let problem = format!("{written} is not finite as f32: starts are drawn from it");
             return Err(entry.refuse("box", problem));
         }
         let topology = match entry.flag("angle")? {
@@ -68,7 +69,8 @@ pub(super) fn controls(section: &Section<'_>, scope: &mut Scope) -> Result<Vec<A
         };
         let [low, high] = entry.interval("bounds")?.ok_or_else(missing)?;
         if low == f32::INFINITY || high == f32::NEG_INFINITY {
-            return Err(entry.refuse("bounds", format!("[{low}, {high}] holds no finite number")));
+            let written = entry.written("bounds");
+            return Err(entry.refuse("bounds", format!("{written} holds no finite number")));
         }
         Ok(Axis::new(key, unit(&entry)?, low, high))
     };
@@ -95,7 +97,8 @@ pub(super) fn parameters(
         let missing = || entry.refuse("value", "missing; expected a number");
         let value = entry.number("value")?.ok_or_else(missing)?;
         if !value.is_finite() {
-            return Err(entry.refuse("value", format!("{value} is not a finite number as f32")));
+            let written = entry.written("value");
+            return Err(entry.refuse("value", format!("{written} is not a finite number as f32")));
         }
         Ok(Parameter::new(key, unit(&entry)?, value))
     };

@@ -20,12 +20,12 @@ const KEYS: [&str; 10] =
     ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task", "bodies"];
 /// Sections of `[model]` that are refused by name, and what they would be.
 const LATER: [(&str, &str); 6] = [
-    ("disturbances", "numbers that are drawn at every step"),
-    ("noise", "measurement noise"),
-    ("costs", "costs of plans"),
-    ("references", "references of costs"),
-    ("maps", "maps of costs"),
-    ("shapes", "shapes of pictures"),
+    ("disturbances", "numbers that are drawn at every step do"),
+    ("noise", "measurement noise does"),
+    ("costs", "costs of plans do"),
+    ("references", "references of costs do"),
+    ("maps", "maps of costs do"),
+    ("shapes", "shapes of pictures do"),
 ];
 
 /// A model and its policy as a text describes them: every name known, every formula parsed.
@@ -99,7 +99,7 @@ fn check_keys(model: &Section<'_>) -> Result<()> {
     model.only(KEYS.into_iter().chain(later))?;
     match LATER.iter().find(|(key, _)| model.has(key)) {
         Some((key, what)) => {
-            Err(model.refuse(key, format!("{what} do not work yet; leave the section out")))
+            Err(model.refuse(key, format!("{what} not work yet; leave the section out")))
         }
         None => Ok(()),
     }

@@ -58,7 +58,7 @@ impl Origin {
     }
 
     /// The file and the line of the key `path`, or of what it is missing in.
-    fn place(&self, path: &str) -> String {
+    pub(crate) fn place(&self, path: &str) -> String {
         match self.text.as_deref().and_then(|text| line_of_key(text, path)) {
             Some(line) => format!("{}:{line}", self.name),
             None => self.name.clone(),

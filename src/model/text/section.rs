@@ -131,6 +131,11 @@ impl<'a> Section<'a> {
         read(value).map(Some).ok_or_else(|| self.wrong(key, expected, value))
     }
 
+    /// The value at `key` as it was written.
+    pub(super) fn written(&self, key: &str) -> String {
+        self.table.get(key).map_or_else(String::new, written)
+    }
+
     /// The refusal of a value of the wrong kind.
     pub(super) fn wrong(&self, key: &str, expected: &str, found: &Value) -> Error {
         self.refuse(key, format!("expected {expected}, found {}", words(found)))
@@ -165,6 +170,17 @@ fn number(value: &Value) -> Option<f32> {
     }
 }
 
+/// A value as it was written, a large or small number with its exponent.
+fn written(value: &Value) -> String {
+    match value {
+        Value::Float(number) => format!("{number:?}"),
+        Value::Array(list) => {
+            format!("[{}]", list.iter().map(written).collect::<Vec<_>>().join(", "))
+        }
+        other => other.to_string(),
+    }
+}
+
 /// A list of two numbers.
 fn pair(value: &Value) -> Option<[f32; 2]> {
     let [low, high] = value.as_array()?.as_slice() else { return None };
@@ -179,7 +195,12 @@ fn words(value: &Value) -> String {
         Value::Float(number) => format!("the number {number}"),
         Value::Boolean(flag) => format!("{flag}"),
         Value::Datetime(date) => format!("the date {date}"),
-        Value::Array(list) => format!("a list of {}", list.len()),
+        Value::Array(list) => match list.iter().find(|one| number(one).is_none()) {
+            Some(other) if !other.is_array() => {
+                format!("a list of {} with {}", list.len(), words(other))
+            }
+            _ => format!("a list of {}", list.len()),
+        },
         Value::Table(_) => "a section".to_owned(),
     }
 }

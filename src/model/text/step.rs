@@ -11,6 +11,9 @@ use crate::model::Model;
 use crate::real::Real;
 use crate::system::Axis;
 
+/// Key of what makes a step of formulas that are small enough too large.
+const SUBSTEPS: &str = "model.time.substeps";
+
 /// Formulas of a description with the intermediate ones that they need.
 struct Formulas<'a> {
     description: &'a Description,
@@ -88,8 +91,9 @@ impl Description {
         };
         let formulas = Formulas::new(self, formulas, networks);
         // Counted before anything is recorded: millions of substeps would fill the memory.
-        let operations = (formulas.operations() + formulas.formulas.len()).saturating_mul(stages);
-        self.check_size(path, operations)?;
+        let once = formulas.operations() + formulas.formulas.len();
+        self.check_size(path, once.saturating_mul(stages / self.substeps()))?;
+        self.check_size(SUBSTEPS, once.saturating_mul(stages))?;
         let graph = record(self.inputs(), |inputs| {
             let inputs = self.clipped(inputs);
             match &self.dynamics {
@@ -99,6 +103,14 @@ impl Description {
         });
         self.check_size(path, graph.nodes.len())?;
         Ok(graph)
+    }
+
+    /// Substeps of a step, 1 where it is not integrated.
+    fn substeps(&self) -> usize {
+        match &self.dynamics {
+            Dynamics::Next(_) => 1,
+            Dynamics::Flow(_, rule) => (rule.substeps as usize).max(1),
+        }
     }
 
     /// The inputs with every control within its bounds.

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::{Activation, Layer, Mlp, OutputActivation};
 use crate::error::{Error, Result};
+use crate::files;
 use checkpoint::Checkpoint;
 pub use kind::Cast;
 
@@ -74,7 +75,7 @@ pub struct Imported {
 /// [`Error::File`] saying what is damaged, not supported or not clear, and what to do;
 /// [`Error::Invalid`] for a request that does not go with the file.
 pub fn read(path: &Path, request: &Request) -> Result<Imported> {
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    let bytes = files::read(path, files::ARCHIVE_BYTES).map_err(|e| Error::file(path, e))?;
     from_bytes(path, &bytes, request)
 }
 

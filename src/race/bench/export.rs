@@ -19,12 +19,15 @@ const MEASURES: usize = 4096;
 /// Samples of the plan whose controls and costs are exported.
 const SAMPLES: u32 = 1024;
 
+/// Version of the layout of `settings.json`.
+const EXPORT_SCHEMA: u32 = 1;
 /// Room for all files, bytes.
 const EXPORT_BYTES: u64 = 8 << 20;
 
 /// The numbers beside the arrays: `settings.json`.
 #[derive(Serialize)]
 struct Settings {
+    schema: u32,
     seed: u64,
     horizon: u32,
     gamma: f32,
@@ -86,6 +89,7 @@ pub(crate) fn export(
 
 fn settings(seed: u64, networks: Vec<String>) -> Settings {
     Settings {
+        schema: EXPORT_SCHEMA,
         seed,
         horizon: data::HORIZON,
         gamma: data::GAMMA,

@@ -11,7 +11,7 @@ use super::arguments::RaceArguments;
 use super::input::{RaceInput, names, noise_seeds};
 use crate::cli::options::Global;
 use crate::cli::progress::Progress;
-use crate::cli::{Outcome, devices, report};
+use crate::cli::{Outcome, devices, document, report};
 use crate::error::Result;
 use crate::files::{Existing, Staged, json};
 use crate::race::page::race_html;
@@ -62,11 +62,12 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
         config: input.config.to_json()?,
         folder: out.clone(),
     };
+    let placed = |error| input.config.placed(error);
     if global.existing == Existing::Replaced {
-        experiment.make_way()?;
+        experiment.make_way().map_err(placed)?;
     }
     estimate(global, &experiment);
-    let (record, controllers) = experiment.run(&progress)?;
+    let (record, controllers) = experiment.run(&progress).map_err(placed)?;
     progress.finish();
     devices::note_events(global, &backend);
     let wall_seconds = begun.elapsed().as_secs_f64();
@@ -91,7 +92,7 @@ fn estimate(global: &Global, experiment: &Experiment<'_>) {
 fn write(out: &Path, record: &RaceRecord, timing: &Timing) -> Result<Vec<PathBuf>> {
     let mut staged = Staged::new(out)?;
     staged.add("report.html", race_html(record).as_bytes())?;
-    staged.add("timing.json", json("timing.json", timing)?.as_bytes())?;
+    staged.add("timing.json", json("timing.json", &document(timing))?.as_bytes())?;
     staged.add("results.json", json("results.json", record)?.as_bytes())?;
     staged.publish()
 }

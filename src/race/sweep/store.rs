@@ -11,7 +11,7 @@ use super::table::table;
 use crate::backend::Event;
 use crate::digest;
 use crate::error::{Error, Result};
-use crate::files::{Staged, claim_folder, json, make_way};
+use crate::files::{Claim, RECORD_BYTES, Staged, json, make_way, read_text};
 
 /// The tables grow with the sweep: they are not written again sooner than this.
 const TABLE_PERIOD: Duration = Duration::from_secs(1);
@@ -39,6 +39,8 @@ pub struct Store {
     record: SweepRecord,
     /// When the tables were written last.
     written: Option<Instant>,
+    /// Given back where no point is done.
+    claim: Claim,
 }
 
 impl Store {
@@ -50,10 +52,10 @@ impl Store {
     /// written to, [`Error::NoRoom`] if its disk is too full.
     pub fn open(folder: &Path, identity: &serde_json::Value, record: SweepRecord) -> Result<Self> {
         let need = record.total * POINT_BYTES + PAGE_BYTES;
-        claim_folder(folder, &manifest(identity, &record), need)?;
+        let claim = Claim::new(folder, &manifest(identity, &record), need)?;
         Staged::within(folder, POINTS)?;
         let folder = folder.to_owned();
-        Ok(Self { folder, record, written: None })
+        Ok(Self { folder, record, written: None, claim })
     }
 
     /// Removes the results of other work than this sweep from `folder`.
@@ -85,6 +87,7 @@ impl Store {
         let is_new = found.is_none();
         let (result, events) = match found.map_or_else(compute, Ok) {
             Ok(done) => done,
+            Err(error) if self.record.points.is_empty() => return Err(error),
             Err(error) => {
                 self.tables()?;
                 return Err(error);
@@ -120,13 +123,32 @@ impl Store {
     /// # Errors
     /// [`Error::Write`].
     pub fn finish(&mut self, page: impl FnOnce(&SweepRecord) -> String) -> Result<Vec<PathBuf>> {
+        self.claim.keep();
         self.record.notes = notes(&self.record);
+        self.record.notes.extend(self.left_out());
         let mut files = self.tables()?;
         let mut staged = Staged::new(&self.folder)?;
         staged.add("report.html", page(&self.record).as_bytes())?;
         staged.add("sweep.json", json("sweep.json", &self.record)?.as_bytes())?;
         files.extend(staged.publish()?);
         Ok(files)
+    }
+
+    /// That the folder has points of values that are not asked for now.
+    fn left_out(&self) -> Option<String> {
+        let of_this = |name: &str| {
+            self.record.points.iter().any(|point| name.strip_suffix(".json") == Some(&point.sha256))
+        };
+        let entries = std::fs::read_dir(self.folder.join(POINTS)).into_iter().flatten().flatten();
+        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let count = names.filter(|name| name.ends_with(".json") && !of_this(name)).count();
+        (count > 0).then(|| {
+            format!(
+                "{count} stored points have values that were not asked for now: they are kept in \
+                 `{POINTS}`, and the tables and the page are without them; ask for all values \
+                 together to have them all"
+            )
+        })
     }
 
     /// The sweep so far.
@@ -148,7 +170,7 @@ fn stored(path: &Path, sha256: &str) -> Result<Option<(PointResult, Vec<Event>)>
         let text = format!("{problem}; remove the file, and the point is computed again");
         Error::file(path, text)
     };
-    let text = match std::fs::read_to_string(path) {
+    let text = match read_text(path, RECORD_BYTES) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(damaged(&error)),

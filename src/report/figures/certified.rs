@@ -78,8 +78,8 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
     Figure {
         id: "figure-certified",
         title: "Certified set, ball and starts".to_owned(),
-        drawing: grid.map_or_else(no_slice, |grid| Ok(drawing(grid, ball.as_ref()))),
-        legend: legend(record, ball.as_ref()),
+        drawing: grid.map_or_else(|| no_slice(record), |grid| Ok(drawing(grid, ball.as_ref()))),
+        legend: grid.map_or_else(Vec::new, |_| legend(record, ball.as_ref())),
         caption: caption(record, ball.as_ref()),
     }
 }
@@ -116,6 +116,9 @@ fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
 
 fn caption(record: &Record, ball: Option<&Ball>) -> String {
     let values = &record.slice.check_margin;
+    if values.is_empty() {
+        return without_slice(record);
+    }
     let positive = values.iter().filter(|&&value| value > 0.0).count();
     let mut caption = format!("{positive} of {} cells are certified.", values.len());
     let varied = record.growth.varies.iter().filter(|&&varies| varies).count();
@@ -143,6 +146,19 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
         (_, None) => caption += " The centre of the ball cannot be drawn.",
     }
     caption
+}
+
+/// What is known of the set and the ball where there is no slice.
+fn without_slice(record: &Record) -> String {
+    let global = &record.global;
+    let set = format!("{} of {} starts drawn are certified.", global.accepted, global.draws);
+    match record.growth.outcome {
+        GrowthOutcome::Verified => {
+            format!("{set} The verified ball has radius {}.", number(record.growth.radius))
+        }
+        GrowthOutcome::Exhausted => format!("{set} No ball is verified."),
+        GrowthOutcome::NoBoundary => format!("{set} No boundary of the set was found."),
+    }
 }
 
 /// What the figure covers: the slice, the state, the ball and the starts.

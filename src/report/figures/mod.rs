@@ -1,6 +1,7 @@
 //! The figures of the report, one per file.
 
 mod certified;
+mod course;
 mod deviation;
 mod growth;
 mod paths;

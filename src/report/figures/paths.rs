@@ -1,5 +1,6 @@
 //! Trajectories of a few rollouts in the plane of the system's bodies.
 
+use super::course::{self, only_state};
 use super::plane::{entry, margins, point, same_unit, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, dot};
 use crate::report::plot::{Labels, Plot, Shape};
@@ -45,7 +46,7 @@ fn bodies(record: &Record) -> Vec<Body> {
 /// Whether the slice's margins are in the plane of the first body.
 fn overlaid(record: &Record, bodies: &[Body]) -> bool {
     let states = slice_states(record);
-    bodies.first().is_some_and(|body| [body.x, body.y] == states)
+    only_state(record).is_none() && bodies.first().is_some_and(|body| [body.x, body.y] == states)
 }
 
 fn class(body: usize, success: bool) -> String {
@@ -76,7 +77,8 @@ fn legend(record: &Record, bodies: &[Body]) -> Vec<(Swatch, String)> {
         .map(|(index, body)| {
             let class = CLASSES[index.min(CLASSES.len() - 1)];
             let name = format!("{}, from its start", shorten(&body.name, 40));
-            (Swatch::Marked(class, start(index)), name)
+            let mark = if only_state(record).is_some() { String::new() } else { start(index) };
+            (Swatch::Marked(class, mark), name)
         })
         .collect();
     let rollouts = &record.picture.rollouts;
@@ -140,6 +142,11 @@ fn span(record: &Record, states: impl Iterator<Item = usize>) -> Option<Span> {
 
 fn drawing(record: &Record, bodies: &[Body], grid: Option<&Grid>) -> Result<String, String> {
     let nothing = || "No state of the rollouts can be drawn.".to_owned();
+    let description = format!("Trajectories. {}", caption(record, bodies));
+    if let Some(state) = only_state(record) {
+        let span = span(record, std::iter::once(state)).ok_or_else(nothing)?;
+        return Ok(course::drawing(record, span, state, &description));
+    }
     let mut x = span(record, bodies.iter().map(|body| body.x)).ok_or_else(nothing)?;
     let mut y = span(record, bodies.iter().map(|body| body.y)).ok_or_else(nothing)?;
     if let Some(grid) = grid {
@@ -164,7 +171,7 @@ fn drawing(record: &Record, bodies: &[Body], grid: Option<&Grid>) -> Result<Stri
         y: &label(record, bodies, |body| body.y),
         whole: false,
     };
-    Ok(plot.finish(&labels, &format!("Trajectories. {}", caption(record, bodies))))
+    Ok(plot.finish(&labels, &description))
 }
 
 /// Names of the states that the bodies move along, with the unit of the first.

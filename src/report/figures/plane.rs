@@ -6,9 +6,13 @@ use crate::report::slice::Grid;
 use crate::report::text::ordinary;
 use crate::scenario::record::Record;
 
-/// Said where the arrays of a slice do not fit its axes.
-pub(super) fn no_slice() -> Result<String, String> {
-    Err("The record holds no slice that can be drawn.".to_owned())
+/// Said where there is one state alone, or where the arrays of a slice do not fit its axes.
+pub(super) fn no_slice(record: &Record) -> Result<String, String> {
+    let reason = match record.system.states.len() {
+        1 => "A slice shows two states, and the system has one.",
+        _ => "The record holds no slice that can be drawn.",
+    };
+    Err(reason.to_owned())
 }
 
 /// Path data of all zero lines of a field.

@@ -10,11 +10,24 @@ use crate::report::text::{number, ordinary};
 use crate::report::words;
 use crate::scenario::record::Record;
 
+/// Anchor and title of the figure.
+const ID: &str = "figure-value";
+const TITLE: &str = "Value slice: V_check";
 /// Thickness of the colour bar.
 const BAR: f64 = 12.0;
 
 /// The figure.
 pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
+    let Some(grid) = grid else {
+        let caption = "Tier and V_check of the state are among the numbers below.".to_owned();
+        return Figure {
+            id: ID,
+            title: TITLE.to_owned(),
+            drawing: no_slice(record),
+            legend: Vec::new(),
+            caption,
+        };
+    };
     let mut legend = vec![
         (Swatch::Line("zero"), "V_check = 0: boundary of the certified set".to_owned()),
         (Swatch::Mark(diamond()), "the state that the slice goes through".to_owned()),
@@ -31,9 +44,9 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
         _ => format!("; the other {frozen} coordinates keep the state's values"),
     };
     Figure {
-        id: "figure-value",
-        title: "Value slice: V_check".to_owned(),
-        drawing: grid.map_or_else(no_slice, |grid| Ok(drawing(grid))),
+        id: ID,
+        title: TITLE.to_owned(),
+        drawing: Ok(drawing(grid)),
         legend,
         caption: format!(
             "Each cell is one rollout from its centre, with margins tightened by the deviation \

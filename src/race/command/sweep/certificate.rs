@@ -106,9 +106,10 @@ impl Sweep<'_> {
     /// SHA-256 of a point that can be certified.
     fn checked(&self, values: &Values) -> Result<String> {
         let (config, policy, rule) = self.point(values)?;
-        let plant = config.plant(&policy)?;
-        let (settings, stored) = counted(&config, &plant, rule)?;
-        check_settings(&settings)?;
+        let blamed = |error| self.grid.blamed(error, values);
+        let plant = config.plant(&policy).map_err(blamed)?;
+        let (settings, stored) = counted(&config, &plant, rule).map_err(blamed)?;
+        check_settings(&settings).map_err(|error| blamed(config.placed(error)))?;
         let program = self.backend.prepare(&plant)?;
         Ok(certificate_sha256(&program, settings.seed, stored))
     }
@@ -119,7 +120,8 @@ impl Sweep<'_> {
         let plant = config.plant(&policy)?;
         let (settings, stored) = counted(&config, &plant, rule)?;
         let program = self.backend.prepare(&plant)?;
-        let point = certificate_point(&program, &settings, stored, progress)?;
+        let point = certificate_point(&program, &settings, stored, progress);
+        let point = point.map_err(|error| self.grid.blamed(config.placed(error), values))?;
         Ok(PointResult::Certificate(point))
     }
 }

@@ -1,5 +1,6 @@
 //! The grid of a sweep: axes from options, their points, and what each value sets.
 
+use crate::cli::race_input::name;
 use crate::config::Overrides;
 use crate::error::{Error, Result};
 use crate::race::controller::Name;
@@ -271,16 +272,29 @@ impl Grid {
         Ok(overrides)
     }
 
-    /// `error` with the option of the axis in place of the assignment that it made.
+    /// `error` with the option of the axis, and the key, in place of the assignment that it made.
     pub(super) fn blamed(&self, error: Error, values: &Values) -> Error {
         let Error::Invalid { place, problem } = error else { return error };
-        let made = place.strip_prefix("--set ").and_then(|assignment| {
-            let made = |(axis, value): &(&Axis, &String)| {
-                axis.assignments(value, None).iter().any(|made| made == assignment)
+        let controller = self.value(values, &Target::Controller).and_then(|text| name(text).ok());
+        let place = self.option(&place, values, controller).unwrap_or(place);
+        Error::Invalid { place, problem }
+    }
+
+    /// The option, with its key, whose assignment `place` begins with; none if it is not of an axis.
+    fn option(&self, place: &str, values: &Values, controller: Option<Name>) -> Option<String> {
+        let assignment = place.strip_prefix("--set ")?;
+        self.axes.iter().zip(values).find_map(|(axis, value)| {
+            let made = axis.assignments(value, controller);
+            let is = |made: &&String| {
+                assignment
+                    .strip_prefix(made.as_str())
+                    .is_some_and(|rest| !rest.starts_with(|c| c != ':'))
             };
-            self.axes.iter().zip(values).find(made).map(|(axis, _)| axis.option.clone())
-        });
-        Error::Invalid { place: made.unwrap_or(place), problem }
+            let made = made.iter().find(is)?;
+            let key = made.split('=').next().unwrap_or_default();
+            let named = axis.option.contains(key);
+            Some(if named { axis.option.clone() } else { format!("{}: {key}", axis.option) })
+        })
     }
 
     /// The point `values` in words, number `index` from 0.

@@ -104,7 +104,8 @@ impl Sweep<'_> {
         let plant = input.plant()?;
         let program = self.backend.prepare(&plant)?;
         let experiment = self.experiment(&input, &program)?;
-        experiment.check_point(name)?;
+        let checked = experiment.check_point(name);
+        checked.map_err(|error| self.grid.blamed(input.config.placed(error), values))?;
         Ok(experiment.point_sha256(name))
     }
 
