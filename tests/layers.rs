@@ -125,6 +125,24 @@ fn only_the_gpu_backend_names_wgpu() {
     assert!(inside > 0, "the search finds nothing, not even where it must");
 }
 
+/// Elsewhere a pipe would be waited for, and a device read until memory ends.
+#[test]
+fn only_one_file_reads_files() {
+    let ways =
+        ["fs::read(", "fs::read)", "fs::{read", "read_to_string", "File::open", "OpenOptions"];
+    let mut inside = 0;
+    for (name, text) in modules::texts(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src")) {
+        let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        let found: Vec<_> = ways.iter().filter(|way| code.contains(**way)).collect();
+        if name == "files/plain.rs" {
+            inside += found.len();
+        } else if !name.contains("tests") {
+            assert!(found.is_empty(), "{name} reads files by {found:?}; `files/plain.rs` does");
+        }
+    }
+    assert!(inside > 0, "the search finds nothing, not even where it must");
+}
+
 /// A crate of a few files.
 fn made_up(files: &[(&str, &str)]) -> Modules {
     Modules::of(files.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())))

@@ -19,6 +19,6 @@ pub(crate) fn inputs(
 }
 
 /// The files of networks that formulas of a model call.
-pub(super) fn networks(config: &Config) -> impl Iterator<Item = PathBuf> {
+pub(crate) fn networks(config: &Config) -> impl Iterator<Item = PathBuf> {
     config.networks.iter().map(|file| file.path.clone())
 }

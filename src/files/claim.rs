@@ -1,10 +1,11 @@
 //! A folder that holds the results of one piece of work, and says which.
 
-use std::io::{BufRead, BufReader, ErrorKind};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::made::Made;
-use super::{RECORD_BYTES, Staged, check_room, named, open, read_text};
+use super::existing::spare_folder;
+use super::{RECORD_BYTES, Staged, check_room, named, read_text};
 use crate::error::{Error, Result};
 
 /// Name of the file that says which work a folder holds.

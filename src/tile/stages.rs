@@ -119,29 +119,43 @@ where
 {
     #[inline(always)]
     fn run<V: Vector>(self) {
+        // Samples of a group, known to the compiler: it leaves out all tests of indices.
+        match V::WIDTH {
+            16 => self.groups::<V, 32>(),
+            _ => self.groups::<V, 16>(),
+        }
+    }
+}
+
+impl<S, C, const NX: usize, const NU: usize, const NC: usize> Advance<'_, S, C, NX, NU, NC>
+where
+    S: System<NX, NU>,
+    C: Cost<NX, NU, NC>,
+{
+    /// The stages of all samples in groups of `N`.
+    #[inline(always)]
+    fn groups<V: Vector, const N: usize>(self) {
         let CompiledStages { system, cost } = self.formulas;
         let Stages { frame, total, controls, group, lanes, steps, plan, context, .. } = self.stages;
+        assert_eq!(group, N, "samples of a group");
         let (bounds, penalty) = (self.stages.bounds.as_chunks::<NU>().0, self.stages.penalty);
-        let (plan, context) = (plan.as_chunks::<NU>().0, context.as_chunks::<NC>().0);
         let [bounds] = bounds else { unreachable!("bounds of each control") };
-        let blocks = Blocks::new(frame, lanes);
+        let (plan, context) = (plan.as_chunks::<NU>().0, context.as_chunks::<NC>().0);
+        let (horizon, plan, context) = (plan.len(), &plan[steps.clone()], &context[steps.clone()]);
+        let blocks = Blocks::new(frame, lanes.next_multiple_of(N));
         let (states, totals) = (blocks.rows::<NX>(0), blocks.rows::<1>(total));
-        let length = plan.len() * NU * group;
-        for block in 0..blocks.length {
-            for at in (0..GRANULE).step_by(V::WIDTH) {
-                let mut x: [V; NX] = load(&states, block, at);
-                let [mut total]: [V; 1] = load(&totals, block, at);
-                let lane = block * GRANULE + at;
-                let rows = &mut controls[lane / group * length..][..length];
-                let lane = lane % group;
-                for t in steps.clone() {
-                    let rows = &mut rows[t * NU * group..][..NU * group];
-                    let (nominal, stage) = (&plan[t], &context[t]);
+        let rows = controls.as_chunks_mut::<N>().0.as_chunks_mut::<NU>().0;
+        for (number, rows) in rows.chunks_mut(horizon).take(lanes.div_ceil(N)).enumerate() {
+            for at in (0..N).step_by(V::WIDTH) {
+                let (block, within) = ((number * N + at) / GRANULE, (number * N + at) % GRANULE);
+                let mut x: [V; NX] = load(&states, block, within);
+                let [mut total]: [V; 1] = load(&totals, block, within);
+                let stages = rows[steps.clone()].iter_mut().zip(plan).zip(context);
+                for ((row, nominal), stage) in stages {
                     let mut u = [V::lit(0.0); NU];
                     for i in 0..NU {
-                        let place = &mut rows[i * group + lane..];
-                        u[i] = clipped(nominal[i], V::load(place), bounds[i]);
-                        u[i].store(place);
+                        u[i] = clipped(nominal[i], V::load(&row[i][at..]), bounds[i]);
+                        u[i].store(&mut row[i][at..]);
                     }
                     total = total + cost.stage(x, u, lit(stage));
                     if let Some(penalty) = penalty {
@@ -152,8 +166,8 @@ where
                     }
                     x = system.step(x, u);
                 }
-                store(x, &states, block, at);
-                store([total], &totals, block, at);
+                store(x, &states, block, within);
+                store([total], &totals, block, within);
             }
         }
     }

@@ -6,7 +6,7 @@ use crate::report::span::Span;
 use crate::report::words;
 use crate::scenario::record::{Record, RolloutRecord};
 
-use super::entry;
+use super::plane::entry;
 
 /// The only state of a system that has no bodies to show.
 pub(super) fn only_state(record: &Record) -> Option<usize> {

@@ -1,6 +1,6 @@
 //! The grid of a sweep: axes from options, their points, and what each value sets.
 
-use crate::cli::race_input::name;
+use crate::race::command::input::name;
 use crate::config::Overrides;
 use crate::error::{Error, Result};
 use crate::race::controller::Name;
