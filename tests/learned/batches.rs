@@ -16,7 +16,7 @@ const COUNT: u64 = 150;
 
 fn starts(seed: u64) -> Starts<'static> {
     let region = Region::new_box([-1.3; 2], [1.3; 2]).expect("a box");
-    Starts::Drawn { region, stream: Stream::new(seed, Purpose::User, 3) }
+    Starts::Drawn { region, stream: Stream::new(seed, Purpose::USER, 3) }
 }
 
 fn spec() -> RolloutSpec {
@@ -79,7 +79,7 @@ pub(crate) fn assert_measures(backend: &Backend, law: Law) {
 /// Requires the measures of pairs to be those of f64.
 pub(crate) fn assert_pairs(backend: &Backend, law: Law, control: PairControl) {
     let (truth, spec) = (Truth::new(law), spec());
-    let stream = Stream::new(73, Purpose::DeviationPerturbation, 0);
+    let stream = Stream::new(73, reachcast::scenario::purpose::DEVIATION_PERTURBATION, 0);
     let pairs = Pairs { nominal: starts(72), radius: 0.2, stream };
     let task =
         DeviationTask { pairs, range: 3..3 + COUNT, spec, tightening: &ramp(&spec), control };
