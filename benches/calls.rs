@@ -8,12 +8,12 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::compose::{Kernel, PlantText};
 use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
+use reachcast::bench;
 use reachcast::model::{Controller, Model, Plant};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    Plant as TypedPlant, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream,
-    Tightening,
+    Plant as TypedPlant, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 
@@ -46,7 +46,7 @@ fn calls<S, P, const NX: usize, const NU: usize>(
     let task = ReachAvoidTask {
         starts: Starts::Drawn {
             region: Region::new_box(low, high).expect("a box"),
-            stream: Stream::new(1, Purpose::Bench, 0),
+            stream: Stream::new(1, bench::PURPOSE, 0),
         },
         range: 0..1,
         spec,

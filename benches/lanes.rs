@@ -14,10 +14,10 @@ use std::process::ExitCode;
 use reachcast::Result;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
-use reachcast::bench::data::{self, Data};
 use reachcast::bench::measure::{Protocol, measure};
 use reachcast::policy::Policy;
 use reachcast::race::DroneRace;
+use reachcast::race::bench::data::{self, Data};
 use reachcast::rollout::{
     CostQuery, MppiTask, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };

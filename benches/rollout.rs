@@ -17,11 +17,11 @@ use rayon::prelude::*;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Choice, Gpu};
-use reachcast::bench::data::{self, Data, HORIZON};
 use reachcast::bench::limits::multiply;
 use reachcast::model;
 use reachcast::policy::{Mlp, Policy};
 use reachcast::race::DroneRace;
+use reachcast::race::bench::data::{self, Data, HORIZON};
 use reachcast::rollout::{
     DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts,
     Stream, Tightening,
@@ -110,7 +110,7 @@ impl Bench {
             pairs: Pairs {
                 nominal: Starts::listed(&*self.data.starts),
                 radius: 0.1,
-                stream: Stream::new(1, Purpose::User, 0),
+                stream: Stream::new(1, Purpose::USER, 0),
             },
             range: 0..count,
             spec: self.spec,

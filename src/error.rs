@@ -14,10 +14,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A value in the configuration, on the command line or in a call is not usable.
+    /// A value in a configuration, an argument or a call is not usable.
     #[error("{place}: {problem}")]
     Invalid {
-        /// The key, flag or argument.
+        /// The key or argument.
         place: String,
         /// What is wrong with it and what is expected.
         problem: String,
@@ -73,10 +73,7 @@ pub enum Error {
     #[error("{0}")]
     Device(String),
     /// The device failed during the work.
-    #[error(
-        "device failure ({fault}): {problem}; `--fallback` goes on on the CPU where an adapter \
-         fails, `--backend cpu` starts there"
-    )]
+    #[error("device failure ({fault}): {problem}")]
     DeviceFailed {
         /// How.
         fault: Fault,
@@ -86,10 +83,8 @@ pub enum Error {
     /// A stored certificate does not fit what it is used with.
     #[error("stored certificate refused: {0}")]
     Refused(String),
-    /// Stopped by Ctrl-C or a termination signal; nothing half-written is left.
-    #[error(
-        "interrupted; no result was written (what `race`, `sweep` and `train` have done is kept)"
-    )]
+    /// Stopped by whoever watches the work; nothing half-written is left.
+    #[error("interrupted; no result was written")]
     Interrupted,
 }
 
@@ -135,7 +130,7 @@ impl Error {
         Self::File { path: path.to_owned(), problem: problem.to_string() }
     }
 
-    /// Exit code of the command line: 2 for wrong usage, config or input, 1 for failed work.
+    /// What a program should exit with: 2 for wrong usage, configuration or input, 1 for failed work.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Invalid { .. }

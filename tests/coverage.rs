@@ -15,10 +15,11 @@ use reachcast::backend::{Backend, Program};
 use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
-use reachcast::rollout::{Purpose, Tightening};
+use reachcast::rollout::Tightening;
 use reachcast::scenario::bound::{certified_risk, required_scenarios};
 use reachcast::scenario::boundary::Boundary;
 use reachcast::scenario::growth::{Growth, grow};
+use reachcast::scenario::purpose;
 use reachcast::scenario::settings::{Joint, Settings};
 use reachcast::scenario::{Context, Unwatched, deviation, global};
 use reachcast::system::{Axis, BangBang, DoubleIntegrator, System};
@@ -315,7 +316,7 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     let (mut false_bounds, mut false_halves, mut false_shares) = (0, 0, 0);
     for seed in 0..SEEDS {
         settings.seed = seed;
-        let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
+        let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
         let record = global::conditional(context, &settings, &tightening, purposes)
             .expect("conditional failure");
         let (n, k) = (record.accepted, record.claim.failures);

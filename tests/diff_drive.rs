@@ -241,7 +241,7 @@ fn a_lost_state_is_charged_a_cell() {
         start: [1.2, -1.7],
         plan: vec![[0.0]; 3],
         context: vec![[0.0]; 3],
-        stream: Stream::new(1, Purpose::ControlNoise, 0),
+        stream: Stream::new(1, Purpose::CONTROL_NOISE, 0),
     }];
     let task = MppiTask {
         spec: &spec,
@@ -282,7 +282,7 @@ fn drive_to_goal(benchmark: &DriveBenchmark, start: [f32; 3], seed: u64) -> (f32
         let [problem] = &mut problems;
         let [x, y, _] = problem.start;
         problem.context.fill([goal_x, goal_y, (goal_y - y).atan2(goal_x - x)]);
-        problem.stream = Stream::new(seed, Purpose::ControlNoise, step);
+        problem.stream = Stream::new(seed, Purpose::CONTROL_NOISE, step);
         benchmark.planner.improve(&backend, system, &mut problems).unwrap();
         let [problem] = &mut problems;
         problem.start = system.step(problem.start, problem.plan[0]);

@@ -10,7 +10,7 @@ use modules::{Import, Modules};
 /// Layer of each top-level module; a file may name its own layer and those below it.
 ///
 /// The study goes through all of them; its parts that stand elsewhere than with the experiments are named.
-const LAYERS: [(&str, u32); 25] = [
+const LAYERS: [(&str, u32); 26] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -33,6 +33,7 @@ const LAYERS: [(&str, u32); 25] = [
     ("bench", 7),
     ("train", 7),
     ("report", 8),
+    ("studies", 9),
     ("cli", 9),
     ("config", 9),
     ("lib", 9),
@@ -40,13 +41,12 @@ const LAYERS: [(&str, u32); 25] = [
 
 /// Circles that stand, by folder and parts, each with the reason. The list gets shorter, never longer:
 /// a circle that is smaller than its entry is a failure too.
-const STANDING: [(&str, &[&str]); 5] = [
+const STANDING: [(&str, &[&str]); 4] = [
     // The elementary functions are default methods of the scalar trait and are written in its operations.
     ("real", &["approx", "mod"]),
-    // The command line calls the commands of the study, which stand on its options and devices.
-    ("", &["cli", "race::command"]),
-    // The numbers of the study are among those that a configuration starts from.
-    ("", &["config", "race::defaults"]),
+    // The command line and configurations ask the registry of studies, and the parts of a study that stand
+    // there are written with their options and sections.
+    ("", &["cli", "config", "race::command", "race::defaults", "studies"]),
     // To be taken apart: what the parts share moves down.
     ("race/sweep_page", &["chart", "curves", "rows"]),
     ("rollout", &["mppi", "noise"]),

@@ -64,7 +64,7 @@ fn linear_problem(plan: Vec<[f32; 1]>, seed: u64) -> MppiProblem<2, 1, 3> {
         start: [1.0, -0.5],
         plan,
         context: context.collect(),
-        stream: Stream::new(seed, Purpose::ControlNoise, 0),
+        stream: Stream::new(seed, Purpose::CONTROL_NOISE, 0),
     }
 }
 
@@ -293,7 +293,7 @@ fn race_problems(horizon: usize) -> Vec<MppiProblem<12, 3, RACE_CONTEXT>> {
             start: start(i as f32),
             plan: plan(i),
             context: (0..horizon).map(|t| context(i, t)).collect(),
-            stream: Stream::new(40 + i as u64, Purpose::ControlNoise, 7 * i as u32),
+            stream: Stream::new(40 + i as u64, Purpose::CONTROL_NOISE, 7 * i as u32),
         })
         .collect()
 }
@@ -389,7 +389,7 @@ fn small_and_long_problems() {
             start: [0.6, -0.1],
             plan: vec![[0.1]; horizon as usize],
             context: context.collect(),
-            stream: Stream::new(5, Purpose::ControlNoise, 1),
+            stream: Stream::new(5, Purpose::CONTROL_NOISE, 1),
         };
         compare(&system, &cost, &task(&spec, &[problem]));
     }
@@ -446,7 +446,7 @@ fn the_noise_has_the_moments_that_were_asked_for() {
             ..race_settings(count, 12)
         };
         let spec = MppiSpec::new(settings).unwrap();
-        let stream = Stream::new(9, Purpose::ControlNoise, 0);
+        let stream = Stream::new(9, Purpose::CONTROL_NOISE, 0);
         let samples: Vec<_> = (0..count).map(|k| spec.noise().sample(stream, 0, k)).collect();
         let moment = |s: usize, t: usize, i: usize, j: usize| {
             let terms = samples.iter().map(|e| f64::from(e[s][i]) * f64::from(e[t][j]));
@@ -483,7 +483,7 @@ fn the_noise_has_the_moments_that_were_asked_for() {
 fn antithetic_samples_mirror_each_other() {
     let settings = MppiSettings { antithetic: true, ..race_settings(10, 6) };
     let spec = MppiSpec::new(settings).unwrap();
-    let stream = Stream::new(9, Purpose::ControlNoise, 0);
+    let stream = Stream::new(9, Purpose::CONTROL_NOISE, 0);
     for pair in 0..5 {
         let [a, b] = [0, 1].map(|i| spec.noise().sample(stream, 0, 2 * pair + i));
         assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| *a == -*b && *a != 0.0));

@@ -94,7 +94,7 @@ where
 {
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let tightening = losses(&spec);
-    let starts = Starts::Drawn { region, stream: Stream::new(3, Purpose::User, 5) };
+    let starts = Starts::Drawn { region, stream: Stream::new(3, Purpose::USER, 5) };
     [Query::Measure, Query::Sign].into_iter().all(|query| {
         let task = ReachAvoidTask {
             starts: starts.clone(),
@@ -131,9 +131,9 @@ where
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let tightening = losses(&spec);
     let pairs = Pairs {
-        nominal: Starts::Drawn { region, stream: Stream::new(3, Purpose::User, 6) },
+        nominal: Starts::Drawn { region, stream: Stream::new(3, Purpose::USER, 6) },
         radius: 0.1,
-        stream: Stream::new(3, Purpose::User, 7),
+        stream: Stream::new(3, Purpose::USER, 7),
     };
     let task = DeviationTask {
         pairs: pairs.clone(),
@@ -170,13 +170,13 @@ fn drift_parity(gpu: Gpu) -> bool {
     let truth = models::Truth::new(driver, models::VALUES);
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let region = Region::new_box([-1.5, -1.5, -2.0], [1.5, 1.5, 2.0]).expect("box");
-    let drawn = Starts::Drawn { region, stream: Stream::new(3, Purpose::User, 8) };
+    let drawn = Starts::Drawn { region, stream: Stream::new(3, Purpose::USER, 8) };
     let list: Vec<f32> = (0..BATCH).flat_map(|index| drawn.start(index)).collect();
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Listed(States::new(&list, 3)),
             radius: 0.2,
-            stream: Stream::new(3, Purpose::User, 9),
+            stream: Stream::new(3, Purpose::USER, 9),
         },
         range: 0..BATCH,
         spec,
@@ -283,7 +283,7 @@ fn mppi_problem(number: u32) -> MppiProblem<2, 1, 3> {
         start: [0.8 - shift, shift - 0.3],
         plan: (0..MPPI_HORIZON).map(|t| [step(t)]).collect(),
         context: (0..MPPI_HORIZON).map(|t| [0.1 * step(t), shift, t as f32 / 9.0]).collect(),
-        stream: Stream::new(3, Purpose::ControlNoise, number),
+        stream: Stream::new(3, Purpose::CONTROL_NOISE, number),
     }
 }
 

@@ -411,7 +411,7 @@ fn samples_that_overflow_have_no_weight() {
         start: [start],
         plan: vec![[0.25]; 12],
         context: vec![[0.0]; 12],
-        stream: Stream::new(71, Purpose::ControlNoise, number),
+        stream: Stream::new(71, Purpose::CONTROL_NOISE, number),
     };
     // Some samples overflow, then all of them.
     let problems = [problem(0.3, 0), problem(100.0, 1)];

@@ -254,7 +254,7 @@ fn margins_within_the_band_are_decided_in_f64() {
         system.states().map(|axis| axis.high),
     );
     let starts =
-        Starts::Drawn { region: region.expect("box"), stream: Stream::new(5, Purpose::User, 3) };
+        Starts::Drawn { region: region.expect("box"), stream: Stream::new(5, Purpose::USER, 3) };
     let states = StateList::new(12).with((0..200).map(|index| starts.start(index)));
     let backend = cpu(2);
     let program = program(&backend, &model::Plant::of(DroneRace::default(), race_policy()));
@@ -446,12 +446,12 @@ fn compare<S, P, const NX: usize, const NU: usize>(
     let tightening = deviation::tightening(&bound, 0.5, 0.25, &spec);
     let starts = || Starts::Drawn {
         region: Region::new_box(&*settings.low, &*settings.high).expect("box"),
-        stream: Stream::new(9, Purpose::User, 0),
+        stream: Stream::new(9, Purpose::USER, 0),
     };
     let pairs = Pairs {
         nominal: starts(),
         radius: settings.deviation.radius,
-        stream: Stream::new(9, Purpose::User, 1),
+        stream: Stream::new(9, Purpose::USER, 1),
     };
     let given = |i: u64| pairs.pair(i).map(|x| from_fn(|k| x[k]));
     let oracle: Vec<ScalarPair> = (0..COUNT)

@@ -184,7 +184,7 @@ fn every_output_lies_in_its_interval() {
 fn seen_ranges_are_those_of_the_states_drawn() {
     let network = race_policy();
     let (low, high) = (vec![-1.0_f32; 12], (0..12).map(|i| 0.25 * i as f32).collect::<Vec<_>>());
-    let stream = Stream::new(3, Purpose::User, 0);
+    let stream = Stream::new(3, Purpose::USER, 0);
     let batches = (0..640).step_by(16).map(|i| stream.in_box::<16>(&low, &high, i));
     let ranges = output_ranges(&network, batches);
     let region = Region::Box { low, high };

@@ -53,7 +53,7 @@ fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
     let (mut x, mut plan) = ([0.8, 0.0], vec![[0.0]; HORIZON]);
     let mut warm = None;
     for step in 0..steps {
-        let stream = Stream::new(81, Purpose::ControlNoise, step);
+        let stream = Stream::new(81, Purpose::CONTROL_NOISE, step);
         let context = vec![[0.0; 3]; HORIZON];
         let mut problems = [MppiProblem { start: x, plan: shifted(&plan), context, stream }];
         let results = planner.improve(backend, &system, &mut problems).expect("a plan");

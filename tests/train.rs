@@ -12,14 +12,13 @@ use std::sync::Arc;
 use burn_tensor::{Tensor, activation};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
+use reachcast::bench;
 use reachcast::config::Config;
 use reachcast::formula::{Graph, Node, record};
 use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
-use reachcast::rollout::{
-    Plant, Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, reach_avoid,
-};
+use reachcast::rollout::{Plant, Query, ReachAvoidTask, Starts, Stream, Tightening, reach_avoid};
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
@@ -29,6 +28,7 @@ use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::{Curve, layer};
 use reachcast::train::network::{Network, Shape};
 use reachcast::train::physics::apply;
+use reachcast::train::purpose;
 use reachcast::train::record::{Origin, TrainRecord};
 use reachcast::train::run::{Learner, Run};
 use reachcast::train::samples::Source;
@@ -131,7 +131,7 @@ fn slopes_of_the_softened_measure_are_central_differences_in_f64() {
     let spec = config.spec().unwrap();
     let lost = losses(&spec);
     let learner = learner(&system, &backend, &config, network.clone(), Some(lost.clone()));
-    let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::TrainStart, 3, 6);
+    let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::START, 3, 6);
     let bound = network.bind(&Device::cpu());
     let measures = learner.measures(&bound, &starts, tau);
     let found = bound.gradient(&measures.clone().sum().backward());
@@ -184,7 +184,7 @@ fn an_exported_network_measures_as_on_tensors() {
         (DroneRace::default(), cpu(1), config("drone-race", "analytic", &[]));
     let network = random(&system, &[64, 64], 1.0);
     let learner = learner(&system, &backend, &config, network.clone(), None);
-    let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::HeldOut, 0, 500);
+    let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::HELD_OUT, 0, 500);
     let told = floats(learner.measures(&network.bind(&Device::cpu()), &starts, 1e-7));
     let policy = network.export(order(&system)).unwrap();
     let measured = measures(&backend, Plant { system: &system, policy: &policy }, &starts, &config);
@@ -306,7 +306,7 @@ fn training_improves_and_ends_early() {
     let best = scores.iter().copied().fold(0.0, f64::max);
     let config = config("double-integrator", "analytic", &[]);
     let system = DoubleIntegrator::default();
-    let held_out = config.mixture(&system.states()).unwrap().draw(5, Purpose::HeldOut, 0, 512);
+    let held_out = config.mixture(&system.states()).unwrap().draw(5, purpose::HELD_OUT, 0, 512);
     let share = |measures: Vec<f32>| {
         measures.iter().filter(|m| **m > 0.0).count() as f64 / measures.len() as f64
     };
@@ -339,7 +339,7 @@ fn carried_networks_know_the_set_in_closed_form() {
         Mlp::load(&folder.join(format!("double_integrator_{name}.safetensors"))).unwrap()
     };
     let (policy, value) = (carried("policy"), carried("value"));
-    let starts = config.mixture(&system.states()).unwrap().draw(11, Purpose::HeldOut, 0, 20_000);
+    let starts = config.mixture(&system.states()).unwrap().draw(11, purpose::HELD_OUT, 0, 20_000);
     let plant = Plant { system: &system, policy: &policy };
     let measured = measures(&cpu(2), plant, &starts, &config);
     let (mut set, mut covered, mut right) = (0, 0, 0);
@@ -383,8 +383,8 @@ fn samples_are_measures_in_f64() {
         }
         reach_avoid(margins, f64::from(source.spec.gamma))
     };
-    let values = source.values::<1>(Purpose::TrainStart, 300).unwrap();
-    let actions = source.action_values::<1>(Purpose::TrainStart, 300).unwrap();
+    let values = source.values::<1>(purpose::START, 300).unwrap();
+    let actions = source.action_values::<1>(purpose::START, 300).unwrap();
     assert_eq!((values.len(), values.columns, actions.len(), actions.columns), (300, 2, 300, 3));
     let mut outside = 0;
     for i in 0..300 {
@@ -417,15 +417,15 @@ fn a_value_network_learns_the_measure() {
     let lesson = Lesson {
         name: "value",
         order: order(&system),
-        samples: source.values::<1>(Purpose::TrainStart, 20_000).unwrap(),
-        held_out: source.values::<1>(Purpose::HeldOut, 2000).unwrap(),
+        samples: source.values::<1>(purpose::START, 20_000).unwrap(),
+        held_out: source.values::<1>(purpose::HELD_OUT, 2000).unwrap(),
         device: Device::cpu(),
         seed: 5,
     };
     let inputs = system.states().iter().map(|axis| [axis.low, axis.high]).collect();
     let (activation, output) = (Activation::Relu, OutputActivation::Identity);
     let shape = Shape { inputs, hidden: vec![32; 2], outputs: 1, activation, output };
-    let network = Network::random(shape, Stream::new(5, Purpose::TrainWeight, 0), 1.0);
+    let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
     let mut settings = settings(&config).value;
     settings.batch = 256;
     let mut learner = Value::new(lesson, network, settings).unwrap();
@@ -477,8 +477,8 @@ fn the_loss_is_the_mean_gain() {
     let spec = config.spec().unwrap();
     let mut learner = learner(&system, &backend, &config, network.clone(), Some(losses(&spec)));
     let batch = settings(&config).analytic.batch;
-    let starts = config.mixture(&system.states()).unwrap().draw(5, Purpose::TrainStart, 0, batch);
-    let next = config.mixture(&system.states()).unwrap().draw(5, Purpose::TrainStart, 1, batch);
+    let starts = config.mixture(&system.states()).unwrap().draw(5, purpose::START, 0, batch);
+    let next = config.mixture(&system.states()).unwrap().draw(5, purpose::START, 1, batch);
     assert!(starts.iter().all(|start| !next.contains(start)), "fresh starts");
     let AnalyticSettings { scale, slope, temperature, .. } = settings(&config).analytic;
     let bound = network.bind(&Device::cpu());
@@ -539,8 +539,8 @@ fn one_operation_per_graph_is_one_per_node() {
         next.into_iter().chain(margins).collect()
     });
     let config = config("drone-race", "analytic", &[]);
-    let states = config.mixture(&system.states()).unwrap().draw(9, Purpose::TrainStart, 0, 37);
-    let controls = Stream::new(9, Purpose::TrainControl, 0);
+    let states = config.mixture(&system.states()).unwrap().draw(9, purpose::START, 0, 37);
+    let controls = Stream::new(9, purpose::CONTROL, 0);
     let row = |i: usize| -> Vec<f32> {
         let u = controls.in_box::<1>(&[-1.2; 3], &[1.2; 3], i as u64);
         states[i].into_iter().chain(u.into_iter().map(|lane| lane.0[0])).collect()
@@ -568,7 +568,7 @@ fn one_operation_per_graph_is_one_per_node() {
 fn a_layer_is_burns_own_operations() {
     let drawn = |number: u32, [rows, columns]: [usize; 2]| {
         let count = rows * columns;
-        let lanes = Stream::new(9, Purpose::Bench, number).in_box::<1>(
+        let lanes = Stream::new(9, bench::PURPOSE, number).in_box::<1>(
             &vec![-2.0; count],
             &vec![2.0; count],
             0,

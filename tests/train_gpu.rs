@@ -14,9 +14,10 @@ use burn_tensor::Tensor;
 use command::{Folder, document, refused};
 use common::{adapter, cpu};
 use reachcast::backend::Backend;
+use reachcast::bench;
 use reachcast::policy::{Activation, OutputActivation};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{Plant, Purpose, Stream};
+use reachcast::rollout::{Plant, Stream};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::ddpg::{Ddpg, Game};
@@ -24,6 +25,7 @@ use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::{Curve, layer};
 use reachcast::train::network::{Network, Shape};
 use reachcast::train::ppo::{self, Ppo};
+use reachcast::train::purpose;
 use reachcast::train::reward::Reward;
 use reachcast::train::run::Learner;
 use reachcast::train::samples::Source;
@@ -50,7 +52,7 @@ fn devices() -> Option<[Device; 2]> {
 
 /// Random numbers within `-reach..reach`.
 fn drawn(number: u32, count: usize, reach: f32) -> Vec<f32> {
-    let stream = Stream::new(9, Purpose::Bench, number);
+    let stream = Stream::new(9, bench::PURPOSE, number);
     let lanes = stream.in_box::<1>(&vec![-reach; count], &vec![reach; count], 0);
     lanes.iter().map(|lane| lane.0[0]).collect()
 }
@@ -194,7 +196,7 @@ fn slopes_of_the_softened_measure_are_the_cpus() {
         (DroneRace::default(), cpu(1), config("drone-race", "analytic", &[]));
     let network = random(&system, &[64, 64], 1.0);
     let losses = Some(losses(&config.spec().unwrap()));
-    let starts = config.mixture(&system.states()).unwrap().draw(9, Purpose::TrainStart, 3, 100);
+    let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::START, 3, 100);
     let [expected, found] = devices.map(|device| {
         let task = Task { losses: losses.clone(), ..task(&system, &backend, &device, &config) };
         let learner = Analytic::new(task, network.clone(), settings(&config).analytic);
@@ -263,15 +265,15 @@ fn a_value_is_updated_as_on_the_cpu() {
         let lesson = value::Lesson {
             name: "value",
             order: system.states().map(|axis| axis.name).to_vec(),
-            samples: samples(Purpose::TrainStart),
-            held_out: samples(Purpose::HeldOut),
+            samples: samples(purpose::START),
+            held_out: samples(purpose::HELD_OUT),
             device: device.clone(),
             seed: 5,
         };
         let (activation, output) = (Activation::Relu, OutputActivation::Identity);
         let (inputs, hidden) = (intervals(&system), vec![32; 2]);
         let shape = Shape { inputs, hidden, outputs: 1, activation, output };
-        let network = Network::random(shape, Stream::new(5, Purpose::TrainWeight, 0), 1.0);
+        let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
         Value::new(lesson, network, settings(&config).value).unwrap()
     });
 }

@@ -15,7 +15,7 @@ use reachcast::backend::Backend;
 use reachcast::config::Config;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{Plant, Purpose, RolloutSpec, Stream, Tightening, measure};
+use reachcast::rollout::{Plant, RolloutSpec, Stream, Tightening, measure};
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
@@ -26,6 +26,7 @@ use reachcast::train::disturbed::{Disturbed, pushed};
 use reachcast::train::environments::Environments;
 use reachcast::train::gae::{Step, advantages};
 use reachcast::train::ppo::{Lesson, Ppo};
+use reachcast::train::purpose;
 use reachcast::train::record::{Origin, TrainRecord};
 use reachcast::train::replay::Replay;
 use reachcast::train::reward::Reward;
@@ -208,7 +209,7 @@ fn both_players_come_near_the_solution_of_the_game() {
         learner.update(iteration).unwrap();
     }
     let after = learner.scores().unwrap();
-    let starts = config.mixture(&system.states()).unwrap().draw(5, Purpose::HeldOut, 0, 2048);
+    let starts = config.mixture(&system.states()).unwrap().draw(5, purpose::HELD_OUT, 0, 2048);
     let reached = |system: &DoubleIntegrator| {
         let policy = &BangBang { acceleration: system.acceleration };
         let spec = config.spec().unwrap();
@@ -260,7 +261,7 @@ fn a_game_that_was_interrupted_comes_to_the_same() {
 #[test]
 fn a_replay_holds_the_latest_rows() {
     let mut replay = Replay::new(8, 2);
-    let stream = Stream::new(1, Purpose::TrainChoice, 0);
+    let stream = Stream::new(1, purpose::CHOICE, 0);
     for number in 0..11_u64 {
         // No row is zero, as those are that were not written.
         replay.write(number, &[number as f32 + 1.0, -(number as f32)]);
@@ -381,7 +382,7 @@ fn ppo_learns_to_reach() {
         learner.update(iteration).unwrap();
     }
     let after = learner.scores().unwrap()[0];
-    let starts = config.mixture(&system.states()).unwrap().draw(5, Purpose::HeldOut, 0, 2048);
+    let starts = config.mixture(&system.states()).unwrap().draw(5, purpose::HELD_OUT, 0, 2048);
     let best = Plant { system: &system, policy: &BangBang { acceleration: 1.0 } };
     let found = successes(&backend, best, config.spec().unwrap(), &starts).unwrap();
     let ceiling = share(found.into_iter());

@@ -7,10 +7,10 @@ use std::hint::black_box;
 use reachcast::Result;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::{Backend, Program};
-use reachcast::bench::data::{self, Data};
 use reachcast::model::{Controller, Model, Plant};
 use reachcast::policy::Policy;
 use reachcast::race::DroneRace;
+use reachcast::race::bench::data::{self, Data};
 use reachcast::rollout::{Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
 use reachcast::system::System;
 
@@ -75,7 +75,7 @@ where
 
 /// Starts in the default box of `system`.
 fn starts<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Vec<[f32; NX]> {
-    let stream = Stream::new(1, Purpose::User, 0);
+    let stream = Stream::new(1, Purpose::USER, 0);
     let axes = system.states();
     let region = Region::new_box(axes.each_ref().map(|axis| axis.low), axes.map(|axis| axis.high));
     let region = region.expect("a box");

@@ -1,7 +1,6 @@
 //! A benchmark from its start to its record: limits before and after, workloads on each backend,
 //! scaling.
 
-use super::data::Data;
 use super::limits::{AdapterLimits, HostLimits};
 use super::measure::{Protocol, measure};
 use super::record::{
@@ -9,7 +8,7 @@ use super::record::{
     WorkloadRecord,
 };
 use super::scaling::{SIZES, scaling};
-use super::workload::{self, Workload};
+use super::workload::{Batch, Work, Workload};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{AdapterKind, KernelTime};
@@ -48,8 +47,7 @@ impl Asked {
     }
 
     /// The workloads asked for.
-    fn workloads(&self, data: &Data) -> Result<Vec<Workload>> {
-        let all = workload::all(data)?;
+    fn chosen(&self, all: Vec<Workload>) -> Result<Vec<Workload>> {
         let known: Vec<String> = all.iter().map(|workload| workload.name.clone()).collect();
         let chosen: Vec<_> = all.into_iter().filter(|one| self.names(&one.name)).collect();
         if chosen.is_empty() && !self.names(SCALING) {
@@ -76,13 +74,18 @@ impl Asked {
     }
 }
 
-/// Measures the machine, then what was asked for on each of `backends`.
+/// Measures the machine, then what was asked for of `work` on each of `backends`.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a filter that fits nothing; those of the backends; interruption.
-pub fn run(asked: &Asked, backends: &[Backend], watch: &dyn Watch) -> Result<BenchRecord> {
-    let data = Data::new(asked.seed)?;
-    let workloads = asked.workloads(&data)?;
+pub fn run(
+    asked: &Asked,
+    work: Work,
+    backends: &[Backend],
+    watch: &dyn Watch,
+) -> Result<BenchRecord> {
+    let Work { workloads, batch } = work;
+    let workloads = asked.chosen(workloads)?;
     let (protocol, host) = (asked.protocol(), Cpu::new(asked.threads)?);
     watch.begin("limits", 1);
     let limits = HostLimits::measure(&protocol, host.threads())?;
@@ -108,7 +111,7 @@ pub fn run(asked: &Asked, backends: &[Backend], watch: &dyn Watch) -> Result<Ben
             }
         }
         if asked.names(SCALING) {
-            record.add_scaling(asked, backend, &data, watch)?;
+            record.add_scaling(asked, backend, &batch, watch)?;
         }
     }
     watch.begin("limits", 1);
@@ -183,7 +186,7 @@ impl BenchRecord {
         &mut self,
         asked: &Asked,
         backend: &Backend,
-        data: &Data,
+        batch: &Batch,
         watch: &dyn Watch,
     ) -> Result<()> {
         if is_software(backend) {
@@ -194,7 +197,7 @@ impl BenchRecord {
         let sizes = if asked.quick { &SIZES[..QUICK_SIZES] } else { &SIZES };
         // A long batch needs no repetition to be measured well.
         let protocol = Protocol { least_calls: 1, ..self.protocol };
-        self.scaling.extend(scaling(backend, data, sizes, &protocol, watch)?);
+        self.scaling.extend(scaling(backend, batch, sizes, &protocol, watch)?);
         Ok(())
     }
 

@@ -1,39 +1,30 @@
 //! Batches of growing size in one process: time should grow linearly, memory not at all.
 
-use std::hint::black_box;
-
-use super::data::{self, Data};
 use super::measure::{Protocol, measure};
 use super::record::ScalingRecord;
+use super::workload::Batch;
 use crate::backend::Backend;
 use crate::error::Result;
-use crate::policy::Mlp;
-use crate::race::system::DroneRace;
-use crate::rollout::{Plant, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
 use crate::scenario::Watch;
-use crate::system::System;
 
 /// Sizes of the batches.
 pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
-/// Number of the stream of the starts.
-const STREAM: u32 = 1 << 17;
 
-/// Rolls out the batches of `sizes`, one after the other, under the first network of `data`.
+/// Rolls out the batches of `sizes`, one after the other.
 ///
 /// # Errors
 /// Those of the backend, and interruption.
 pub fn scaling(
     backend: &Backend,
-    data: &Data,
+    batch: &Batch,
     sizes: &[u64],
     protocol: &Protocol,
     watch: &dyn Watch,
 ) -> Result<Vec<ScalingRecord>> {
-    let (_, network) = &data.networks[0];
-    let batch = |&rollouts: &u64| {
+    let timed = |&rollouts: &u64| {
         reset_peak();
         watch.begin(&format!("{rollouts} rollouts"), rollouts);
-        let timing = measure(protocol, || roll(backend, network, data.seed, rollouts, watch))?;
+        let timing = measure(protocol, || batch(backend, rollouts, watch))?;
         Ok(ScalingRecord {
             backend: backend.name().to_owned(),
             rollouts,
@@ -42,26 +33,7 @@ pub fn scaling(
             peak_bytes: peak_bytes(),
         })
     };
-    sizes.iter().map(batch).collect()
-}
-
-/// Rolls out `count` starts drawn from the default box of the race.
-fn roll(backend: &Backend, network: &Mlp, seed: u64, count: u64, watch: &dyn Watch) -> Result<()> {
-    let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
-    let axes = system.states();
-    let low = axes.each_ref().map(|axis| axis.low);
-    let region = Region::new_box(low, axes.each_ref().map(|axis| axis.high))?;
-    let task = ReachAvoidTask {
-        starts: Starts::Drawn { region, stream: Stream::new(seed, Purpose::Bench, STREAM) },
-        range: 0..count,
-        spec,
-        tightening: &Tightening::none(&spec),
-        query: Query::Measure,
-    };
-    backend.reach_avoid(Plant { system: &system, policy: network }, &task, &mut |_, measures| {
-        black_box(measures);
-        watch.advance(measures.len() as u64)
-    })
+    sizes.iter().map(timed).collect()
 }
 
 /// Starts the count of [`peak_bytes`] anew, where the system lets a process do that (Linux).
@@ -86,7 +58,7 @@ mod tests {
     fn the_peak_sees_what_was_held() {
         reset_peak();
         let before = peak_bytes().unwrap();
-        let held = black_box(vec![1_u8; 256 << 20]);
+        let held = std::hint::black_box(vec![1_u8; 256 << 20]);
         let during = peak_bytes().unwrap();
         drop(held);
         // Half of it: other tests of the same process give memory back.

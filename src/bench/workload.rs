@@ -1,38 +1,35 @@
-//! The workloads: what is timed on every backend, with its operations counted.
+//! What a benchmark runs: workloads whose operations are counted, and a batch of any size.
 
 use std::fmt;
 use std::hint::black_box;
-use std::sync::Arc;
 
-use super::data::{self, Data};
 use super::flops;
 use crate::backend::Backend;
-use crate::control::DriveBenchmark;
 use crate::cost::Cost;
 use crate::error::Result;
-use crate::policy::Mlp;
-use crate::race::system::DroneRace;
-use crate::rollout::{
-    CostQuery, DeviationTask, Fold, MppiProblem, MppiSpec, MppiTask, PairControl, Pairs, Plant,
-    Purpose, Query, ReachAvoidTask, Starts, Stream, Tightening, trajectory,
-};
+use crate::rollout::{CostQuery, MppiProblem, MppiSpec, MppiTask};
+use crate::scenario::Watch;
 use crate::system::System;
 
-/// Batches of rollouts: the scenarios of a certificate, and those that fill a machine.
-const BATCHES: [u64; 3] = [158, 4096, 65_536];
-/// Pairs of the deviation bound.
-const PAIRS: u64 = 16_384;
-/// Radius of their perturbations.
-const RADIUS: f32 = 0.1;
-/// Samples of a plan.
-const SAMPLES: [u32; 2] = [1024, 16_384];
-/// Samples of the published benchmark of MPPI.
-const DRIVE_SAMPLES: u32 = 16_384;
-/// Starts whose rollouts tell how soon a sign is decided.
-const DECIDED: usize = 100;
+/// Everything that a benchmark runs.
+pub struct Work {
+    /// What is timed.
+    pub workloads: Vec<Workload>,
+    /// The batch of growing size.
+    pub batch: Batch,
+}
+
+impl fmt::Debug for Work {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Work").field(&self.workloads).finish()
+    }
+}
+
+/// Rolls out so many starts on a backend, and tells how far it is.
+pub type Batch = Box<dyn Fn(&Backend, u64, &dyn Watch) -> Result<()>>;
 
 /// One call of a workload on a backend.
-type Call = Box<dyn Fn(&Backend) -> Result<()>>;
+pub(crate) type Call = Box<dyn Fn(&Backend) -> Result<()>>;
 
 /// Work of a fixed size that any backend does in one call.
 pub struct Workload {
@@ -46,7 +43,8 @@ pub struct Workload {
     pub steps: f64,
     /// Floating-point operations of a unit, as [`flops`] counts them.
     pub flops: f64,
-    call: Call,
+    /// The call.
+    pub(crate) call: Call,
 }
 
 impl Workload {
@@ -70,113 +68,8 @@ impl fmt::Debug for Workload {
     }
 }
 
-/// All workloads.
-///
-/// # Errors
-/// None: what they are made of is valid.
-pub fn all(data: &Data) -> Result<Vec<Workload>> {
-    let mut all = Vec::new();
-    for (name, network) in &data.networks {
-        for count in BATCHES {
-            all.push(rollouts(format!("rollout/{name}/{count}"), data, network, count)?);
-        }
-    }
-    all.push(signs("sign/race/65536".to_owned(), data, &data.policy, 65_536)?);
-    let (name, network) = &data.networks[0];
-    all.push(pairs(format!("deviation/{name}/{PAIRS}"), data, network, PAIRS)?);
-    for samples in SAMPLES {
-        let (spec, problem) = (data::mppi_spec(samples)?, data::mppi_problem(data.seed, 0));
-        let name = format!("mppi/lane/{samples}");
-        all.push(plan(name, DroneRace::default(), data::lane(), spec, problem));
-    }
-    let DriveBenchmark { system, planner, problem } = DriveBenchmark::new(DRIVE_SAMPLES)?;
-    let name = format!("mppi/drive/{DRIVE_SAMPLES}");
-    all.push(plan(name, system, planner.cost, planner.spec, problem));
-    Ok(all)
-}
-
-/// Measures of the first `count` starts in feedback with `network`.
-fn rollouts(name: String, data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Workload> {
-    let steps = f64::from(data::HORIZON);
-    reach_avoid(name, data, network, count, (Query::Measure, steps))
-}
-
-/// Their signs alone.
-fn signs(name: String, data: &Data, policy: &Arc<Mlp>, count: u64) -> Result<Workload> {
-    let steps = decided_steps(data, policy)?;
-    reach_avoid(name, data, policy, count, (Query::Sign, steps))
-}
-
-fn reach_avoid(
-    name: String,
-    data: &Data,
-    policy: &Arc<Mlp>,
-    count: u64,
-    (query, steps): (Query, f64),
-) -> Result<Workload> {
-    let spec = data::rollout_spec()?;
-    let (policy, starts) = (Arc::clone(policy), Arc::clone(&data.starts));
-    let system = DroneRace::default();
-    let flops = flops::rollout(Plant { system: &system, policy: &*policy }, steps);
-    let tightening = Tightening::none(&spec);
-    let call = move |backend: &Backend| {
-        let starts = Starts::listed(&*starts);
-        let task = ReachAvoidTask { starts, range: 0..count, spec, tightening: &tightening, query };
-        let plant = Plant { system: &system, policy: &*policy };
-        backend.reach_avoid(plant, &task, &mut |_, measures| {
-            black_box(measures);
-            Ok(())
-        })
-    };
-    Ok(Workload { name, unit: "rollout", units: count, steps, flops, call: Box::new(call) })
-}
-
-/// Mean number of steps until the sign of a measure is decided, over some of the starts.
-fn decided_steps(data: &Data, policy: &Mlp) -> Result<f64> {
-    let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
-    let plant = Plant { system: &system, policy };
-    let steps = |start: &[f32; 12]| {
-        let mut fold = Fold::new();
-        let states = trajectory::<f32, _, _, 12, 3>(plant, *start, spec.horizon);
-        let open = states.iter().take_while(|x| {
-            fold.add(system.target(**x), system.constraint(**x), spec.gamma);
-            fold.measure() <= 0.0 && fold.safe() > 0.0
-        });
-        open.count().min(spec.horizon as usize)
-    };
-    let starts = &data.starts[..DECIDED];
-    Ok(starts.iter().map(steps).sum::<usize>() as f64 / starts.len() as f64)
-}
-
-/// Pairs around the first `count` starts, the perturbed rollout under the nominal controls.
-fn pairs(name: String, data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Workload> {
-    let spec = data::rollout_spec()?;
-    let (network, starts) = (Arc::clone(network), Arc::clone(&data.starts));
-    let system = DroneRace::default();
-    let steps = f64::from(spec.horizon);
-    let flops = flops::replayed_pair(Plant { system: &system, policy: &*network }, steps);
-    let tightening = Tightening::none(&spec);
-    let stream = Stream::new(data.seed, Purpose::User, 0);
-    let call = move |backend: &Backend| {
-        let task = DeviationTask {
-            pairs: Pairs { nominal: Starts::listed(&*starts), radius: RADIUS, stream },
-            range: 0..count,
-            spec,
-            tightening: &tightening,
-            control: PairControl::Replay,
-        };
-        let plant = Plant { system: &system, policy: &*network };
-        let farthest = backend.deviation(plant, &task, &mut |_, measures| {
-            black_box(measures);
-            Ok(())
-        });
-        farthest.map(|farthest| drop(black_box(farthest)))
-    };
-    Ok(Workload { name, unit: "pair", units: count, steps, flops, call: Box::new(call) })
-}
-
 /// One improvement of a plan, its noise drawn anew.
-fn plan<S, C, const NX: usize, const NU: usize, const NC: usize>(
+pub(crate) fn plan<S, C, const NX: usize, const NU: usize, const NC: usize>(
     name: String,
     system: S,
     cost: C,
@@ -198,31 +91,4 @@ where
     let steps = f64::from(horizon);
     let (unit, units) = ("sample", u64::from(samples));
     Workload { name, unit, units, steps, flops, call: Box::new(call) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::backend::cpu::Cpu;
-
-    #[test]
-    fn every_workload_runs_and_counts() {
-        let data = Data::new(1).unwrap();
-        let backend = Backend::Cpu(Cpu::new(Some(1)).unwrap());
-        for workload in all(&data).unwrap() {
-            assert!(workload.flops > 1000.0, "{workload:?}: {}", workload.flops);
-            assert!(workload.name.ends_with(&workload.units.to_string()), "{workload:?}");
-            if workload.call_flops() < 1e9 {
-                workload.call(&backend).unwrap();
-            }
-        }
-    }
-
-    /// The sign of many starts is decided early: the point of the early exit.
-    #[test]
-    fn signs_are_decided_before_the_horizon() {
-        let data = Data::new(1).unwrap();
-        let steps = decided_steps(&data, &data.policy).unwrap();
-        assert!(steps > 1.0 && steps < 30.0, "{steps}");
-    }
 }

@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand};
 use super::options::{Changes, Common, Global, Keys, Replace};
 use crate::files::Existing;
 use crate::policy::{Activation, OutputActivation};
-use crate::race::command::sweep::SweepArguments;
+use crate::studies::StudyCommand;
 use crate::train::settings::Method;
 
 /// Batch rollouts and the probabilistic reach-avoid certificates that they support.
@@ -124,46 +124,8 @@ Example:
         /// Folder that `certify` wrote
         folder: PathBuf,
     },
-    /// Fly whole races under many controllers, judge and compare them
-    ///
-    /// Writes results.json, report.html, timing.json, and states, controls and logs of every race
-    /// as races/CONTROLLER-seedS-fromN.npz to the folder of --out (default: reachcast-race). Stopped
-    /// half-way, the same command goes on where it was; the results are the same.
-    #[command(after_help = "\
-Controllers: hybrid, hybrid-no-policy, mppi, mppi-soft, mppi-cbf, mppi-warmstart, policy, ppo-cbf
-(all of these: all). The hybrid without one of its parts: hybrid-no-global, hybrid-no-local,
-hybrid-no-recovery, hybrid-no-policy, hybrid-no-safety (with hybrid: ablations). The hybrid with one
-thing as in the study: hybrid-no-safety, hybrid-no-fences, hybrid-one-iteration, hybrid-study-start,
-hybrid-study-recovery, hybrid-value (with hybrid: improvements).
-
-Examples:
-  reachcast race configs/race.toml
-  reachcast race configs/race.toml --profile study --controllers hybrid,mppi --noise-seeds 5
-  reachcast race configs/race.toml --controllers ablations --starts 2000 --out ablations")]
-    Race(RaceArguments),
-    /// Race or certify every point of a grid of settings
-    ///
-    /// Writes sweep.csv and sweep.parquet as points are done, then sweep.json and report.html, to the
-    /// folder of --out (default: reachcast-sweep). Stopped half-way, the same command goes on where it
-    /// was; points that are stored are not computed again, also after a grid was extended.
-    #[command(after_help = "\
-Every option that takes a LIST is an axis of the grid; the values of one axis are separated by commas.
-What is not an axis has the value of the configuration.
-
-Races (--of race): every point flies the same starts with the same noise seeds; axes --controllers,
---samples, --horizon, --temperature, --sigma, --noise, --iterations, --vary. An axis of plans changes
-all plans of the controller, for the hybrid those of tiers 0 and 3. A noise is `independent`,
-`colored:TIME` or `spline:KNOTS`.
-
-Certificates (--of certificate): axes --epsilon, --beta, --radius, --horizon, --bound, --count, --vary.
-
-Examples:
-  reachcast sweep configs/race.toml --samples 16,64,256,1024,4096 --horizon 10,20,30 --starts 100
-  reachcast sweep configs/race.toml --controllers hybrid,mppi --noise independent,colored:3,spline:5
-  reachcast sweep configs/race.toml --vary race.mppi.cost.speed=0.5,1,2 --noise-seeds 5
-  reachcast sweep configs/race.toml --of certificate --epsilon 0.05,0.1,0.2 --radius 0.02,0.05,0.1
-  reachcast sweep configs/race.toml --of certificate --bound fixed-shape,variables,exact")]
-    Sweep(Box<SweepArguments>),
+    #[command(flatten)]
+    Study(StudyCommand),
     /// Train a policy, or a network that tells its value
     ///
     /// Writes policy.safetensors (or value.safetensors, or action_value.safetensors; beside the policy
@@ -232,8 +194,7 @@ impl Command {
             }
             Self::Rollout { keys, replace, .. } => (no_seed(keys), None, *replace),
             Self::Query { out, replace, .. } => (Changes::default(), out.as_ref(), *replace),
-            Self::Race(asked) => (asked.changes.clone(), asked.out.as_ref(), asked.replace),
-            Self::Sweep(asked) => (asked.changes.clone(), asked.out.as_ref(), asked.replace),
+            Self::Study(asked) => asked.options(),
             Self::Policy(PolicyCommand::Import(asked)) => {
                 (no_seed(&asked.keys), asked.out.as_ref(), asked.replace)
             }
@@ -249,29 +210,6 @@ impl Command {
             }
         }
     }
-}
-
-/// What `race` is asked for.
-#[derive(Args, Clone, Debug)]
-pub(crate) struct RaceArguments {
-    /// Configuration (TOML)
-    pub(crate) config: PathBuf,
-    /// Controllers, separated by commas
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "all")]
-    pub(crate) controllers: Vec<String>,
-    /// Starts: how many to draw from race.start_box, or a file, .npy or .csv [default: race.starts]
-    #[arg(long, value_name = "N|FILE")]
-    pub(crate) starts: Option<String>,
-    /// Runs of each controller, with the noise seeds SEED, SEED + 1, ...
-    #[arg(long, value_name = "M", default_value_t = 1)]
-    pub(crate) noise_seeds: u64,
-    /// Folder of the results [default: reachcast-race]
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) replace: Replace,
-    #[command(flatten, next_help_heading = "Configuration")]
-    pub(crate) changes: Changes,
 }
 
 /// What `bench` is asked for.

@@ -9,12 +9,12 @@ use super::args::BenchArguments;
 use super::options::Global;
 use super::progress::Progress;
 use super::{Outcome, devices, report};
-use crate::bench::export::export;
 use crate::bench::measure::Timing;
 use crate::bench::record::{BenchRecord, KernelRecord, ScalingRecord, WorkloadRecord};
 use crate::bench::run::{self as benchmark, Asked};
 use crate::error::Result;
 use crate::files::{Staged, check_room, json, spare_existing};
+use crate::studies;
 
 /// Room for the record, bytes.
 const RECORD_BYTES: u64 = 1 << 20;
@@ -37,7 +37,7 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     global.out.as_deref().map_or(Ok(()), |out| check_room(out, RECORD_BYTES))?;
     let backends = devices::all(global)?;
-    let record = benchmark::run(&asked, &backends, &progress)?;
+    let record = benchmark::run(&asked, studies::work(seed)?, &backends, &progress)?;
     progress.finish();
     backends.iter().for_each(|backend| devices::note_events(global, backend));
     if let Some(mut staged) = staged {
@@ -57,7 +57,7 @@ struct Exported {
 
 /// Writes what the workloads run on.
 fn write_out(global: &Global, seed: u64, folder: &Path) -> Result<Outcome> {
-    let files = export(&devices::open(global)?, seed, folder, global.existing)?;
+    let files = studies::export(&devices::open(global)?, seed, folder, global.existing)?;
     let files = files.iter().map(|file| file.display().to_string()).collect();
     let exported = Exported { seed, files };
     report(global, &exported, || exported.files.iter().map(|file| format!("{file}\n")).collect())?;

@@ -1,6 +1,6 @@
 //! The command line: reads arguments, runs a command, says what came of it by its exit code.
 
-pub(crate) mod args;
+mod args;
 mod bench;
 mod certify;
 pub(crate) mod devices;
@@ -42,10 +42,22 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NotObtained) => 3,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "error: {}", plain(&error.to_string()));
+            let _ = writeln!(std::io::stderr(), "error: {}", plain(&told(&error)));
             error.exit_code()
         }
     }
+}
+
+/// The error with what the options of the command line can do about it.
+fn told(error: &Error) -> String {
+    let remedy = match error {
+        Error::DeviceFailed { .. } => {
+            "; `--fallback` goes on on the CPU where an adapter fails, `--backend cpu` starts there"
+        }
+        Error::Interrupted => " (what `race`, `sweep` and `train` have done is kept)",
+        _ => "",
+    };
+    format!("{error}{remedy}")
 }
 
 /// Runs the command.
@@ -58,8 +70,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
-        Command::Race(asked) => crate::race::command::race::run(global, asked),
-        Command::Sweep(asked) => crate::race::command::sweep::run(global, asked),
+        Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
         Command::Policy(PolicyCommand::Inspect { file, config, .. }) => {

@@ -266,7 +266,7 @@ fn actions(network: &Mlp, frame: &Frame, seed: u64) -> Vec<Action> {
     let Frame { controls, low, high, .. } = frame;
     let sides = low.iter().zip(high).map(|(&low, &high)| Interval::new(low.into(), high.into()));
     let intervals = output_intervals(network, &sides.collect::<Vec<_>>());
-    let stream = Stream::new(seed, Purpose::User, 0);
+    let stream = Stream::new(seed, Purpose::USER, 0);
     let batches = (0..SAMPLES).step_by(LANES).map(|i| stream.in_box::<LANES>(low, high, i));
     let seen = output_ranges(network, batches);
     let action = |((name, Interval { low, high }), seen): ((&String, _), _)| Action {

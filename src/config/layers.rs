@@ -7,9 +7,10 @@ use toml::{Table, Value};
 
 use super::counts;
 use super::section::{Config, Profile};
-use super::{keys, model, profile};
+use super::{keys, model};
 use crate::error::{Error, Result};
 use crate::model::text::Origin;
+use crate::studies::{self, SYSTEMS};
 
 /// A document with the name that errors have for it.
 pub(super) type Layer = (String, Table);
@@ -129,10 +130,10 @@ fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
         let place = text.map_or(place.clone(), |text| place.with_text(text));
         return model::defaults(profile, given, place);
     }
-    let systems = profile::SYSTEMS.join("\" or \"");
+    let systems = SYSTEMS.join("\" or \"");
     let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
     let name = given.get("system").and_then(|system| system.get("name"));
-    let known = name.and_then(Value::as_str).and_then(|name| profile::defaults(profile, name));
+    let known = name.and_then(Value::as_str).and_then(|name| studies::defaults(profile, name));
     let config = known.ok_or_else(|| {
         let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
         refused("system.name", format!("{found}; {expected}"))

@@ -5,21 +5,25 @@ mod keys;
 mod layers;
 mod model;
 mod plant;
-mod profile;
+pub(crate) mod profile;
 mod section;
 mod settings;
 #[cfg(test)]
 mod tests;
-mod train;
+pub(crate) mod train;
 mod value;
 
-pub use plant::{Job, PolicySource, SystemJob};
+pub use crate::studies::SystemSection;
+pub use plant::{PlantWork, PolicySource, SystemWork};
 pub use section::{
     BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
     GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,
-    StateSection, SystemSection,
+    StateSection,
 };
 pub use value::{Constant, Coordinates, Named};
+
+pub(crate) use plant::{check_network, no_formula};
+pub(crate) use settings::positive_f32;
 
 use std::path::Path;
 
@@ -27,6 +31,7 @@ use serde::Deserialize;
 use toml::Table;
 
 use crate::error::{Error, Result};
+use crate::studies::SYSTEMS;
 use layers::Layers;
 
 /// What the command line lays over a configuration file.
@@ -95,7 +100,7 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_train_json(&self) -> Result<serde_json::Value> {
-        stored(&Self { race: None, ..self.clone() })
+        stored(&Self { study: None, ..self.clone() })
     }
 
     /// The configuration that a certificate stores.
@@ -115,7 +120,7 @@ impl Config {
 fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
     let system = value.pointer("/system/name").and_then(serde_json::Value::as_str);
     if value.get("model").is_some_and(serde_json::Value::is_object)
-        || system.is_some_and(|name| profile::SYSTEMS.contains(&name))
+        || system.is_some_and(|name| SYSTEMS.contains(&name))
     {
         return None;
     }
@@ -127,7 +132,7 @@ fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
     Some(Error::Refused(format!(
         "the certificate is of {plant}, which another program defines; this one knows {}. Its numbers \
          can be read, and the program that made it can check it (`reachcast::scenario::check`)",
-        profile::SYSTEMS.join(" and ")
+        SYSTEMS.join(" and ")
     )))
 }
 

@@ -1,18 +1,17 @@
-//! From names to types: the system and the policy that a configuration names, for one generic job.
+//! From names to types: the system and the policy that a configuration names, for one generic work.
 
 use std::path::{Path, PathBuf};
 
-use super::section::{Config, FormulaSection, SystemSection};
-use super::settings::positive_f32;
+use super::section::{Config, FormulaSection};
 use crate::error::{Error, Result};
 use crate::model;
 use crate::policy::{Mlp, Policy};
-use crate::race::system::DroneRace;
 use crate::rollout::Plant;
-use crate::system::{Axis, BangBang, DoubleIntegrator, System};
+use crate::studies::BuiltIn;
+use crate::system::System;
 
 /// Work on a plant of any system and policy.
-pub trait Job {
+pub trait PlantWork {
     /// What comes of it.
     type Output;
 
@@ -25,12 +24,12 @@ pub trait Job {
         plant: Plant<'_, S, P>,
     ) -> Result<Self::Output>
     where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>;
+        S: System<NX, NU> + Clone + Send + Sync + 'static,
+        P: Policy<NX, NU> + Clone + Send + Sync + 'static;
 }
 
 /// Work on any system.
-pub trait SystemJob {
+pub trait SystemWork {
     /// What comes of it.
     type Output;
 
@@ -40,7 +39,7 @@ pub trait SystemJob {
     /// Those of the work.
     fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Self::Output>
     where
-        S: System<NX, NU>;
+        S: System<NX, NU> + Clone + Send + Sync + 'static;
 }
 
 /// The policy that a configuration names: a formula, or a network and the bytes of its file.
@@ -95,123 +94,86 @@ impl Config {
         if let Some(model) = &self.model {
             return self.described_plant(model, policy);
         }
-        let network = |axes: &[Axis], controls: usize, path: &Path, network: &Mlp| {
-            let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
-            network.check_fits(&names, controls).map_err(|problem| Error::file(path, problem))?;
-            Ok(network.clone())
-        };
-        match (self.any_system()?, policy) {
-            (AnySystem::DroneRace(system), PolicySource::Formula(name)) => {
-                Err(no_formula(&system, name, "none"))
-            }
-            (AnySystem::DoubleIntegrator(system), PolicySource::Formula(name)) => {
-                if name != "bang-bang" {
-                    return Err(no_formula(&system, name, "bang-bang"));
-                }
-                let acceleration = system.acceleration;
-                Ok(model::Plant::of(system, BangBang { acceleration }))
-            }
-            (AnySystem::DroneRace(system), PolicySource::Network { path, network: mlp, .. }) => {
-                Ok(model::Plant::of(system, network(&system.states(), 3, path, mlp)?))
-            }
-            (
-                AnySystem::DoubleIntegrator(system),
-                PolicySource::Network { path, network: mlp, .. },
-            ) => Ok(model::Plant::of(system, network(&system.states(), 1, path, mlp)?)),
-        }
+        self.with_plant(policy, AsModel)
     }
 
-    /// Builds the system, checks the policy against it, and runs `job` on both.
+    /// Builds the system, checks the policy against it, and does `work` on both.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a parameter out of range or a formula that the system does not
-    /// have, [`Error::File`] for a network of the wrong shape, and those of the job.
-    pub fn with_plant<J: Job>(&self, policy: &PolicySource, job: J) -> Result<J::Output> {
-        match (self.any_system()?, policy) {
-            (AnySystem::DroneRace(system), PolicySource::Formula(name)) => {
-                Err(no_formula(&system, name, "none"))
-            }
-            (AnySystem::DoubleIntegrator(system), PolicySource::Formula(name)) => {
-                if name != "bang-bang" {
-                    return Err(no_formula(&system, name, "bang-bang"));
-                }
-                let policy = &BangBang { acceleration: system.acceleration };
-                job.run(Plant { system: &system, policy })
-            }
-            (AnySystem::DroneRace(system), PolicySource::Network { path, network, .. }) => {
-                with_network(&system, path, network, job)
-            }
-            (AnySystem::DoubleIntegrator(system), PolicySource::Network { path, network, .. }) => {
-                with_network(&system, path, network, job)
-            }
-        }
-    }
-
-    /// Builds the system and runs `job` on it.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for a parameter out of range, and those of the job.
-    pub fn with_system<J: SystemJob>(&self, job: J) -> Result<J::Output> {
-        match self.any_system()? {
-            AnySystem::DroneRace(system) => job.run(&system),
-            AnySystem::DoubleIntegrator(system) => job.run(&system),
-        }
-    }
-
-    /// The drone race and its policy, a network.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for another system, a formula or a parameter out of range,
-    /// [`Error::File`] for a network of the wrong shape.
-    pub fn race_plant<'a>(&self, policy: &'a PolicySource) -> Result<(DroneRace, &'a Mlp)> {
-        let AnySystem::DroneRace(system) = self.any_system()? else {
-            return Err(Error::invalid("system.name", "only `drone-race` has races"));
-        };
+    /// have, [`Error::File`] for a network of the wrong shape, and those of the work.
+    pub fn with_plant<W: PlantWork>(&self, policy: &PolicySource, work: W) -> Result<W::Output> {
+        let system = self.built_in()?;
         match policy {
-            PolicySource::Formula(name) => Err(no_formula(&system, name, "none")),
+            PolicySource::Formula(name) => system.with_formula(name, work),
             PolicySource::Network { path, network, .. } => {
-                check_network(&system, path, network)?;
-                Ok((system, network))
+                system.with_system(UnderNetwork { path, network, work })
             }
         }
+    }
+
+    /// Builds the system and does `work` on it.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a parameter out of range, and those of the work.
+    pub fn with_system<W: SystemWork>(&self, work: W) -> Result<W::Output> {
+        self.built_in()?.with_system(work)
     }
 
     /// The system, its parameters checked.
-    fn any_system(&self) -> Result<AnySystem> {
+    pub(crate) fn built_in(&self) -> Result<BuiltIn> {
         let carried = || {
             let problem = "works for the systems that the program carries, not yet for a model; \
                            `certify`, `rollout`, `query` and `check` do, and `sweep --of certificate`";
             Error::invalid("this command", problem)
         };
-        let number = |key: &str, value: f64| positive_f32(&format!("system.{key}"), value);
-        Ok(match self.system.clone().ok_or_else(carried)? {
-            SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit } => {
-                AnySystem::DroneRace(DroneRace {
-                    ego_gain: number("ego_gain", ego_gain)?,
-                    opponent_gain: number("opponent_gain", opponent_gain)?,
-                    cone,
-                    speed_limit,
-                })
-            }
-            SystemSection::DoubleIntegrator { target, corridor, acceleration } => {
-                AnySystem::DoubleIntegrator(DoubleIntegrator {
-                    target: number("target", target)?,
-                    corridor: number("corridor", corridor)?,
-                    acceleration: number("acceleration", acceleration)?,
-                })
-            }
-        })
+        self.system.as_ref().ok_or_else(carried)?.checked()
     }
 }
 
-/// Any of the systems that a configuration can ask for.
-enum AnySystem {
-    DroneRace(DroneRace),
-    DoubleIntegrator(DoubleIntegrator),
+/// Makes a plant of plain data.
+struct AsModel;
+
+impl PlantWork for AsModel {
+    type Output = model::Plant;
+
+    fn run<S, P, const NX: usize, const NU: usize>(
+        self,
+        plant: Plant<'_, S, P>,
+    ) -> Result<model::Plant>
+    where
+        S: System<NX, NU> + Clone + Send + Sync + 'static,
+        P: Policy<NX, NU> + Clone + Send + Sync + 'static,
+    {
+        Ok(model::Plant::of(plant.system.clone(), plant.policy.clone()))
+    }
+}
+
+/// Work on a system under the network of `path`, once it fits.
+struct UnderNetwork<'a, W> {
+    path: &'a Path,
+    network: &'a Mlp,
+    work: W,
+}
+
+impl<W: PlantWork> SystemWork for UnderNetwork<'_, W> {
+    type Output = W::Output;
+
+    fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<W::Output>
+    where
+        S: System<NX, NU> + Clone + Send + Sync + 'static,
+    {
+        check_network(system, self.path, self.network)?;
+        self.work.run(Plant { system, policy: self.network })
+    }
 }
 
 /// The refusal of the formula `name`.
-fn no_formula<S, const NX: usize, const NU: usize>(system: &S, name: &str, has: &str) -> Error
+pub(crate) fn no_formula<S, const NX: usize, const NU: usize>(
+    system: &S,
+    name: &str,
+    has: &str,
+) -> Error
 where
     S: System<NX, NU>,
 {
@@ -220,22 +182,8 @@ where
     Error::invalid("policy.formula", problem)
 }
 
-/// Runs `job` with a network that fits the system.
-fn with_network<J: Job, S, const NX: usize, const NU: usize>(
-    system: &S,
-    path: &Path,
-    network: &Mlp,
-    job: J,
-) -> Result<J::Output>
-where
-    S: System<NX, NU>,
-{
-    check_network(system, path, network)?;
-    job.run(Plant { system, policy: network })
-}
-
 /// Refuses the network of `path` if it does not fit the system.
-fn check_network<S, const NX: usize, const NU: usize>(
+pub(crate) fn check_network<S, const NX: usize, const NU: usize>(
     system: &S,
     path: &Path,
     network: &Mlp,

@@ -1,82 +1,23 @@
-//! Defaults: the numbers of each profile for each system, from the published study of the race.
+//! Defaults: the numbers of each profile that plants share, and those of the double integrator.
 
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
-    Profile, RolloutSection, SliceAxisSection, SliceSection, SystemSection,
+    Profile, RolloutSection, SliceAxisSection, SliceSection,
 };
 use super::train;
 use super::value::{Constant, Coordinates, Named};
-use crate::race::defaults::race;
-use crate::race::system::{Cone, DroneRace};
 use crate::rollout::PairControl;
 use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::studies::SystemSection;
 use crate::system::{Axis, DoubleIntegrator, System};
-
-/// Names of the systems that a configuration can ask for.
-pub(super) const SYSTEMS: [&str; 2] = ["drone-race", "double-integrator"];
 
 /// Steps of a slice that nobody asked for.
 const SLICE_STEPS: f64 = 20.0;
 
-/// First of the 500 starts of the published study, `configs/race_starts_500.csv`.
-const RACE_STATE: [f64; 12] = [
-    0.7415519915922972,
-    0.0,
-    -1.0318051933867767,
-    0.5269589927741894,
-    -0.00831426835774926,
-    -0.0925577927382397,
-    -0.45164051298706803,
-    0.0,
-    -2.4884756227075835,
-    0.31867728763257475,
-    0.006058703491681097,
-    -0.016398054808464832,
-];
-
-/// The defaults of `profile` for the system `name`, without a policy; none if it is unknown.
-pub(super) fn defaults(profile: Profile, name: &str) -> Option<Config> {
-    match name {
-        "drone-race" => Some(drone_race(profile)),
-        "double-integrator" => Some(double_integrator(profile)),
-        _ => None,
-    }
-}
-
-/// The race. Where the paper gives no number, `paper` has that of the study.
-fn drone_race(profile: Profile) -> Config {
-    let published = profile != Profile::Rigorous;
-    let mut states = DroneRace::default().states();
-    if published {
-        (states[9].low, states[9].high) = (-1.0, 1.0);
-    }
-    let given = |value| {
-        if published { Constant::Given(value) } else { Constant::Computed }
-    };
-    let slice = SliceSection { x: axis("ego_x", -0.9, 0.9, 0.1), y: axis("ego_y", -2.6, 0.0, 0.1) };
-    let system = SystemSection::DroneRace {
-        cone: if profile == Profile::Paper { Cone::Squared } else { Cone::Distance },
-        ego_gain: if profile == Profile::Paper { 1.0 } else { 0.5 },
-        opponent_gain: 1.0,
-        speed_limit: profile == Profile::Study,
-    };
-    let mut config = common(profile, Some(system), &states, &RACE_STATE, slice);
-    config.constants = ConstantsSection { target: given(10.0), constraint: given(20.0) };
-    config.growth.heading = names(["ego_x", "ego_vx", "ego_y", "ego_vy"]);
-    config.race = Some(race(profile));
-    config.train = Some(train::race());
-    if profile == Profile::Study {
-        // The study scores the first 30 states of a rollout, 29 steps.
-        config.rollout.horizon = 29;
-        config.growth.coordinates = Coordinates::Named(names(["ego_x", "ego_y"]));
-    }
-    config
-}
-
 /// The double integrator; the published study has no such experiment, so the profiles differ in
 /// their accounting alone.
-fn double_integrator(profile: Profile) -> Config {
+pub(crate) fn double_integrator(profile: Profile) -> Config {
     let plain = DoubleIntegrator::default();
     let system = SystemSection::DoubleIntegrator {
         target: decimal(plain.target),
@@ -118,7 +59,7 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
 }
 
 /// What all systems share.
-fn common(
+pub(crate) fn common(
     profile: Profile,
     system: Option<SystemSection>,
     states: &[Axis],
@@ -168,13 +109,13 @@ fn common(
             },
             heading: Vec::new(),
         },
-        race: None,
+        study: None,
         train: None,
     }
 }
 
 /// A slice axis.
-fn axis(state: &str, from: f64, to: f64, step: f64) -> SliceAxisSection {
+pub(crate) fn axis(state: &str, from: f64, to: f64, step: f64) -> SliceAxisSection {
     SliceAxisSection { state: state.to_owned(), from, to, step }
 }
 
@@ -185,6 +126,6 @@ fn by_name<T>(states: &[Axis], value: impl Fn(&Axis, usize) -> T) -> Named<T> {
 }
 
 /// Owned names.
-fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
+pub(crate) fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
     names.map(str::to_owned).to_vec()
 }

@@ -4,10 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
-use crate::race::settings::RaceSettings;
-use crate::race::system::Cone;
 use crate::rollout::PairControl;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::studies::{StudySettings, SystemSection};
 use crate::train::settings::TrainSettings;
 
 /// Intervals by state name, in state order.
@@ -48,16 +47,16 @@ pub struct Config {
     pub state: StateSection,
     /// Local growth.
     pub growth: GrowthSection,
-    /// The race experiment; the drone race alone has one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub race: Option<RaceSettings>,
+    /// The experiments of a study; only the plants of studies have them. Files call them by their first.
+    #[serde(default, rename = "race", skip_serializing_if = "Option::is_none")]
+    pub study: Option<StudySettings>,
     /// Training; what a certificate or race stores of its configuration has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train: Option<TrainSettings>,
 }
 
 /// Which defaults fill in what a file leaves out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Profile {
     /// The experiment as printed in the paper.
@@ -78,32 +77,6 @@ impl Profile {
             Self::Rigorous => "rigorous",
         }
     }
-}
-
-/// The system and its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum SystemSection {
-    /// [`crate::race::system::DroneRace`].
-    DroneRace {
-        /// Form of the collision cone.
-        cone: Cone,
-        /// Acceleration of the ego at full control, m/s^2.
-        ego_gain: f64,
-        /// Factor on the opponent's feedback.
-        opponent_gain: f64,
-        /// Whether the constraint keeps the ego below 1 m/s.
-        speed_limit: bool,
-    },
-    /// [`crate::system::DoubleIntegrator`].
-    DoubleIntegrator {
-        /// Half width of the target interval, m.
-        target: f64,
-        /// Half width of the constraint interval, m.
-        corridor: f64,
-        /// Bound on the acceleration, m/s^2.
-        acceleration: f64,
-    },
 }
 
 /// The policy: a file or a formula.

@@ -249,7 +249,7 @@ fn positive(key: &str, value: f64) -> Result<f64> {
 }
 
 /// `value` as an f32, finite and above 0.
-pub(super) fn positive_f32(key: &str, value: f64) -> Result<f32> {
+pub(crate) fn positive_f32(key: &str, value: f64) -> Result<f32> {
     let single = value as f32;
     positive(key, value)?;
     positive(key, f64::from(single))?;

@@ -86,7 +86,7 @@ fn study_and_paper_are_the_published_experiments() {
 #[test]
 fn races_of_the_profiles() {
     let race = |profile: &str| {
-        let race = load(RACE, &[&format!("profile={profile}")]).unwrap().race.unwrap();
+        let race = load(RACE, &[&format!("profile={profile}")]).unwrap().study.unwrap();
         race.check(&DroneRace::default()).unwrap();
         race
     };

@@ -14,19 +14,6 @@ use crate::train::settings::{
 };
 use crate::train::starts::Mixture;
 
-/// Training for the race: half of the starts from the whole box, a quarter from where races
-/// start, a quarter from a wider box around that.
-pub(super) fn race() -> TrainSettings {
-    let slow = part(0.5, &[("opp_vy", [0.1, 0.45])]);
-    let start = drones(0.25, [0.8, 0.0, 0.1, 0.1], [-2.5, -1.0], [[0.5, 0.7], [0.3, 0.5]]);
-    let wide = drones(0.25, [0.95, 0.5, 0.3, 0.3], [-2.8, -0.2], [[0.1, 1.0], [0.2, 0.55]]);
-    let mut settings = common(vec![64; 3]);
-    settings.ddpg.disturbance = named(&[("opp_vx", 0.01), ("opp_vy", 0.01), ("opp_vz", 0.01)]);
-    // Beyond the gate, so that the way there leads through it.
-    settings.ppo.reward.goal = named(&[("ego_x", 0.0), ("ego_y", 0.5), ("ego_z", 0.0)]);
-    TrainSettings { starts: vec![slow, start, wide], ..settings }
-}
-
 /// Training for the double integrator.
 pub(super) fn double_integrator() -> TrainSettings {
     let mut settings = common(vec![32; 2]);
@@ -39,7 +26,7 @@ pub(super) fn double_integrator() -> TrainSettings {
 }
 
 /// What all systems share.
-fn common(hidden: Vec<usize>) -> TrainSettings {
+pub(crate) fn common(hidden: Vec<usize>) -> TrainSettings {
     let optimiser =
         Optimiser { rate: 4e-3, warmup: 20, last: 0.02, clip: 1.0, decays: [0.9, 0.99] };
     TrainSettings {
@@ -114,28 +101,12 @@ fn constant(rate: f64, clip: f64) -> Optimiser {
 }
 
 /// Numbers by state name.
-fn named(numbers: &[(&str, f64)]) -> BTreeMap<String, f64> {
+pub(crate) fn named(numbers: &[(&str, f64)]) -> BTreeMap<String, f64> {
     numbers.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect()
 }
 
-/// Both drones in boxes that differ in their speed toward the gate alone: `around` bounds position
-/// and velocity across, then height and climb.
-fn drones(share: f64, around: [f64; 4], along: [f64; 2], speeds: [[f64; 2]; 2]) -> StartsSection {
-    let mut bounds = BTreeMap::new();
-    for (drone, speed) in ["ego", "opp"].into_iter().zip(speeds) {
-        let mut insert =
-            |state: &str, interval| bounds.insert(format!("{drone}_{state}"), interval);
-        for (state, reach) in ["x", "vx", "z", "vz"].into_iter().zip(around) {
-            insert(state, [-reach, reach]);
-        }
-        insert("y", along);
-        insert("vy", speed);
-    }
-    StartsSection { share, bounds }
-}
-
 /// The whole box but for these intervals.
-fn part(share: f64, bounds: &[(&str, [f64; 2])]) -> StartsSection {
+pub(crate) fn part(share: f64, bounds: &[(&str, [f64; 2])]) -> StartsSection {
     let bounds = bounds.iter().map(|(name, interval)| ((*name).to_owned(), *interval));
     StartsSection { share, bounds: bounds.collect() }
 }

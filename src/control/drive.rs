@@ -65,7 +65,7 @@ impl DriveBenchmark {
             start: START,
             plan: vec![[0.0; 2]; HORIZON as usize],
             context: vec![[x, y, GOAL_YAW]; HORIZON as usize],
-            stream: Stream::new(1, Purpose::ControlNoise, 0),
+            stream: Stream::new(1, Purpose::CONTROL_NOISE, 0),
         };
         Ok(Self { system, planner, problem })
     }

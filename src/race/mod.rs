@@ -3,6 +3,8 @@
 #[cfg(feature = "cli")]
 pub mod barrier;
 #[cfg(feature = "cli")]
+pub mod bench;
+#[cfg(feature = "cli")]
 pub(crate) mod command;
 #[cfg(feature = "cli")]
 pub mod controller;

@@ -7,51 +7,26 @@ use crate::real::{Lanes, Real, per_lane};
 pub const GENERATOR: &str = "Philox4x32-10";
 
 /// What random numbers are used for; each use of each purpose has a stream of its own.
+///
+/// Whoever draws has a number of their own: two that shared one would draw the same numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Purpose {
-    /// Nominal starts of a pilot that fixes the shape of the deviation bound.
-    PilotNominal = 1,
-    /// Their perturbations.
-    PilotPerturbation,
-    /// Nominal starts of the deviation bound.
-    DeviationNominal,
-    /// Their perturbations.
-    DeviationPerturbation,
-    /// Nominal starts that estimate the certified set and its conditional failure.
-    ConditionalNominal,
-    /// Their perturbations.
-    ConditionalPerturbation,
-    /// Starts in the balls of local growth.
-    Growth,
-    /// Directions of the boundary search.
-    Direction,
+pub struct Purpose(u8);
+
+impl Purpose {
     /// Starts that a user asks for.
-    User,
-    /// Starts that a stored certificate is checked with.
-    Check,
-    /// Perturbations that a stored certificate is checked with.
-    CheckPerturbation,
-    /// The rollouts drawn in a report.
-    Picture,
+    pub const USER: Self = Self::numbered(9);
     /// Control noise of MPPI.
-    ControlNoise,
-    /// Starts of races.
-    RaceStart,
-    /// Weights and starts of benchmarks.
-    Bench,
-    /// Weights of networks before training.
-    TrainWeight,
-    /// Starts, and states, to train on.
-    TrainStart,
-    /// Which of the states to train on a batch takes.
-    TrainChoice,
-    /// First controls to train on.
-    TrainControl,
-    /// Starts that training is scored on and never sees.
-    HeldOut,
-    /// Noise on the controls that reinforcement learning tries.
-    TrainNoise,
+    pub const CONTROL_NOISE: Self = Self::numbered(13);
+
+    /// The purpose with a number that nobody else has.
+    pub const fn numbered(number: u8) -> Self {
+        Self(number)
+    }
+
+    /// Its number.
+    pub fn number(self) -> u32 {
+        u32::from(self.0)
+    }
 }
 
 /// A sequence of random samples, addressed by index.
@@ -68,7 +43,7 @@ impl Stream {
     /// If `number` is 2^24 or more.
     pub fn new(seed: u64, purpose: Purpose, number: u32) -> Self {
         assert!(number < 1 << 24, "stream number {number} does not fit 24 bits");
-        Self { seed, id: (purpose as u32) << 24 | number }
+        Self { seed, id: purpose.number() << 24 | number }
     }
 
     /// The generator's key: the seed's low and high word.

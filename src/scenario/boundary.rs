@@ -1,12 +1,13 @@
 //! Boundary search: the point of the certified set's boundary that is closest to a state.
 
 use super::global::{check_margins, slice_through};
+use super::purpose;
 use super::record::SliceRecord;
 use super::settings::Settings;
 use super::{Context, settings::BoundarySearch};
 use crate::error::Result;
 use crate::real::Lanes;
-use crate::rollout::{Purpose, Query, StateList, States, Stream, Tightening, sample_ball};
+use crate::rollout::{Query, StateList, States, Stream, Tightening, sample_ball};
 
 /// Directions of each sweep of the ray search.
 const DIRECTIONS: u64 = 512;
@@ -133,7 +134,7 @@ fn along_rays(
 
 /// Unit directions in the coordinates that vary: uniform, or spread around a given one.
 fn directions(settings: &Settings, sweep: u32, around: Option<(&[f32], f32)>) -> StateList {
-    let stream = Stream::new(settings.seed, Purpose::Direction, sweep);
+    let stream = Stream::new(settings.seed, purpose::DIRECTION, sweep);
     let draw = |index: u64| {
         let mut offset = vec![Lanes([0.0]); settings.state.len()];
         sample_ball::<1>(stream, index, |i| settings.growth.varies[i], &mut offset);

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::budget::{ledger, spendings};
 use super::origin::{provenance, system_record};
+use super::purpose;
 use super::record::{
     GrowthRecord, PictureRecord, Record, RolloutRecord, SCHEMA, StateRecord, Timing, decimal,
     finite_margin,
@@ -16,7 +17,7 @@ use super::{Context, Watch, boundary, claims, deviation, global, growth};
 use crate::backend::Program;
 use crate::error::Result;
 use crate::model::Plant;
-use crate::rollout::{Purpose, Query, Region, States, Stream, Tightening, replay};
+use crate::rollout::{Query, Region, States, Stream, Tightening, replay};
 
 /// Rollouts drawn in the picture: the state's, and that many starts of the growth.
 const PICTURED: usize = 12;
@@ -39,7 +40,7 @@ pub fn certify(
     check_settings(settings)?;
     let ledger = ledger(settings)?;
     let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
-    let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
+    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
     let global = global::conditional(context, settings, &tightening, purposes)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
@@ -106,7 +107,7 @@ fn state(
 /// A few rollouts: the state's, then starts of the growth's last round.
 fn picture(plant: &Plant, settings: &Settings, growth: &GrowthRecord) -> PictureRecord {
     let region = Region::Box { low: settings.low.to_vec(), high: settings.high.to_vec() };
-    let stream = Stream::new(settings.seed, Purpose::Picture, 0);
+    let stream = Stream::new(settings.seed, purpose::PICTURE, 0);
     let sampled = growth.samples.iter().take(PICTURED).map(|sample| sample.x.clone());
     let mut starts: Vec<Vec<f32>> =
         std::iter::once(settings.state.to_vec()).chain(sampled).collect();

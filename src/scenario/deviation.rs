@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
 use super::coordinates::coordinates;
+use super::purpose;
 use super::record::{Claim, DeviationRecord, decimal};
 use super::settings::{DeviationSettings, DeviationSource, Joint, Program, Settings};
 use super::{Context, linear};
@@ -31,13 +32,13 @@ pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecor
     let shape = match pilot {
         Some(count) => {
             context.watch.begin("pilot pairs", count);
-            let purposes = [Purpose::PilotNominal, Purpose::PilotPerturbation];
+            let purposes = [purpose::PILOT_NOMINAL, purpose::PILOT_PERTURBATION];
             Some(shape(&draw(context, settings, purposes, count)?.farthest, asked.radius))
         }
         None => None,
     };
     context.watch.begin("deviation pairs", asked.scenarios);
-    let purposes = [Purpose::DeviationNominal, Purpose::DeviationPerturbation];
+    let purposes = [purpose::DEVIATION_NOMINAL, purpose::DEVIATION_PERTURBATION];
     let sample = draw(context, settings, purposes, asked.scenarios)?;
     let largest: Vec<f64> = sample.farthest.iter().map(|f| f64::from(f.distance)).collect();
     let (scenario_bound, scale, support) =

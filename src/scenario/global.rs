@@ -6,6 +6,7 @@ use super::Context;
 use super::bound::{certified_risk, interval};
 use super::coordinates::coordinates;
 use super::finding::{Figure, Finding};
+use super::purpose;
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord, finite_margin};
 use super::settings::Settings;
 use crate::error::Result;
@@ -252,7 +253,7 @@ fn band_of(f32_error: f64) -> f64 {
 /// The band around zero within which measures are run again in f64, from the f32 error measured
 /// on pairs drawn from the box.
 pub fn band(context: Context<'_>, settings: &Settings, tightening: &Tightening) -> Result<f64> {
-    let purposes = [Purpose::ConditionalNominal, Purpose::ConditionalPerturbation];
+    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
     let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {

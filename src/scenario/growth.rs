@@ -4,12 +4,13 @@ use super::Context;
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
 use super::boundary::{self, Boundary};
 use super::coordinates::coordinates;
+use super::purpose;
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{
-    Ball, NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
+    Ball, NON_FINITE, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
 };
 
 /// Starts of the last round that are kept for the picture.
@@ -69,7 +70,7 @@ pub fn grow(
     let mut samples = Vec::new();
     context.watch.begin("local growth", asked.scenarios * u64::from(asked.rounds));
     for number in 0..asked.rounds {
-        let stream = Stream::new(settings.seed, Purpose::Growth, call * asked.rounds + number);
+        let stream = Stream::new(settings.seed, purpose::GROWTH, call * asked.rounds + number);
         let round = round(context, settings, &ball, stream, band)?;
         samples = round.samples;
         let nearest = round.record.nearest_failure;

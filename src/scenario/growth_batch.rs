@@ -6,11 +6,12 @@ use rayon::prelude::*;
 
 use super::Context;
 use super::growth::{Growth, check_scenarios, next_radius};
+use super::purpose;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::real::Lanes;
 use crate::rollout::{
-    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening, replay,
+    Ball, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening, replay,
 };
 
 /// Starts that are drawn side by side.
@@ -133,7 +134,7 @@ fn piece(
     let draw = |(place, open): (usize, &Open)| {
         let Request { seed, call, .. } = &requests[open.request];
         let use_number = call * settings.growth.rounds + open.rounds;
-        let stream = Stream::new(*seed, Purpose::Growth, use_number);
+        let stream = Stream::new(*seed, purpose::GROWTH, use_number);
         let own = |index: u64| index.saturating_sub(place as u64 * count).min(count);
         drawn(&Region::Ball(open.ball.clone()), stream, own(range.start)..own(range.end))
     };

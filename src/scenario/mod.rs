@@ -18,6 +18,7 @@ pub mod ledger;
 pub mod linear;
 pub mod lipschitz;
 mod origin;
+pub mod purpose;
 pub mod record;
 pub mod sampling;
 pub mod settings;

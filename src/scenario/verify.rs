@@ -7,6 +7,7 @@ use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::origin::{hashes, provenance};
+use super::purpose;
 use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{tier, verified_ball};
@@ -15,9 +16,7 @@ use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
-use crate::rollout::{
-    Ball, Purpose, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
-};
+use crate::rollout::{Ball, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening};
 
 /// Fresh starts that a verified ball is tried with.
 const FRESH_STARTS: u64 = 20_000;
@@ -155,7 +154,7 @@ pub fn check(
     findings.push(compare::fields(record, &again));
     findings.extend(not_compared(record));
     let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
-    let purposes = [Purpose::Check, Purpose::CheckPerturbation];
+    let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
     let fresh = global::conditional(context, settings, &tightening, purposes)?;
     findings.push(refuted(
         "conditional failure on fresh pairs",
@@ -246,7 +245,7 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
 /// Failures among fresh starts in the verified ball.
 fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
     context.watch.begin("fresh starts in the ball", FRESH_STARTS);
-    let stream = Stream::new(settings.seed, Purpose::Check, 1);
+    let stream = Stream::new(settings.seed, purpose::CHECK, 1);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region: Region::Ball(ball), stream },

@@ -8,6 +8,7 @@ use super::adam::Adam;
 use super::device::{Device, number};
 use super::network::{Bound, Network};
 use super::physics::apply;
+use super::purpose;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::AnalyticSettings;
@@ -17,7 +18,7 @@ use super::tape::Tape;
 use crate::backend::Backend;
 use crate::error::Result;
 use crate::policy::Mlp;
-use crate::rollout::{Plant, Purpose, RolloutSpec, Tightening};
+use crate::rollout::{Plant, RolloutSpec, Tightening};
 use crate::system::System;
 
 /// Weights of the last layer at first, as a share of the others': no output is near saturation.
@@ -59,7 +60,7 @@ pub struct Analytic<'a, S, const NX: usize, const NU: usize> {
 impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX, NU> {
     /// Trains `network` from the parameters that it has.
     pub fn new(task: Task<'a, S, NX>, network: Network, settings: AnalyticSettings) -> Self {
-        let held_out = task.mixture.draw(task.seed, Purpose::HeldOut, 0, task.held_out as usize);
+        let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
         Self {
             step: Arc::new(step_tape(task.system)),
             measure: Arc::new(measure_tape(task.system, &task.spec, task.losses.as_ref())),
@@ -110,7 +111,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX
 impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Analytic<'_, S, NX, NU> {
     fn update(&mut self, iteration: u64) -> Result<f64> {
         let (seed, batch) = (self.task.seed, self.settings.batch);
-        let starts = self.task.mixture.draw(seed, Purpose::TrainStart, iteration, batch);
+        let starts = self.task.mixture.draw(seed, purpose::START, iteration, batch);
         let bound = self.network.bind(&self.task.device);
         let measures = self.measures(&bound, &starts, self.temperature(iteration));
         let loss = self.gain(measures).neg();

@@ -12,13 +12,14 @@ use super::device::{floats, number};
 use super::disturbed::{Disturbed, pushed};
 use super::environments::Environments;
 use super::network::{Network, Shape};
+use super::purpose;
 use super::replay::Replay;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::DdpgSettings;
 use crate::error::Result;
 use crate::policy::{Activation, Mlp, OutputActivation};
-use crate::rollout::{Plant, Purpose, RolloutSpec, Stream};
+use crate::rollout::{Plant, RolloutSpec, Stream};
 use crate::system::System;
 
 /// The backup knows no horizon: what the critic tells is compared with rollouts so many times as
@@ -58,7 +59,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
         let random = |number: u32, inputs: Vec<[f32; 2]>, outputs, output, last| {
             let (hidden, activation) = (hidden.clone(), Activation::Relu);
             let shape = Shape { inputs, hidden, outputs, activation, output };
-            let stream = Stream::new(task.seed, Purpose::TrainWeight, number);
+            let stream = Stream::new(task.seed, purpose::WEIGHT, number);
             Agent::new(Network::random(shape, stream, last))
         };
         let actor =
@@ -77,7 +78,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
                 horizon,
                 settings.environments,
             ),
-            held_out: task.mixture.draw(task.seed, Purpose::HeldOut, 0, task.held_out as usize),
+            held_out: task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize),
             entries,
             settings,
             task,
@@ -115,8 +116,8 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
         let [u, d] = [&self.control, &self.disturbance]
             .map(|actor| actor.network.fixed(device).forward(rows.clone()));
         let own = floats(Tensor::cat(vec![u, d], 1).inner());
-        let noise = Stream::new(self.task.seed, Purpose::TrainNoise, 0);
-        let uniform = Stream::new(self.task.seed, Purpose::TrainControl, 0);
+        let noise = Stream::new(self.task.seed, purpose::NOISE, 0);
+        let uniform = Stream::new(self.task.seed, purpose::CONTROL, 0);
         let act = |(i, own): (usize, &[f32])| {
             let (index, random) = (first + i as u64, self.settings.random);
             // Spread over the parts of the mixture, which stand one after the other.
@@ -136,7 +137,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
     fn remembered(&self, iteration: u64) -> Vec<f32> {
         let batch = self.settings.batch;
         let written = (iteration + 1) * self.environments.len() as u64;
-        let choice = Stream::new(self.task.seed, Purpose::TrainChoice, 0);
+        let choice = Stream::new(self.task.seed, purpose::CHOICE, 0);
         self.replay
             .draw(written, choice, iteration * batch as u64, batch)
             .flatten()

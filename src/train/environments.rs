@@ -1,7 +1,7 @@
 //! Plants stepped side by side, each started again when its episode is over.
 
+use super::purpose;
 use super::starts::Mixture;
-use crate::rollout::Purpose;
 
 /// Plants with the states that they are in; what follows is a function of these and of the number
 /// of the step.
@@ -20,7 +20,7 @@ impl<const NX: usize> Environments<NX> {
     /// `count` plants at their first starts, each at another age, so that they do not start again
     /// all at once.
     pub fn new(mixture: Mixture<NX>, seed: u64, horizon: u32, count: usize) -> Self {
-        let states = mixture.draw(seed, Purpose::TrainStart, 0, count).as_flattened().to_vec();
+        let states = mixture.draw(seed, purpose::START, 0, count).as_flattened().to_vec();
         let ages = (0..count).map(|i| (i as u32 % horizon) as f32).collect();
         Self { mixture, seed, horizon, states, ages }
     }
@@ -48,7 +48,7 @@ impl<const NX: usize> Environments<NX> {
         next: &[[f32; NX]],
         over: impl Fn(&[f32; NX]) -> bool,
     ) -> Vec<bool> {
-        let starts = self.mixture.draw(self.seed, Purpose::TrainStart, number + 1, self.ages.len());
+        let starts = self.mixture.draw(self.seed, purpose::START, number + 1, self.ages.len());
         let mut ended = Vec::with_capacity(next.len());
         let states = self.states.as_chunks_mut().0.iter_mut();
         for (((state, age), next), start) in states.zip(&mut self.ages).zip(next).zip(starts) {

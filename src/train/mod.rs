@@ -22,6 +22,7 @@ pub mod network;
 pub mod physics;
 #[cfg(feature = "train")]
 pub mod ppo;
+pub mod purpose;
 pub mod record;
 pub mod replay;
 pub mod reward;

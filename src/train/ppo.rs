@@ -10,13 +10,14 @@ use super::device::{floats, number};
 use super::environments::Environments;
 use super::gae::{Step, advantages};
 use super::network::{Network, Shape};
+use super::purpose;
 use super::reward::Reward;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::PpoSettings;
 use crate::error::Result;
 use crate::policy::{Activation, Mlp, OutputActivation};
-use crate::rollout::{Plant, Purpose, Stream};
+use crate::rollout::{Plant, Stream};
 use crate::system::System;
 
 /// What is rewarded, and what the networks see.
@@ -71,7 +72,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         let random = |number: u32, outputs, output, last| {
             let (inputs, hidden, activation) = (states.clone(), hidden.clone(), Activation::Relu);
             let shape = Shape { inputs, hidden, outputs, activation, output };
-            Network::random(shape, Stream::new(task.seed, Purpose::TrainWeight, number), last)
+            Network::random(shape, Stream::new(task.seed, purpose::WEIGHT, number), last)
         };
         let policy = random(0, NU, OutputActivation::Tanh, LAST);
         let value = random(1, 1, OutputActivation::Identity, 1.0);
@@ -79,7 +80,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         let (horizon, count) = (task.spec.horizon, settings.environments);
         Self {
             environments: Environments::new(task.mixture.clone(), task.seed, horizon, count),
-            held_out: task.mixture.draw(task.seed, Purpose::HeldOut, 0, task.held_out as usize),
+            held_out: task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize),
             spread: vec![settings.spread.ln() as f32; NU],
             policy,
             value,
@@ -142,7 +143,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         let device = &self.task.device;
         let rows = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
         let means = floats(self.policy.fixed(device).forward(rows).inner());
-        let noise = Stream::new(self.task.seed, Purpose::TrainNoise, 0);
+        let noise = Stream::new(self.task.seed, purpose::NOISE, 0);
         let first = number * states.len() as u64;
         let next = |(i, (x, mean)): (usize, (&[f32; NX], &[f32]))| {
             let z = noise.normals(first + i as u64, NU);
@@ -201,7 +202,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
 
     /// The numbers below `count` in the random order number `number`.
     fn shuffled(&self, number: u64, count: usize) -> Vec<usize> {
-        let stream = Stream::new(self.task.seed, Purpose::TrainChoice, 0);
+        let stream = Stream::new(self.task.seed, purpose::CHOICE, 0);
         let first = number * count as u64;
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by_key(|&i| (stream.words::<1>(first + i as u64, 0)[0][0], i));

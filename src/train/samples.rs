@@ -1,5 +1,6 @@
 //! What value networks learn from: states, or states with a control, and the measures there.
 
+use super::purpose;
 use super::starts::Mixture;
 use crate::backend::Backend;
 use crate::error::Result;
@@ -69,7 +70,7 @@ impl<S, P, const NX: usize> Source<'_, S, P, NX> {
         let system = self.plant.system;
         let (low, high): (Vec<f32>, Vec<f32>) =
             system.controls().iter().map(|axis| (axis.low, axis.high)).unzip();
-        let stream = Stream::new(self.seed, Purpose::TrainControl, purpose as u32);
+        let stream = Stream::new(self.seed, purpose::CONTROL, purpose.number());
         let states = self.states::<NU>(purpose, count);
         let control = |i: usize| -> [f32; NU] {
             let drawn = stream.in_box::<1>(&low, &high, i as u64);

@@ -40,19 +40,18 @@ pub struct TrainSettings {
 }
 
 /// What is trained, and how.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[value(rename_all = "kebab-case")]
 pub enum Method {
-    /// A policy, by back-propagation of the softened measure through the known dynamics
+    /// A policy, by back-propagation of the softened measure through the known dynamics.
     Analytic,
-    /// V(x), the measure of the policy's rollout from a state
+    /// V(x), the measure of the policy's rollout from a state.
     Value,
-    /// Q(x, u), the measure after a first control
+    /// Q(x, u), the measure after a first control.
     ActionValue,
-    /// A policy against a disturbance, both by the critic of the reach-avoid backup
+    /// A policy against a disturbance, both by the critic of the reach-avoid backup.
     Ddpg,
-    /// A policy, by proximal policy optimisation on an ordinary reward
+    /// A policy, by proximal policy optimisation on an ordinary reward.
     Ppo,
 }
 

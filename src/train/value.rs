@@ -3,12 +3,13 @@
 use super::adam::Adam;
 use super::device::{Device, floats, number};
 use super::network::Network;
+use super::purpose;
 use super::run::Learner;
 use super::samples::Samples;
 use super::settings::ValueSettings;
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
-use crate::rollout::{Purpose, Stream};
+use crate::rollout::Stream;
 
 /// A network that learns the measures of samples.
 #[derive(Debug)]
@@ -52,7 +53,7 @@ impl Value {
             let problem = "every rollout meets a state that is not finite: nothing to learn from";
             return Err(Error::invalid("train.value", problem));
         }
-        let choice = Stream::new(seed, Purpose::TrainChoice, 0);
+        let choice = Stream::new(seed, purpose::CHOICE, 0);
         let adam = Adam::new(network.parameters.len());
         Ok(Self { name, order, settings, choice, samples, held_out, device, network, adam })
     }

@@ -9,9 +9,10 @@ use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
 use reachcast::rollout::Plant as TypedPlant;
 use reachcast::rollout::{
-    DeviationTask, PairControl, Pairs, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
-    States, Stream,
+    DeviationTask, PairControl, Pairs, Query, ReachAvoidTask, Region, RolloutSpec, Starts, States,
+    Stream,
 };
+use reachcast::scenario::purpose;
 use reachcast::system::{BangBang, DoubleIntegrator};
 use reachcast::{Error, Fault, Result};
 
@@ -73,7 +74,7 @@ fn roll_out_pairs(program: &Program<'_>, control: PairControl) -> Result<()> {
         pairs: Pairs {
             nominal: starts(program.plant()),
             radius: 0.1,
-            stream: Stream::new(82, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(82, purpose::DEVIATION_PERTURBATION, 0),
         },
         range: 0..158,
         spec,

@@ -7,6 +7,7 @@ use reachcast::rollout::{
     DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query,
     ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
 };
+use reachcast::scenario::purpose;
 use reachcast::system::{BangBang, DoubleIntegrator};
 
 use crate::systems::{Count, Idle};
@@ -42,7 +43,7 @@ fn chunks_join_without_a_seam() {
         pairs: Pairs {
             nominal: drawn(whole_box(&system), 27),
             radius: 0.1,
-            stream: Stream::new(27, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(27, purpose::DEVIATION_PERTURBATION, 0),
         },
         range,
         spec,
@@ -81,7 +82,7 @@ fn every_step_of_a_long_horizon_is_taken() {
         pairs: Pairs {
             nominal: Starts::listed(&list),
             radius: 0.0,
-            stream: Stream::new(1, Purpose::User, 0),
+            stream: Stream::new(1, Purpose::USER, 0),
         },
         range: 0..10,
         spec,
@@ -155,7 +156,7 @@ fn non_finite_states(mut gpu: Gpu) {
         pairs: Pairs {
             nominal: Starts::listed(&starts[..3]),
             radius: 0.01,
-            stream: Stream::new(1, Purpose::User, 0),
+            stream: Stream::new(1, Purpose::USER, 0),
         },
         range: 0..3,
         spec,

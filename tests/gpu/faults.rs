@@ -12,6 +12,7 @@ use reachcast::rollout::{
     CostQuery, DeviationTask, Farthest, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask,
     PairControl, PairMeasure, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Stream,
 };
+use reachcast::scenario::purpose;
 use reachcast::system::DoubleIntegrator;
 use reachcast::{Error, Fault, Result};
 
@@ -107,7 +108,7 @@ fn pairs(backend: &Backend, found: &mut Found) -> Result<()> {
         pairs: Pairs {
             nominal: drawn(whole_box(&system), 62),
             radius: 0.1,
-            stream: Stream::new(62, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(62, purpose::DEVIATION_PERTURBATION, 0),
         },
         range: 0..COUNT,
         spec,
@@ -131,7 +132,7 @@ fn plans(backend: &Backend, found: &mut Found) -> Result<()> {
         start: [0.1 * number as f32, -0.2],
         plan: vec![[0.1]; 8],
         context: vec![[0.0; 3]; 8],
-        stream: Stream::new(63, Purpose::ControlNoise, number),
+        stream: Stream::new(63, Purpose::CONTROL_NOISE, number),
     };
     let problems: Vec<_> = (0..PROBLEMS).map(problem).collect();
     let (value, disturbance, costs) = (None, None, CostQuery::Each);

@@ -138,7 +138,7 @@ fn a_measure_stays_finite() {
             pairs: Pairs {
                 nominal: Starts::listed(&starts),
                 radius: 0.0,
-                stream: Stream::new(1, Purpose::User, 0),
+                stream: Stream::new(1, Purpose::USER, 0),
             },
             range: 0..1,
             spec,

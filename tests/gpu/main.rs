@@ -120,7 +120,7 @@ fn whole_box<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) ->
 }
 
 fn drawn(region: Region, seed: u64) -> Starts<'static> {
-    Starts::Drawn { region, stream: Stream::new(seed, Purpose::User, 3) }
+    Starts::Drawn { region, stream: Stream::new(seed, Purpose::USER, 3) }
 }
 
 fn race_policy() -> Mlp {

@@ -26,7 +26,7 @@ fn host() -> Backend {
 }
 
 fn stream(number: u32) -> Stream {
-    Stream::new(0x1_2345_6789, Purpose::ControlNoise, number)
+    Stream::new(0x1_2345_6789, Purpose::CONTROL_NOISE, number)
 }
 
 fn task<'a, const NX: usize, const NU: usize, const NC: usize>(

@@ -5,9 +5,10 @@ use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    DeviationTask, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask,
-    RolloutSpec, Starts, Stream, Tightening,
+    DeviationTask, NON_FINITE, PairControl, Pairs, Plant, Query, ReachAvoidTask, RolloutSpec,
+    Starts, Stream, Tightening,
 };
+use reachcast::scenario::purpose;
 
 use crate::measures::assert_close_to_f64;
 use crate::systems::Count;
@@ -91,7 +92,7 @@ fn fused_chunks_join_without_a_seam() {
         pairs: Pairs {
             nominal: drawn(whole_box(&system), 33),
             radius: 0.1,
-            stream: Stream::new(33, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(33, purpose::DEVIATION_PERTURBATION, 0),
         },
         range,
         spec,

@@ -7,9 +7,10 @@ use reachcast::policy::Policy;
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
-    DeviationTask, Farthest, Fold, PairControl, PairMeasure, Pairs, Plant, Purpose, Region,
-    RolloutSpec, Stream, Tightening, pair_measures,
+    DeviationTask, Farthest, Fold, PairControl, PairMeasure, Pairs, Plant, Region, RolloutSpec,
+    Stream, Tightening, pair_measures,
 };
+use reachcast::scenario::purpose;
 use reachcast::system::System;
 
 use crate::systems::{Idle, Reveal};
@@ -30,7 +31,7 @@ fn race_deviation(mut gpu: Gpu) {
             pairs: Pairs {
                 nominal: drawn(whole_box(&system), 25),
                 radius: 0.1,
-                stream: Stream::new(25, Purpose::DeviationPerturbation, 0),
+                stream: Stream::new(25, purpose::DEVIATION_PERTURBATION, 0),
             },
             range: 100..400,
             spec,
@@ -147,7 +148,7 @@ fn equal_distances_go_to_the_first_pair() {
         pairs: Pairs {
             nominal: drawn(Region::new_box([-1.0; 3], [1.0; 3]).expect("a box"), 11),
             radius: 0.1,
-            stream: Stream::new(12, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(12, purpose::DEVIATION_PERTURBATION, 0),
         },
         range: 77..777,
         spec,

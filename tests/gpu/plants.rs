@@ -5,9 +5,10 @@ use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::model::Plant;
 use reachcast::rollout::{
-    DeviationTask, PairControl, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, States, Stream, Tightening,
+    DeviationTask, PairControl, PairMeasure, Pairs, Query, ReachAvoidTask, Region, RolloutSpec,
+    Starts, States, Stream, Tightening,
 };
+use reachcast::scenario::purpose;
 
 use crate::models::{DRIVERS, Driver, Truth, VALUES};
 use crate::{drawn, gpu, ramp};
@@ -111,7 +112,7 @@ fn assert_pairs(backend: &Backend, driver: Driver, control: PairControl) {
         pairs: Pairs {
             nominal: drawn(region(), 72),
             radius: 0.2,
-            stream: Stream::new(73, Purpose::DeviationPerturbation, 0),
+            stream: Stream::new(73, purpose::DEVIATION_PERTURBATION, 0),
         },
         range: 3..3 + COUNT,
         spec,

@@ -2,9 +2,10 @@
 
 use reachcast::backend::gpu::Gpu;
 use reachcast::rollout::{
-    Ball, DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, Stream, Tightening,
+    Ball, DeviationTask, PairControl, Pairs, Plant, Query, ReachAvoidTask, Region, RolloutSpec,
+    Starts, Stream, Tightening,
 };
+use reachcast::scenario::purpose;
 
 use crate::systems::{Idle, Reveal};
 use crate::{deviation, drawn, gpu, measures};
@@ -62,7 +63,7 @@ fn pairs_have_the_host_bits() {
     let pairs = Pairs {
         nominal: drawn(Region::new_box([-1.0; 3], [1.0, 2.0, 3.0]).expect("a box"), 11),
         radius: 0.1,
-        stream: Stream::new(12, Purpose::DeviationPerturbation, 0),
+        stream: Stream::new(12, purpose::DEVIATION_PERTURBATION, 0),
     };
     let task = DeviationTask {
         pairs: pairs.clone(),

@@ -8,9 +8,10 @@ use reachcast::backend::gpu::Injection;
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Purpose, Query,
-    ReachAvoidTask, RolloutSpec, Stream,
+    DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Query, ReachAvoidTask,
+    RolloutSpec, Stream,
 };
+use reachcast::scenario::purpose;
 use reachcast::{Fault, Result};
 
 use crate::{drawn, gpu, ramp, random_network, whole_box};
@@ -46,7 +47,7 @@ fn run(backend: &Backend, policy: &Mlp, seed: u64) -> Result<Found> {
         found.measures.extend_from_slice(values);
         Ok(())
     })?;
-    let stream = Stream::new(seed, Purpose::DeviationPerturbation, 0);
+    let stream = Stream::new(seed, purpose::DEVIATION_PERTURBATION, 0);
     let task = DeviationTask {
         pairs: Pairs { nominal: starts, radius: 0.1, stream },
         range: 0..150,

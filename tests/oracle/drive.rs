@@ -37,7 +37,7 @@ fn problem(number: u32) -> MppiProblem<3, 2, 3> {
         start,
         plan: (0..HORIZON).map(|t| [1.2 + 0.5 * wave(t), 1.5 * wave(2 * t)]).collect(),
         context: (0..HORIZON).map(|t| [1.5 + 0.1 * wave(t), 0.4, 3.0 - 0.05 * t as f32]).collect(),
-        stream: Stream::new(11, Purpose::ControlNoise, number),
+        stream: Stream::new(11, Purpose::CONTROL_NOISE, number),
     }
 }
 

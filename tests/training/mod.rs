@@ -6,11 +6,12 @@
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
 use reachcast::policy::{Activation, OutputActivation};
-use reachcast::rollout::{Purpose, RolloutSpec, Stream, Tightening};
+use reachcast::rollout::{RolloutSpec, Stream, Tightening};
 use reachcast::system::System;
 use reachcast::train::analytic::Task;
 use reachcast::train::device::Device;
 use reachcast::train::network::{Network, Shape};
+use reachcast::train::purpose;
 use reachcast::train::settings::TrainSettings;
 
 /// The configuration of a system with its defaults.
@@ -42,7 +43,7 @@ pub(crate) fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
     let (inputs, hidden) = (intervals(system), hidden.to_vec());
     let (activation, output) = (Activation::Relu, OutputActivation::Tanh);
     let shape = Shape { inputs, hidden, outputs: NU, activation, output };
-    Network::random(shape, Stream::new(5, Purpose::TrainWeight, 0), last)
+    Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), last)
 }
 
 /// What is trained on `system`, its tensors on `device`.

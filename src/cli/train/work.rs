@@ -10,7 +10,7 @@ use crate::backend::{Backend, Program};
 use crate::cli::options::{BackendName, Global};
 use crate::cli::progress::Progress;
 use crate::cli::{Outcome, devices, report};
-use crate::config::{Config, Job, SystemJob};
+use crate::config::{Config, PlantWork, SystemWork};
 use crate::error::Result;
 use crate::files::{Existing, Staged, json};
 use crate::model;
@@ -22,6 +22,7 @@ use crate::system::System;
 use crate::train::analytic::{Analytic, LAST, Task};
 use crate::train::device::Device;
 use crate::train::network::{Network, Shape};
+use crate::train::purpose;
 use crate::train::record::{Origin, TrainRecord};
 use crate::train::run::{Learner, Run, Trained};
 use crate::train::samples::Source;
@@ -94,7 +95,7 @@ impl Training<'_> {
     ) -> Network {
         let hidden = self.settings.hidden.clone();
         let shape = Shape { inputs, hidden, outputs, activation: Activation::Relu, output };
-        Network::random(shape, Stream::new(self.config.seed, Purpose::TrainWeight, 0), last)
+        Network::random(shape, Stream::new(self.config.seed, purpose::WEIGHT, 0), last)
     }
 
     /// Trains `learner`, on the plant of `program` or from its policy on, for `total` iterations.
@@ -116,7 +117,7 @@ impl Training<'_> {
     }
 }
 
-impl SystemJob for Training<'_> {
+impl SystemWork for Training<'_> {
     type Output = Trained;
 
     fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Trained>
@@ -157,7 +158,7 @@ impl SystemJob for Training<'_> {
     }
 }
 
-impl Job for Training<'_> {
+impl PlantWork for Training<'_> {
     type Output = Trained;
 
     fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Trained>
@@ -190,8 +191,8 @@ impl Job for Training<'_> {
         let lesson = Lesson {
             name: if acts { "action_value" } else { "value" },
             order,
-            samples: samples(Purpose::TrainStart, settings.value.states)?,
-            held_out: samples(Purpose::HeldOut, settings.held_out)?,
+            samples: samples(purpose::START, settings.value.states)?,
+            held_out: samples(purpose::HELD_OUT, settings.held_out)?,
             device: self.device.clone(),
             seed: config.seed,
         };

@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
-
 use crate::backend::{Backend, Program};
 use crate::cli::folder_of;
 use crate::cli::inputs::inputs;
-use crate::config::{Config, Overrides, PolicySource};
+use crate::config::{Config, Overrides, PolicySource, check_network, no_formula};
 use crate::error::{Error, Result};
 use crate::files::{Inputs, StateReader};
 use crate::model::Plant;
@@ -17,17 +15,20 @@ use crate::race::settings::RaceSettings;
 use crate::race::system::DroneRace;
 use crate::rollout::{Purpose, Region, Starts, Stream};
 use crate::scenario::settings::Settings;
+use crate::studies::BuiltIn;
 use crate::system::System;
 
+/// What starts of races are drawn for.
+const RACE_START: Purpose = Purpose::numbered(14);
 /// Most starts that can be drawn.
 const MOST_STARTS: u64 = 1_000_000;
 /// Most noise seeds.
 const MOST_SEEDS: u64 = 1000;
 
 /// A configuration that has races, with everything that it names.
-pub(in crate::race::command) struct RaceInput {
+pub(super) struct RaceInput {
     /// The configuration.
-    pub(in crate::race::command) config: Config,
+    pub(super) config: Config,
     folder: PathBuf,
     race: RaceSettings,
     certificates: Settings,
@@ -38,9 +39,9 @@ pub(in crate::race::command) struct RaceInput {
 
 impl RaceInput {
     /// Reads the configuration at `path`, with `overrides` over it, and the files that it names.
-    pub(in crate::race::command) fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
+    pub(super) fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let config = Config::load(path, overrides)?;
-        let race = config.race.clone().ok_or_else(|| {
+        let race = config.study.clone().ok_or_else(|| {
             let problem = "only the system `drone-race` has races; certificates it has: `certify`, \
                            `sweep --of certificate`";
             Error::invalid(path.display().to_string(), problem)
@@ -49,12 +50,13 @@ impl RaceInput {
         let policy = config.policy_source(&folder)?;
         let networks = Networks::read(&race, &folder)?;
         let certificates = config.settings(&DroneRace::default().states())?;
-        let (system, _) = config.race_plant(&policy)?;
+        let system = system(&config)?;
+        policy_of(&system, &policy)?;
         Ok(Self { config, folder, race, certificates, system, policy, networks })
     }
 
     /// The files that this and the starts `asked` for were read from; the configuration is at `path`.
-    pub(in crate::race::command) fn inputs(&self, path: &Path, asked: Option<&str>) -> Inputs {
+    pub(super) fn inputs(&self, path: &Path, asked: Option<&str>) -> Inputs {
         let named = &self.race.networks;
         let networks = [&named.value, &named.disturbance, &named.ppo];
         let networks = networks.into_iter().filter(|file| !file.is_empty());
@@ -72,17 +74,17 @@ impl RaceInput {
     }
 
     /// The plant under the policy.
-    pub(in crate::race::command) fn plant(&self) -> Result<Plant> {
+    pub(super) fn plant(&self) -> Result<Plant> {
         self.config.plant(&self.policy)
     }
 
     /// What controllers are made of; `program` is the plant as prepared on `backend`.
-    pub(in crate::race::command) fn world<'a>(
+    pub(super) fn world<'a>(
         &'a self,
         backend: &'a Backend,
         program: &'a Program<'a>,
     ) -> Result<World<'a>> {
-        let (_, policy) = self.config.race_plant(&self.policy)?;
+        let policy = policy_of(&self.system, &self.policy)?;
         Ok(World {
             backend,
             program,
@@ -97,10 +99,7 @@ impl RaceInput {
     }
 
     /// The starts: drawn, of a file, or those of the configuration; and where they come from.
-    pub(in crate::race::command) fn starts(
-        &self,
-        asked: Option<&str>,
-    ) -> Result<(Vec<[f32; 12]>, String)> {
+    pub(super) fn starts(&self, asked: Option<&str>) -> Result<(Vec<[f32; 12]>, String)> {
         if let Some(count) = asked.and_then(|text| text.parse::<u64>().ok()) {
             return drawn(&self.race, count, self.config.seed);
         }
@@ -113,8 +112,27 @@ impl RaceInput {
     }
 }
 
+/// The drone race that the configuration asks for.
+fn system(config: &Config) -> Result<DroneRace> {
+    match config.built_in()? {
+        BuiltIn::DroneRace(system) => Ok(system),
+        _ => Err(Error::invalid("system.name", "only `drone-race` has races")),
+    }
+}
+
+/// The policy, a network that fits.
+fn policy_of<'a>(system: &DroneRace, policy: &'a PolicySource) -> Result<&'a Mlp> {
+    match policy {
+        PolicySource::Formula(name) => Err(no_formula(system, name, "none")),
+        PolicySource::Network { path, network, .. } => {
+            check_network(system, path, network)?;
+            Ok(network)
+        }
+    }
+}
+
 /// The noise seeds `seed`, `seed + 1`, ...
-pub(in crate::race::command) fn noise_seeds(seed: u64, count: u64) -> Result<Vec<u64>> {
+pub(super) fn noise_seeds(seed: u64, count: u64) -> Result<Vec<u64>> {
     if !(1..=MOST_SEEDS).contains(&count) {
         let problem = format!("{count} is not within 1..={MOST_SEEDS}");
         return Err(Error::invalid("--noise-seeds", problem));
@@ -123,7 +141,7 @@ pub(in crate::race::command) fn noise_seeds(seed: u64, count: u64) -> Result<Vec
 }
 
 /// The controllers of a list of names, each once, in its order.
-pub(in crate::race::command) fn names(list: &[String]) -> Result<Vec<Name>> {
+pub(super) fn names(list: &[String]) -> Result<Vec<Name>> {
     let mut names = Vec::new();
     for text in list {
         let more = match text.as_str() {
@@ -139,9 +157,9 @@ pub(in crate::race::command) fn names(list: &[String]) -> Result<Vec<Name>> {
 }
 
 /// The controller of a name.
-pub(in crate::race::command) fn name(text: &str) -> Result<Name> {
-    let known = Name::value_variants();
-    known.iter().copied().find(|name| name.text() == text).ok_or_else(|| {
+pub(super) fn name(text: &str) -> Result<Name> {
+    let known = Name::ALL;
+    known.into_iter().find(|name| name.text() == text).ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(|name| name.text()).collect();
         let distance = |name: &&&str| strsim::damerau_levenshtein(text, name);
         let nearest = names.iter().min_by_key(distance).copied().unwrap_or_default();
@@ -199,7 +217,7 @@ fn drawn(race: &RaceSettings, count: u64, seed: u64) -> Result<(Vec<[f32; 12]>, 
     let region =
         Region::new_box(corners.map(|[low, _]| low as f32), corners.map(|[_, high]| high as f32));
     let region = region.map_err(|error| Error::invalid(place, error.to_string()))?;
-    let starts = Starts::Drawn { region, stream: Stream::new(seed, Purpose::RaceStart, 0) };
+    let starts = Starts::Drawn { region, stream: Stream::new(seed, RACE_START, 0) };
     let source = format!("{count} drawn from the start box with seed {seed}");
     Ok(((0..count).map(|i| starts.start_array(i)).collect(), source))
 }

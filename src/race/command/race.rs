@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::arguments::RaceArguments;
 use super::input::{RaceInput, names, noise_seeds};
-use crate::cli::args::RaceArguments;
 use crate::cli::options::Global;
 use crate::cli::progress::Progress;
 use crate::cli::{Outcome, devices, report};
@@ -41,7 +41,7 @@ struct Timing {
 }
 
 /// Races what the configuration asks for.
-pub(crate) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
+pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let begun = Instant::now();
     let input = RaceInput::load(&asked.config, &global.overrides())?;
     let names = names(&asked.controllers)?;

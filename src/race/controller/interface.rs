@@ -12,19 +12,7 @@ use crate::race::system::DroneRace;
 use crate::scenario::settings::Settings;
 
 /// The controllers of the study, and the hybrid with a part left out.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    Hash,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Name {
     /// The four tiers.
@@ -64,6 +52,27 @@ pub enum Name {
 }
 
 impl Name {
+    /// All of them.
+    pub const ALL: [Self; 17] = [
+        Self::Hybrid,
+        Self::HybridNoPolicy,
+        Self::Mppi,
+        Self::MppiSoft,
+        Self::MppiCbf,
+        Self::MppiWarmstart,
+        Self::Policy,
+        Self::PpoCbf,
+        Self::HybridNoGlobal,
+        Self::HybridNoLocal,
+        Self::HybridNoRecovery,
+        Self::HybridNoSafety,
+        Self::HybridNoFences,
+        Self::HybridOneIteration,
+        Self::HybridStudyStart,
+        Self::HybridStudyRecovery,
+        Self::HybridValue,
+    ];
+
     /// The eight controllers of the study.
     pub const STUDY: [Self; 8] = [
         Self::Hybrid,

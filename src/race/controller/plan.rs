@@ -38,7 +38,7 @@ impl Plan<'_> {
 
 /// The stream of the control noise of a race at one step.
 pub(in crate::race) fn stream(seed: u64, step: u32) -> Stream {
-    Stream::new(seed, Purpose::ControlNoise, step)
+    Stream::new(seed, Purpose::CONTROL_NOISE, step)
 }
 
 /// The problem at `start`, with the reference of each stage.

@@ -1,6 +1,5 @@
 //! What of the points of a sweep has to be said beside their figures.
 
-use clap::ValueEnum;
 use serde_json::Value;
 
 use super::record::{PointRecord, PointResult, SweepRecord};
@@ -26,7 +25,7 @@ pub(super) fn notes(record: &SweepRecord) -> Vec<String> {
 fn note(record: &SweepRecord, point: &PointRecord) -> Option<String> {
     let PointResult::Race(race) = &point.result else { return None };
     let controller = value(record, point, "controller")?;
-    let name = Name::value_variants().iter().find(|name| name.text() == controller)?;
+    let name = Name::ALL.iter().find(|name| name.text() == controller)?;
     let sections = name.plan_sections().iter();
     let of = |key: &str| {
         let numbers = sections.clone().filter_map(|section| number(record, point, section, key));

@@ -88,7 +88,7 @@ fn a_pair_that_is_not_finite_is_the_farthest() {
         pairs: Pairs {
             nominal: Starts::listed(&starts),
             radius: 1e-3,
-            stream: Stream::new(1, Purpose::User, 0),
+            stream: Stream::new(1, Purpose::USER, 0),
         },
         range: 1..200,
         spec,

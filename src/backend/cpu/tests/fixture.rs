@@ -41,13 +41,13 @@ pub(super) fn race_starts() -> Starts<'static> {
     let high = [0.8, 0.0, -1.0, 0.7, 0.1, 0.1, 0.8, 0.0, -1.0, 0.5, 0.1, 0.1];
     Starts::Drawn {
         region: Region::new_box(low, high).expect("a valid box"),
-        stream: Stream::new(7, Purpose::User, 0),
+        stream: Stream::new(7, Purpose::USER, 0),
     }
 }
 
 /// Pairs around [`race_starts`].
 pub(super) fn race_pairs() -> Pairs<'static> {
-    Pairs { nominal: race_starts(), radius: 0.1, stream: Stream::new(7, Purpose::User, 1) }
+    Pairs { nominal: race_starts(), radius: 0.1, stream: Stream::new(7, Purpose::USER, 1) }
 }
 
 /// The policy of the race.

@@ -15,7 +15,7 @@ use crate::race::sweep::record::{PointRecord, PointResult, SweepRecord};
 use crate::race::sweep_page::sweep_html;
 use arguments::Of;
 
-pub(crate) use arguments::SweepArguments;
+pub(super) use arguments::SweepArguments;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-sweep";
@@ -30,7 +30,7 @@ fn outcome(record: &SweepRecord) -> Outcome {
 }
 
 /// Runs the points that are not stored yet and writes the tables and the page of all.
-pub(crate) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
+pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
     let grid = axes::grid(asked)?;
     let out = global.folder(DEFAULT_OUT);
     let progress = Progress::new(global);

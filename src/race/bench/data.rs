@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::bench;
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
 use crate::race::cost::{Fence, LaneCost, RACE_CONTEXT, RaceCost, RaceReference, Safety};
@@ -29,8 +30,8 @@ pub const PLAN_START: [f32; 12] = [0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.3, 0.0, -1.
 const HIDDEN: [(&str, &[usize]); 3] =
     [("3x64", &[64; 3]), ("3x128", &[128; 3]), ("4x512", &[512; 4])];
 /// The trained policy of the race, and the starts of its study.
-const POLICY: &[u8] = include_bytes!("../../configs/policies/race_policy.safetensors");
-const STUDY: &str = include_str!("../../configs/race_starts_500.csv");
+const POLICY: &[u8] = include_bytes!("../../../configs/policies/race_policy.safetensors");
+const STUDY: &str = include_str!("../../../configs/race_starts_500.csv");
 
 /// Number of starts.
 pub const STARTS: usize = 65_536;
@@ -88,7 +89,7 @@ pub fn rollout_spec() -> Result<RolloutSpec> {
 
 /// A relu network with weights that keep the size of its activations, and small biases.
 fn random_network(widths: &[usize], seed: u64, number: u32) -> Result<Mlp> {
-    let stream = Stream::new(seed, Purpose::Bench, number);
+    let stream = Stream::new(seed, bench::PURPOSE, number);
     let mut drawn = 0;
     let mut layer = |inputs: usize, outputs: usize| {
         let scale = (6.0 / inputs as f32).sqrt();
@@ -112,7 +113,7 @@ fn race_starts(seed: u64) -> Result<Arc<[[f32; 12]]>> {
     let study = study_starts()?;
     let region = Region::new_box([-NEAR; 12], [NEAR; 12])?;
     let offsets =
-        Starts::Drawn { region, stream: Stream::new(seed, Purpose::Bench, STARTS_STREAM) };
+        Starts::Drawn { region, stream: Stream::new(seed, bench::PURPOSE, STARTS_STREAM) };
     let near = |i: usize| {
         let (start, offset) = (study[i % study.len()], offsets.start(i as u64));
         std::array::from_fn(|axis| start[axis] + offset[axis])
@@ -169,7 +170,7 @@ pub fn mppi_problem(seed: u64, number: u32) -> MppiProblem<12, 3, RACE_CONTEXT> 
         start: PLAN_START,
         plan: vec![[0.0; 3]; PLAN as usize],
         context: (0..PLAN).map(context).collect(),
-        stream: Stream::new(seed, Purpose::ControlNoise, number),
+        stream: Stream::new(seed, Purpose::CONTROL_NOISE, number),
     }
 }
 

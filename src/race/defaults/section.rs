@@ -1,4 +1,4 @@
-//! Defaults of the race experiment: the numbers of each profile.
+//! The section `[race]` of each profile.
 
 use crate::config::Profile;
 use crate::control::tier::Domain;
@@ -22,7 +22,7 @@ const SAFETY: Safety =
 const FENCE: Fence = Fence { weight: 1e6, margin: 0.03 };
 
 /// The `[race]` section of `profile`. Where the paper gives no number, `paper` has the study's.
-pub(crate) fn race(profile: Profile) -> RaceSettings {
+pub(super) fn race(profile: Profile) -> RaceSettings {
     let rigorous = profile == Profile::Rigorous;
     RaceSettings {
         steps: 80,

@@ -57,7 +57,7 @@ struct MppiNumbers {
 ///
 /// # Errors
 /// Those of the backend, [`crate::Error::Write`] and [`crate::Error::NoRoom`].
-pub fn export(
+pub(crate) fn export(
     backend: &Backend,
     seed: u64,
     folder: &Path,
