@@ -175,6 +175,7 @@ pub mod real;
 pub mod report;
 pub mod rollout;
 pub mod scenario;
+#[cfg(feature = "cli")]
 pub mod studies;
 pub mod system;
 mod tile;

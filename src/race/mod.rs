@@ -40,7 +40,8 @@ pub mod sweep;
 #[cfg(feature = "cli")]
 mod sweep_page;
 pub mod system;
-#[cfg(all(test, feature = "cli"))]
+#[cfg(feature = "cli")]
+#[cfg(test)]
 mod tests;
 #[cfg(feature = "cli")]
 mod weights;

@@ -1,5 +1,6 @@
 //! Instruction sets: what formulas are compiled for, picked when the program starts.
 
+mod body;
 #[cfg(target_arch = "x86_64")]
 mod vector_x86;
 #[cfg(target_arch = "x86_64")]
@@ -7,39 +8,13 @@ mod x86;
 
 use std::marker::PhantomData;
 
-use super::{Lanes, Vector};
+use super::Lanes;
+pub(crate) use body::{Body, Formulas, Simd};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Avx512};
 
 /// Numbers of the vectors that the compiler makes of plain arrays.
 const PORTABLE: usize = 16;
-
-/// Work on one group of lanes, compiled for each instruction set by itself.
-///
-/// Small and few: every body is compiled for every set.
-pub(crate) trait Body {
-    /// What it returns.
-    type Output;
-
-    /// Does the work. Must be `#[inline(always)]`, as all that it calls, or it is compiled for
-    /// the baseline instructions.
-    fn run(self) -> Self::Output;
-}
-
-/// Formulas over the vectors of an instruction set.
-pub(crate) trait Formulas {
-    /// Does the work. Must be `#[inline(always)]`, as for [`Body`].
-    fn run<V: Vector>(self);
-}
-
-/// One instruction set, and what is compiled for it; a value is the proof that the processor has it.
-pub(crate) trait Simd: Copy + Send + Sync {
-    /// What its bodies evaluate formulas in.
-    type Vector: Vector;
-
-    /// Calls `body`, compiled for these instructions.
-    fn call<B: Body>(self, body: B) -> B::Output;
-}
 
 /// Those that the whole program is compiled for.
 #[derive(Clone, Copy, Debug)]

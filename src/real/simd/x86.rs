@@ -1,7 +1,7 @@
 //! AVX-512 and AVX2 with fused multiply-add: the proofs that a processor has them.
 
+use super::body::{Body, Simd};
 use super::vector_x86::{Vector256, Vector512};
-use super::{Body, Simd};
 
 /// The processor has AVX-512 as in x86-64-v4.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ impl Avx2 {
 
 #[allow(unsafe_code, reason = "instructions behind a proof of their presence")]
 mod calls {
-    use super::*;
+    use super::{Avx2, Avx512, Body, Simd, Vector256, Vector512};
 
     #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma")]
     fn call_avx512<B: Body>(body: B) -> B::Output {

@@ -4,7 +4,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 use super::{Source, Tape};
-use crate::formula::{Expr, Graph, Node, record};
+use crate::formula::{Expr, Function, Graph, Node, record};
 use crate::real::Real;
 use crate::real::simd::Instructions;
 use crate::tile::{Frame, Layout};
@@ -51,7 +51,7 @@ fn graph(random: &mut StdRng, inputs: usize, size: usize, outputs: usize) -> Gra
 fn node(random: &mut StdRng, count: u32) -> Node {
     let from = if random.random_range(0..3) == 0 { 0 } else { count.saturating_sub(6) };
     let [a, b, c, d] = std::array::from_fn(|_| random.random_range(from..count));
-    match random.random_range(0..13) {
+    match random.random_range(0..26) {
         0 | 1 => Node::Add(a, b),
         2 | 3 => Node::Sub(a, b),
         4 | 5 => Node::Mul(a, b),
@@ -62,7 +62,20 @@ fn node(random: &mut StdRng, count: u32) -> Node {
         10 => Node::Floor(a),
         11 if random.random() => Node::IfLt(a, b, a, b),
         11 => Node::IfLt(a, b, b, a),
-        _ => Node::IfLt(a, b, c, d),
+        12 => Node::IfLt(a, b, c, d),
+        13 => Node::SelectLt(a, b, c, d),
+        14 => Node::Min(a, b),
+        15 => Node::Max(a, b),
+        16 => Node::Clamp(a, b, c),
+        17 => Node::Sign(a),
+        18 => Node::Hypot(a, b),
+        19 => Node::Atan2(a, b),
+        20 => Node::Powi(a, random.random_range(-9..=9)),
+        21 => Node::Powf(a, number(random).to_bits()),
+        _ => {
+            let function = Function::ALL[random.random_range(0..Function::ALL.len())];
+            Node::Apply(function, a)
+        }
     }
 }
 
