@@ -208,6 +208,15 @@ fn a_point_that_does_not_hold_shows_in_the_exit_code() {
     names.dedup();
     assert_eq!(names.len(), count, "{names:?}");
     assert!(names.contains(&"radius") && names.contains(&"ball_radius"));
+    // Rows that other values leave out are told, and come back with theirs.
+    let again = |radius: &str| {
+        let mut arguments = vec!["sweep", LINE, "--out", &out, "--radius", radius, "--json"];
+        arguments.extend(small.split_whitespace());
+        let record: serde_json::Value = serde_json::from_str(&reachcast(&arguments).1).unwrap();
+        record["notes"].to_string()
+    };
+    assert!(again("0.02").contains("not asked for now: 1; they are kept in `points`"));
+    assert!(!again("0.02,0.9").contains("not asked for now"));
 }
 
 #[test]

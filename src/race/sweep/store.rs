@@ -144,7 +144,7 @@ impl Store {
         let count = names.filter(|name| name.ends_with(".json") && !of_this(name)).count();
         (count > 0).then(|| {
             format!(
-                "{count} stored points have values that were not asked for now: they are kept in \
+                "stored points of values that were not asked for now: {count}; they are kept in \
                  `{POINTS}`, and the tables and the page are without them; ask for all values \
                  together to have them all"
             )
