@@ -3,8 +3,8 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::made::Made;
 use super::existing::spare_folder;
+use super::made::Made;
 use super::{RECORD_BYTES, Staged, check_room, named, read_text};
 use crate::error::{Error, Result};
 

@@ -128,26 +128,24 @@ impl Noise {
         match &self.shape {
             NoiseShape::Independent => {
                 for (t, e) in steps {
-                    self.scale(&normals[t * count..][..count], e);
+                    self.scale::<V, N>(&normals[t * count..][..count], e);
                 }
             }
             NoiseShape::Colored { keep, fresh } => {
-                let (keep, fresh) = (Lanes::lit(*keep), Lanes::lit(*fresh));
                 for (t, e) in steps {
                     // The correlated numbers take the place of the fresh ones.
                     let (before, now) = normals.split_at_mut(t * count);
                     if t > 0 {
-                        for (z, before) in now.iter_mut().zip(&before[(t - 1) * count..]) {
-                            *z = keep * *before + fresh * *z;
-                        }
+                        let before = &before[(t - 1) * count..];
+                        correlate::<V, N>([*keep, *fresh], before, &mut now[..count]);
                     }
-                    self.scale(&now[..count], e);
+                    self.scale::<V, N>(&now[..count], e);
                 }
             }
             NoiseShape::Spline { knots, rows } => {
                 for ((_, e), row) in steps.zip(rows) {
-                    between(normals, *knots, row, e);
-                    self.scale_in_place(e);
+                    between::<V, N>(normals, *knots, row, e);
+                    self.scale_in_place::<V, N>(e);
                 }
             }
         }
@@ -193,25 +191,35 @@ impl Noise {
 
     /// `L z`.
     #[inline(always)]
-    fn scale<const N: usize>(&self, z: &[Lanes<N>], e: &mut [[f32; N]]) {
-        e.iter_mut().zip(z).for_each(|(e, z)| *e = z.0);
-        self.scale_in_place(e);
+    fn scale<V: Vector, const N: usize>(&self, z: &[Lanes<N>], e: &mut [[f32; N]]) {
+        for (i, e) in e.iter_mut().enumerate() {
+            for at in (0..N).step_by(V::WIDTH) {
+                self.scaled(i, |j| V::load(&z[j].0[at..])).store(&mut e[at..]);
+            }
+        }
     }
 
     /// `L e` in the place of `e`: the last control first, which none before it needs.
     #[inline(always)]
-    fn scale_in_place<const N: usize>(&self, e: &mut [[f32; N]]) {
+    fn scale_in_place<V: Vector, const N: usize>(&self, e: &mut [[f32; N]]) {
         for i in (0..e.len()).rev() {
-            let (before, rest) = e.split_at_mut(i);
-            let row = self.factor(i);
-            let mut sum = Lanes::lit(row[i]) * Lanes(rest[0]);
-            for (factor, z) in row.iter().zip(before) {
-                if *factor != 0.0 {
-                    sum = sum + Lanes::lit(*factor) * Lanes(*z);
-                }
+            for at in (0..N).step_by(V::WIDTH) {
+                self.scaled(i, |j| V::load(&e[j][at..])).store(&mut e[i][at..]);
             }
-            rest[0] = sum.0;
         }
+    }
+
+    /// Entry `i` of `L z`.
+    #[inline(always)]
+    fn scaled<V: Vector>(&self, i: usize, z: impl Fn(usize) -> V) -> V {
+        let row = self.factor(i);
+        let mut sum = V::lit(row[i]) * z(i);
+        for (j, factor) in row[..i].iter().enumerate() {
+            if *factor != 0.0 {
+                sum = sum + V::lit(*factor) * z(j);
+            }
+        }
+        sum
     }
 
     /// The noise of one sample, `[H, controls]`.
@@ -223,20 +231,39 @@ impl Noise {
     }
 }
 
+/// The next of correlated numbers, in the place of fresh ones.
+#[inline(always)]
+fn correlate<V: Vector, const N: usize>(
+    [keep, fresh]: [f32; 2],
+    before: &[Lanes<N>],
+    now: &mut [Lanes<N>],
+) {
+    for (z, before) in now.iter_mut().zip(before) {
+        for at in (0..N).step_by(V::WIDTH) {
+            let kept = V::lit(keep) * V::load(&before.0[at..]);
+            (kept + V::lit(fresh) * V::load(&z.0[at..])).store(&mut z.0[at..]);
+        }
+    }
+}
+
 /// The weighted sum of the knots of a step.
 #[inline(always)]
-fn between<const N: usize>(
+fn between<V: Vector, const N: usize>(
     normals: &[Lanes<N>],
     knots: usize,
     row: &SplineRow,
     z: &mut [[f32; N]],
 ) {
-    let count = z.len();
-    z.fill([0.0; N]);
-    for (k, weight) in row.weights.iter().enumerate().take(knots - row.first as usize) {
-        let knot = &normals[(row.first as usize + k) * count..][..count];
-        for (z, knot) in z.iter_mut().zip(knot) {
-            *z = (Lanes(*z) + Lanes::lit(*weight) * *knot).0;
+    let (count, weights) =
+        (z.len(), &row.weights[..SPLINE_SUPPORT.min(knots - row.first as usize)]);
+    for (i, z) in z.iter_mut().enumerate() {
+        for at in (0..N).step_by(V::WIDTH) {
+            let mut sum = V::lit(0.0);
+            for (k, weight) in weights.iter().enumerate() {
+                let knot = &normals[(row.first as usize + k) * count + i];
+                sum = sum + V::lit(*weight) * V::load(&knot.0[at..]);
+            }
+            sum.store(&mut z[at..]);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The grid of a sweep: axes from options, their points, and what each value sets.
 
-use crate::race::command::input::name;
 use crate::config::Overrides;
 use crate::error::{Error, Result};
+use crate::race::command::input::name;
 use crate::race::controller::Name;
 use crate::race::sweep::record::AxisRecord;
 
