@@ -21,7 +21,7 @@ use std::io::Write;
 
 use clap::Parser;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use args::{Arguments, Command, PolicyCommand};
 use output::plain;
 pub(crate) use output::{Outcome, folder_of, report};
