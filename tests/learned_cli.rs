@@ -154,8 +154,8 @@ fn what_does_not_fit_is_refused_with_file_key_and_column() {
             ", v)",
             &["line.toml:11: model.flow.v, column 9", "takes 2 inputs, found 1"][..],
         ),
-        ("v)[1]", "v)[2]", &["model.task.target, column 24", "outputs 0 to 1, found [2]"]),
-        ("shift", "none", &["model.task.target, column 24", "none.safetensors", "No such file"]),
+        ("v)[1]", "v)[2]", &["model.task.target, column 22", "outputs 0 to 1, found [2]"]),
+        ("shift", "none", &["model.task.target, column 22", "none.safetensors", "No such file"]),
         ("nets/drag.safetensors", "line.toml", &["model.flow.v", "not a whole safetensors file"]),
     ] {
         fs::write(&config, MODEL.replacen(from, to, 1)).unwrap();

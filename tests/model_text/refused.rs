@@ -240,7 +240,8 @@ fn networks_in_formulas_are_looked_at() {
     );
     let policy = format!("net('{file}', x)[0]");
     assert_refused("-2 * x - speed", &policy, &["policy.formula.force", "takes 2 inputs"]);
-    assert_refused("0.1 - abs(x)", &net(", x, force)[0]"), &["`force` is a control"]);
+    let margin = format!("net('{file}', x, force)[0]");
+    assert_refused("0.1 - abs(x)", &margin, &["model.task.target", "`force` is a control"]);
 }
 
 #[test]
