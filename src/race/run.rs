@@ -1,7 +1,7 @@
 //! A whole experiment: every controller with every noise seed, batch by batch, resumed where it
 //! stopped.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use serde::Serialize;
@@ -302,11 +302,7 @@ impl Experiment<'_> {
                     let file = events_of(&batch_file(*name, noise_seed, first));
                     let path = self.folder.join(RACES).join(file);
                     if path.exists() {
-                        let text = read_text(&path, ARCHIVE_BYTES);
-                        let text = text.map_err(|error| Error::file(&path, error))?;
-                        let stored: Vec<Event> = serde_json::from_str(&text)
-                            .map_err(|error| Error::file(&path, error))?;
-                        add_events(&mut all, stored);
+                        add_events(&mut all, stored_events(&path)?);
                     }
                 }
             }
@@ -383,6 +379,16 @@ impl Experiment<'_> {
             "ppo_sha256": digest(ppo),
         })
     }
+}
+
+/// What failed on an adapter while stored races were flown, as the file at `path` tells it.
+fn stored_events(path: &Path) -> Result<Vec<Event>> {
+    let damaged = |problem: &dyn std::fmt::Display| {
+        let remedy = "remove the file, and what failed on the adapter then is told no more";
+        Error::file(path, format!("{problem}; {remedy}"))
+    };
+    let text = read_text(path, ARCHIVE_BYTES).map_err(|error| damaged(&error))?;
+    serde_json::from_str(&text).map_err(|error| damaged(&error))
 }
 
 /// SHA-256 of the program that runs.
