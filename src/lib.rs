@@ -2,8 +2,8 @@
 //! that they support.
 //!
 //! The layers, each importing only from those above it: [`real`], [`error`] and [`digest`]; [`system`] and
-//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`race`] and [`mod@bench`];
-//! [`report`]; the command line.
+//! [`policy`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`]; [`mod@bench`];
+//! [`report`]; [`race`], the study; the command line.
 //! The mathematics is in `docs/method.md`, the architecture in `ARCHITECTURE.md`.
 
 pub mod backend;

@@ -53,7 +53,7 @@ pub fn certify(
     let (plant, backend) = (program.plant(), program.backend());
     check_settings(settings)?;
     let ledger = ledger(settings)?;
-    let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
+    let Tightened { constants, deviation, tightening } = tightened(context, settings)?;
     let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
     let global = global::conditional(context, settings, &tightening, purposes)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
@@ -132,8 +132,8 @@ pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened>
     Region::new_box(&*settings.low, &*settings.high)?;
     let constants = constants(context.model(), settings)?;
     let deviation = deviation::bound(context, settings)?;
-    let losses = tightening(&deviation.bound, &constants, &settings.spec);
-    Ok(Tightened { constants, deviation, losses })
+    let tightening = tightening(&deviation.bound, &constants, &settings.spec);
+    Ok(Tightened { constants, deviation, tightening })
 }
 
 /// What V_check is computed with.
@@ -144,7 +144,7 @@ pub struct Tightened {
     /// Deviation bound.
     pub deviation: DeviationRecord,
     /// What the margins lose.
-    pub losses: Tightening,
+    pub tightening: Tightening,
 }
 
 /// The Lipschitz constants, computed, sampled, and used as `settings` ask.
@@ -276,7 +276,7 @@ fn state(
     let margins = global::check_margins(context, &settings.spec, tightening, states, query, band)?;
     let check_margin = decimal(margins[0]);
     let target_margin = decimal(finite_margin(context.model().target_at(x, 0)));
-    let tier = super::verify::tier(target_margin, check_margin, growth, x);
+    let tier = super::verify::tier(target_margin, check_margin, growth, x).number();
     let constraint_margin = decimal(finite_margin(context.model().constraint_at(x, 0)));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }

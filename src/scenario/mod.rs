@@ -19,6 +19,7 @@ pub mod sampling;
 pub mod settings;
 mod stored;
 pub(crate) mod tail;
+pub mod tier;
 mod verify;
 
 pub(crate) use certify::provenance;

@@ -9,6 +9,7 @@ use super::finding::{CheckReport, Figure, Finding};
 use super::purpose;
 use super::record::{GrowthOutcome, GrowthRecord, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
+use super::tier::Tier;
 use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
@@ -27,22 +28,27 @@ const MOVED: f64 = 1e-3;
 /// Tier and margins of one state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct QueryRow {
-    /// 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-    pub tier: u8,
+    /// Its tier.
+    pub tier: Tier,
     /// `V_check`.
     pub check_margin: f32,
     /// Target margin.
     pub target_margin: f32,
 }
 
-/// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord, x: &[f32]) -> u8 {
+/// Tier of a state.
+pub(super) fn tier(
+    target_margin: f64,
+    check_margin: f64,
+    growth: &GrowthRecord,
+    x: &[f32],
+) -> Tier {
     let local = || verified_ball(growth, x.len()).is_some_and(|ball| ball.contains(x));
     match () {
-        () if target_margin > 0.0 => 0,
-        () if check_margin > 0.0 => 1,
-        () if local() => 2,
-        () => 3,
+        () if target_margin > 0.0 => Tier::Target,
+        () if check_margin > 0.0 => Tier::Global,
+        () if local() => Tier::Local,
+        () => Tier::Recovery,
     }
 }
 

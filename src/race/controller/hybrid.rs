@@ -5,9 +5,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::interface::{Active, Controller, Decision, World};
-use super::plan::{Paths, Plan, RaceProblem, fan, problem, stream};
+use super::plan::{Paths, RacePlanner, RaceProblem, fan, problem, stream};
 use crate::control::mppi::{policy_plan, shifted};
-use crate::control::tier::{Asked, Case, Certifier, Standing, Tier};
+use crate::control::tier::{Asked, Case, Certifier, Standing};
 use crate::error::Result;
 use crate::policy::Policy;
 use crate::race::cost::RaceReference;
@@ -16,6 +16,7 @@ use crate::race::system::DroneRace;
 use crate::rollout::{Disturbance, ValueTerm};
 use crate::scenario::global::slice_through;
 use crate::scenario::ledger::Ledger;
+use crate::scenario::tier::Tier;
 use crate::system::System;
 
 /// Velocity across above which the study brakes on entering the target, m/s.
@@ -31,8 +32,8 @@ const DISTURBED: [(usize, f32); 3] = [(7, 0.01), (9, 0.01), (11, 0.01)];
 pub(in crate::race) struct Hybrid<'a> {
     world: World<'a>,
     certifier: Certifier<'a>,
-    fast: Plan<'a>,
-    recovery: Plan<'a>,
+    fast: RacePlanner<'a>,
+    recovery: RacePlanner<'a>,
     paths: Paths,
     races: Vec<Memory>,
 }
@@ -54,8 +55,8 @@ impl<'a> Hybrid<'a> {
         let HybridSettings { global, local, domain, .. } = *asked;
         let certificates = Asked { global, local, domain };
         let certifier = Certifier::new(world.program, world.certificates, certificates)?;
-        let fast = Plan::new("race.hybrid.fast", &asked.fast, world.system)?;
-        let mut recovery = Plan::new("race.hybrid.recovery", &asked.recovery, world.system)?;
+        let fast = RacePlanner::new("race.hybrid.fast", &asked.fast, world.system)?;
+        let mut recovery = RacePlanner::new("race.hybrid.recovery", &asked.recovery, world.system)?;
         let (weight, threshold) = (asked.value_weight, asked.value_threshold);
         let value = |network| ValueTerm { network, weight, threshold };
         recovery.planner.value = world.value.filter(|_| weight > 0.0).map(value);

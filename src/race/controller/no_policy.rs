@@ -4,18 +4,18 @@ use std::time::Instant;
 
 use super::hybrid::{near_gate, shared};
 use super::interface::{Active, Controller, Decision, World};
-use super::plan::{Paths, Plan, RaceProblem, fan, problem, stream};
+use super::plan::{Paths, RacePlanner, RaceProblem, fan, problem, stream};
 use crate::control::mppi::shifted;
-use crate::control::tier::Tier;
 use crate::error::Result;
 use crate::race::cost::RaceReference;
+use crate::scenario::tier::Tier;
 use crate::system::System;
 
 /// The hybrid without policy and certificates: two plans, in the target and outside.
 pub(in crate::race) struct NoPolicy<'a> {
     world: World<'a>,
-    fast: Plan<'a>,
-    outside: Plan<'a>,
+    fast: RacePlanner<'a>,
+    outside: RacePlanner<'a>,
     paths: Paths,
     /// Whether the target was reached once, and the last plan.
     races: Vec<(bool, Option<Vec<[f32; 3]>>)>,
@@ -27,8 +27,8 @@ impl<'a> NoPolicy<'a> {
         let asked = &world.race.no_policy;
         Ok(Self {
             world,
-            fast: Plan::new("race.no_policy.fast", &asked.fast, world.system)?,
-            outside: Plan::new("race.no_policy.recovery", &asked.recovery, world.system)?,
+            fast: RacePlanner::new("race.no_policy.fast", &asked.fast, world.system)?,
+            outside: RacePlanner::new("race.no_policy.recovery", &asked.recovery, world.system)?,
             paths,
             races: vec![(false, None); races],
         })

@@ -11,14 +11,14 @@ use crate::rollout::{MppiProblem, Purpose, Stream};
 pub(in crate::race) type RaceProblem = MppiProblem<12, 3, RACE_CONTEXT>;
 
 /// A planner and the speed that it keeps.
-pub(in crate::race) struct Plan<'a> {
+pub(in crate::race) struct RacePlanner<'a> {
     /// The planner.
     pub(in crate::race) planner: Planner<'a, RaceCost, 3>,
     /// Speed toward the gate, m/s.
     pub(in crate::race) speed: f32,
 }
 
-impl Plan<'_> {
+impl RacePlanner<'_> {
     /// The planner that the `settings` of `section` ask for.
     pub(in crate::race) fn new(
         section: &str,
@@ -68,7 +68,7 @@ const DRAWN: u32 = 24;
 
 /// The first samples of problem `number` around its improved plan: x and y of the ego.
 pub(in crate::race) fn fan(
-    plan: &Plan<'_>,
+    plan: &RacePlanner<'_>,
     system: &DroneRace,
     problems: &[RaceProblem],
     number: usize,
