@@ -106,7 +106,7 @@ fn hybrid_step(criterion: &mut Criterion) {
     let backend = Backend::Cpu(Cpu::new(None).expect("threads"));
     let program = backend.prepare(&Plant::of(system, policy)).expect("a program");
     let context = Context { program: &program, watch: &Unwatched };
-    let losses = tightened(context, &settings).expect("deviation bound").losses;
+    let tightening = tightened(context, &settings).expect("deviation bound").tightening;
     // A centre that fails at any radius, so that all rounds are flown.
     let mut center = settings.state.clone();
     (center[0], center[2], center[6], center[8]) = (0.0, -1.0, 0.1, -0.9);
@@ -116,7 +116,7 @@ fn hybrid_step(criterion: &mut Criterion) {
     let problems = problems(1);
     let cells = slice_through(&settings, &settings.state);
     let slice = || {
-        check_margins(context, &settings.spec, &losses, cells.view(), Query::Sign, 0.0)
+        check_margins(context, &settings.spec, &tightening, cells.view(), Query::Sign, 0.0)
             .expect("a slice")
     };
     let grow = || grow_each(context, &settings, &request, 0.0).expect("a ball");

@@ -26,7 +26,7 @@ use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
 use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::{Curve, layer};
-use reachcast::train::network::{Network, Shape};
+use reachcast::train::network::{Architecture, Network};
 use reachcast::train::physics::apply;
 use reachcast::train::purpose;
 use reachcast::train::record::{Origin, TrainRecord};
@@ -51,7 +51,7 @@ fn learner<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
     network: Network,
     losses: Option<Tightening>,
 ) -> Analytic<'a, S, NX, NU> {
-    let task = Task { losses, ..task(system, backend, &Device::cpu(), config) };
+    let task = Task { tightening: losses, ..task(system, backend, &Device::cpu(), config) };
     Analytic::new(task, network, settings(config).analytic)
 }
 
@@ -424,7 +424,7 @@ fn a_value_network_learns_the_measure() {
     };
     let inputs = system.states().iter().map(|axis| [axis.low, axis.high]).collect();
     let (activation, output) = (Activation::Relu, OutputActivation::Identity);
-    let shape = Shape { inputs, hidden: vec![32; 2], outputs: 1, activation, output };
+    let shape = Architecture { inputs, hidden: vec![32; 2], outputs: 1, activation, output };
     let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
     let mut settings = settings(&config).value;
     settings.batch = 256;

@@ -23,7 +23,7 @@ use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::ddpg::{Ddpg, Game};
 use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::{Curve, layer};
-use reachcast::train::network::{Network, Shape};
+use reachcast::train::network::{Architecture, Network};
 use reachcast::train::ppo::{self, Ppo};
 use reachcast::train::purpose;
 use reachcast::train::reward::Reward;
@@ -198,7 +198,7 @@ fn slopes_of_the_softened_measure_are_the_cpus() {
     let losses = Some(losses(&config.spec().unwrap()));
     let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::START, 3, 100);
     let [expected, found] = devices.map(|device| {
-        let task = Task { losses: losses.clone(), ..task(&system, &backend, &device, &config) };
+        let task = Task { tightening: losses.clone(), ..task(&system, &backend, &device, &config) };
         let learner = Analytic::new(task, network.clone(), settings(&config).analytic);
         let bound = network.bind(&device);
         let measures = learner.measures(&bound, &starts, 0.4);
@@ -272,7 +272,7 @@ fn a_value_is_updated_as_on_the_cpu() {
         };
         let (activation, output) = (Activation::Relu, OutputActivation::Identity);
         let (inputs, hidden) = (intervals(&system), vec![32; 2]);
-        let shape = Shape { inputs, hidden, outputs: 1, activation, output };
+        let shape = Architecture { inputs, hidden, outputs: 1, activation, output };
         let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
         Value::new(lesson, network, settings(&config).value).unwrap()
     });

@@ -117,6 +117,7 @@ fn answers(rows: &[QueryRow]) -> Answers<'_> {
 fn csv(rows: &[QueryRow]) -> String {
     let line = |(index, row): (usize, &QueryRow)| {
         let QueryRow { tier, check_margin, target_margin } = row;
+        let tier = tier.number();
         format!("{index},{tier},{check_margin},{target_margin}\n")
     };
     let lines: String = rows.iter().enumerate().map(line).collect();
@@ -127,7 +128,7 @@ fn csv(rows: &[QueryRow]) -> String {
 fn counts(rows: &[QueryRow], path: &Path) -> String {
     let names = ["in the target", "certified", "in the verified ball", "none of these"];
     let line = |(tier, name): (usize, &str)| {
-        let count = rows.iter().filter(|row| usize::from(row.tier) == tier).count();
+        let count = rows.iter().filter(|row| usize::from(row.tier.number()) == tier).count();
         format!("tier {tier} ({name}): {count}\n")
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();

@@ -11,26 +11,7 @@ use crate::scenario::ledger::{Entry, Ledger, Spend};
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, Tightened, Unwatched, tightened};
 
-/// Who controls at a state, section 6 of `docs/method.md` and Algorithm 2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Tier {
-    /// Tier 0, in the target: the fast controller.
-    Target,
-    /// Tier 1, in the certified set: the policy.
-    Global,
-    /// Tier 2, in the locally verified ball: the policy.
-    Local,
-    /// Tier 3, elsewhere: recovery.
-    Recovery,
-}
-
-impl Tier {
-    /// Its number, 0 to 3.
-    pub fn number(self) -> u8 {
-        self as u8
-    }
-}
+pub use crate::scenario::tier::Tier;
 
 /// Which certificates are asked for; without one its tier is empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,7 +101,7 @@ impl<'a> Certifier<'a> {
             let problem = format!("{lost} rollouts of the deviation bound are not finite");
             return Err(Error::Refused(problem));
         }
-        let band = band(context, settings, &tightened.losses)?;
+        let band = band(context, settings, &tightened.tightening)?;
         Ok(Self { program, settings, tightened, band, asked })
     }
 
@@ -182,8 +163,8 @@ impl<'a> Certifier<'a> {
     /// `V_check` of each state, or its sign.
     fn margins(&self, states: States<'_>, query: Query) -> Result<Vec<f32>> {
         let context = Context { program: self.program, watch: &Unwatched };
-        let (spec, losses) = (&self.settings.spec, &self.tightened.losses);
-        check_margins(context, spec, losses, states, query, self.band)
+        let (spec, tightening) = (&self.settings.spec, &self.tightened.tightening);
+        check_margins(context, spec, tightening, states, query, self.band)
     }
 
     /// The certified cells of the slices through the states `left`. Signs in f32: a cell says

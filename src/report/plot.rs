@@ -21,7 +21,7 @@ const NAME: usize = 44;
 
 /// How the axes fill the plot.
 #[derive(Clone, Copy)]
-pub(crate) enum Shape {
+pub(crate) enum Proportions {
     /// All of the width, and this height.
     Free(f64),
     /// One unit as long across as upwards.
@@ -67,18 +67,18 @@ pub(crate) struct Plot {
 
 impl Plot {
     /// An empty plot; `id` names its clip path and is unique in the page.
-    pub(crate) fn new(id: &str, x: Span, y: Span, shape: Shape) -> Self {
+    pub(crate) fn new(id: &str, x: Span, y: Span, shape: Proportions) -> Self {
         Self::across_width(id, x, y, shape, WIDTH)
     }
 
     /// An empty plot that is `outer` wide with its labels.
-    pub(crate) fn across_width(id: &str, x: Span, y: Span, shape: Shape, outer: f64) -> Self {
+    pub(crate) fn across_width(id: &str, x: Span, y: Span, shape: Proportions, outer: f64) -> Self {
         let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
         let room = |y: Span, height: f64| room(&round(y, height / 46.0));
         let (mut width, mut height) = (outer - MARGIN - room(y, 400.0), 0.0);
         match shape {
-            Shape::Free(fixed) => height = fixed,
-            Shape::Equal => {
+            Proportions::Free(fixed) => height = fixed,
+            Proportions::Equal => {
                 let scale = (width / x.width()).min(HIGHEST / y.width());
                 // A sliver would be unreadable: show more of the shorter axis instead.
                 x = x.stretched(width * 0.5 / scale);
@@ -108,7 +108,7 @@ impl Plot {
     pub(crate) fn ticked(id: &str, axes: [Axis; 2], height: f64, [outer, right]: [f64; 2]) -> Self {
         let [x, y] = axes;
         let left = room(&y.ticks);
-        let empty = Self::across_width(id, x.span, y.span, Shape::Free(height), outer);
+        let empty = Self::across_width(id, x.span, y.span, Proportions::Free(height), outer);
         let width = outer - MARGIN - right - left;
         let mut plot = Self { left, width, ..empty };
         let across = |tick: f64, text: &str| {
@@ -362,13 +362,13 @@ pub(crate) fn coordinate(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Labels, Plot, Shape, coordinate};
+    use super::{Labels, Plot, Proportions, coordinate};
     use crate::report::span::Span;
 
     #[test]
     fn an_equal_plot_has_one_scale() {
         let (x, y) = (Span { low: -1.0, high: 1.0 }, Span { low: 0.0, high: 3.0 });
-        let plot = Plot::new("p", x, y, Shape::Equal);
+        let plot = Plot::new("p", x, y, Proportions::Equal);
         let [across, down] = plot.lengths(1.0);
         assert!((across - down).abs() < 1e-9);
     }
@@ -378,7 +378,7 @@ mod tests {
         let point = Span::of([f64::NAN, 2.0, 1e30]).expect("2 is a number");
         assert_eq!(point, Span { low: 2.0, high: 2.0 });
         assert_eq!(Span::of([f64::NAN]), None);
-        let mut plot = Plot::new("p", point, point, Shape::Free(100.0));
+        let mut plot = Plot::new("p", point, point, Proportions::Free(100.0));
         let line = plot.line([[2.0, 2.0], [f64::NAN, 2.0], [2.0, 1e30], [2.0, 2.0]]);
         assert_eq!(line.matches('M').count(), 2);
         plot.path("line", &line);

@@ -1,7 +1,7 @@
 //! The page of a run of training: what came of it, its learning curves, and where it came from.
 
 use super::figure::{Figure, Swatch};
-use super::plot::{Labels, Plot, Shape};
+use super::plot::{Labels, Plot, Proportions};
 use super::shell::{self, Headline, Scripts};
 use super::span::Span;
 use super::table::{pairs, table};
@@ -120,7 +120,7 @@ fn curve(
         None => Err("Nothing of this was measured.".to_owned()),
         Some(values) => {
             let across = Span { low: 0.0, high: done(record).max(1) as f64 };
-            let mut plot = Plot::new(id, across, values.widened(0.08), Shape::Free(250.0));
+            let mut plot = Plot::new(id, across, values.widened(0.08), Proportions::Free(250.0));
             let line = plot.line(points.iter().copied());
             plot.path("bound", &line);
             if let Some(kept) = best(record) {

@@ -39,7 +39,7 @@ pub fn certify(
     let (plant, backend) = (program.plant(), program.backend());
     check_settings(settings)?;
     let ledger = ledger(settings)?;
-    let Tightened { constants, deviation, losses: tightening } = tightened(context, settings)?;
+    let Tightened { constants, deviation, tightening } = tightened(context, settings)?;
     let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
     let global = global::conditional(context, settings, &tightening, purposes)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
@@ -99,7 +99,7 @@ fn state(
     let margins = global::check_margins(context, &settings.spec, tightening, states, query, band)?;
     let check_margin = decimal(margins[0]);
     let target_margin = decimal(finite_margin(context.model().target_at(x, 0)));
-    let tier = tier(target_margin, check_margin, growth, x);
+    let tier = tier(target_margin, check_margin, growth, x).number();
     let constraint_margin = decimal(finite_margin(context.model().constraint_at(x, 0)));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }

@@ -48,7 +48,7 @@ fn margins(record: &mut Record, model: &Model, settings: &Settings) {
     state.x = x.to_vec();
     state.target_margin = decimal(finite_margin(model.target_at(x, 0)));
     state.constraint_margin = decimal(finite_margin(model.constraint_at(x, 0)));
-    state.tier = tier(state.target_margin, state.check_margin, &record.growth, x);
+    state.tier = tier(state.target_margin, state.check_margin, &record.growth, x).number();
     let cells = global::slice_through(settings, x);
     let check_margin = std::mem::take(&mut record.slice.check_margin);
     record.slice =

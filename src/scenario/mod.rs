@@ -24,7 +24,7 @@ pub mod sampling;
 pub mod settings;
 mod stored;
 pub(crate) mod tail;
-mod tier;
+pub mod tier;
 mod tightened;
 mod verify;
 

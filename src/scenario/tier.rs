@@ -1,16 +1,50 @@
-//! Which tier of a certificate a state is in, and the ball that its growth verified.
+//! The tier of a state: who controls there; and the ball that growth verified.
+
+use serde::Serialize;
 
 use super::record::{GrowthOutcome, GrowthRecord};
 use crate::rollout::Ball;
 
-/// Tier of a state: 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-pub(super) fn tier(target_margin: f64, check_margin: f64, growth: &GrowthRecord, x: &[f32]) -> u8 {
+/// Who controls at a state, section 6 of `docs/method.md` and Algorithm 2; a file has its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(into = "u8")]
+pub enum Tier {
+    /// Tier 0, in the target: the fast controller.
+    Target,
+    /// Tier 1, in the certified set: the policy.
+    Global,
+    /// Tier 2, in the locally verified ball: the policy.
+    Local,
+    /// Tier 3, elsewhere: recovery.
+    Recovery,
+}
+
+impl Tier {
+    /// Its number, 0 to 3.
+    pub fn number(self) -> u8 {
+        self as u8
+    }
+}
+
+impl From<Tier> for u8 {
+    fn from(tier: Tier) -> Self {
+        tier.number()
+    }
+}
+
+/// Tier of a state.
+pub(super) fn tier(
+    target_margin: f64,
+    check_margin: f64,
+    growth: &GrowthRecord,
+    x: &[f32],
+) -> Tier {
     let local = || verified_ball(growth, x.len()).is_some_and(|ball| ball.contains(x));
     match () {
-        () if target_margin > 0.0 => 0,
-        () if check_margin > 0.0 => 1,
-        () if local() => 2,
-        () => 3,
+        () if target_margin > 0.0 => Tier::Target,
+        () if check_margin > 0.0 => Tier::Global,
+        () if local() => Tier::Local,
+        () => Tier::Recovery,
     }
 }
 

@@ -24,8 +24,8 @@ pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened>
     Region::new_box(&*settings.low, &*settings.high)?;
     let constants = constants(context.model(), settings)?;
     let deviation = deviation::bound(context, settings)?;
-    let losses = tightening(&deviation.bound, &constants, &settings.spec);
-    Ok(Tightened { constants, deviation, losses })
+    let tightening = tightening(&deviation.bound, &constants, &settings.spec);
+    Ok(Tightened { constants, deviation, tightening })
 }
 
 /// What V_check is computed with.
@@ -36,5 +36,5 @@ pub struct Tightened {
     /// Deviation bound.
     pub deviation: DeviationRecord,
     /// What the margins lose.
-    pub losses: Tightening,
+    pub tightening: Tightening,
 }

@@ -10,7 +10,7 @@ use super::origin::{hashes, provenance};
 use super::purpose;
 use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
-use super::tier::{tier, verified_ball};
+use super::tier::{Tier, tier, verified_ball};
 use super::tightened::tightening;
 use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
@@ -30,8 +30,8 @@ const MOVED: f64 = 1e-3;
 /// Tier and margins of one state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct QueryRow {
-    /// 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
-    pub tier: u8,
+    /// Its tier.
+    pub tier: Tier,
     /// `V_check`.
     pub check_margin: f32,
     /// Target margin.

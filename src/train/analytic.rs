@@ -36,7 +36,7 @@ pub struct Task<'a, S, const NX: usize> {
     /// Length and discount of a rollout.
     pub spec: RolloutSpec,
     /// What the margins lose in `V_check`; none if it has no part in the objective.
-    pub losses: Option<Tightening>,
+    pub tightening: Option<Tightening>,
     /// Where starts are drawn from.
     pub mixture: Mixture<NX>,
     /// Starts that the policy is scored on.
@@ -63,7 +63,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX
         let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
         Self {
             step: Arc::new(step_tape(task.system)),
-            measure: Arc::new(measure_tape(task.system, &task.spec, task.losses.as_ref())),
+            measure: Arc::new(measure_tape(task.system, &task.spec, task.tightening.as_ref())),
             adam: Adam::new(network.parameters.len()),
             network,
             held_out,

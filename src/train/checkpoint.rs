@@ -21,7 +21,7 @@ const BEST: &str = "best.";
 /// How far a run has come.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Progress {
+pub struct RunProgress {
     /// Iterations done.
     pub iteration: u64,
     /// Whether it ended early.
@@ -38,7 +38,7 @@ pub struct Progress {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checkpoint {
     /// How far it has come.
-    pub progress: Progress,
+    pub progress: RunProgress,
     /// Files of the best networks, by name.
     pub best: Vec<(String, Vec<u8>)>,
     /// What the learner goes on with, by name.

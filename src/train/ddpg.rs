@@ -11,7 +11,7 @@ use super::backup::Margins;
 use super::device::{floats, number};
 use super::disturbed::{Disturbed, pushed};
 use super::environments::Environments;
-use super::network::{Network, Shape};
+use super::network::{Architecture, Network};
 use super::purpose;
 use super::replay::Replay;
 use super::run::Learner;
@@ -58,7 +58,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
         let Game { entries, states, hidden } = game;
         let random = |number: u32, inputs: Vec<[f32; 2]>, outputs, output, last| {
             let (hidden, activation) = (hidden.clone(), Activation::Relu);
-            let shape = Shape { inputs, hidden, outputs, activation, output };
+            let shape = Architecture { inputs, hidden, outputs, activation, output };
             let stream = Stream::new(task.seed, purpose::WEIGHT, number);
             Agent::new(Network::random(shape, stream, last))
         };

@@ -10,7 +10,7 @@ use crate::rollout::Stream;
 
 /// What a network looks like.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shape {
+pub struct Architecture {
     /// Interval of each input, which the first layer sees as -1 to 1.
     pub inputs: Vec<[f32; 2]>,
     /// Neurons of each hidden layer.
@@ -23,7 +23,7 @@ pub struct Shape {
     pub output: OutputActivation,
 }
 
-impl Shape {
+impl Architecture {
     /// Inputs and outputs of each layer.
     fn layers(&self) -> Vec<[usize; 2]> {
         let first = std::iter::once(self.inputs.len());
@@ -50,7 +50,7 @@ impl Shape {
 /// The parameters are plain numbers, so that optimisers, averages and files need no tensors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
-    shape: Shape,
+    shape: Architecture,
     /// All parameters.
     pub parameters: Vec<f32>,
 }
@@ -58,7 +58,7 @@ pub struct Network {
 impl Network {
     /// A random network: uniform within one over the root of a layer's inputs, in the last layer
     /// `last` times that and without biases, so that its outputs do not saturate at first.
-    pub fn random(shape: Shape, stream: Stream, last: f32) -> Self {
+    pub fn random(shape: Architecture, stream: Stream, last: f32) -> Self {
         let layers = shape.layers();
         let mut bounds = Vec::new();
         for (i, &[inputs, outputs]) in layers.iter().enumerate() {

@@ -9,7 +9,7 @@ use super::analytic::{LAST, Task};
 use super::device::{floats, number};
 use super::environments::Environments;
 use super::gae::{Step, advantages};
-use super::network::{Network, Shape};
+use super::network::{Architecture, Network};
 use super::purpose;
 use super::reward::Reward;
 use super::run::Learner;
@@ -71,7 +71,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         let Lesson { reward, states, hidden } = lesson;
         let random = |number: u32, outputs, output, last| {
             let (inputs, hidden, activation) = (states.clone(), hidden.clone(), Activation::Relu);
-            let shape = Shape { inputs, hidden, outputs, activation, output };
+            let shape = Architecture { inputs, hidden, outputs, activation, output };
             Network::random(shape, Stream::new(task.seed, purpose::WEIGHT, number), last)
         };
         let policy = random(0, NU, OutputActivation::Tanh, LAST);

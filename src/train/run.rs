@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::checkpoint::{Checkpoint, Progress};
+use super::checkpoint::{Checkpoint, RunProgress};
 use super::record::{CurvePoint, NetworkRecord, Origin, TRAIN_SCHEMA, TrainRecord};
 use crate::error::{Error, Result};
 use crate::files::{Claim, MANIFEST, json, make_way};
@@ -160,7 +160,7 @@ impl Run<'_> {
         loss: Option<f64>,
     ) -> Result<()> {
         let scores = learner.scores()?;
-        let Progress { iteration, curve, best, stopped_early, .. } = &mut standing.progress;
+        let RunProgress { iteration, curve, best, stopped_early, .. } = &mut standing.progress;
         let record = curve.iter().map(|point| point.scores[0]).fold(f64::NEG_INFINITY, f64::max);
         if scores[0] > record || standing.best.is_empty() {
             *best = *iteration;

@@ -23,7 +23,7 @@ pub fn step_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S
 pub fn measure_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(
     system: &S,
     spec: &RolloutSpec,
-    losses: Option<&Tightening>,
+    tightening: Option<&Tightening>,
 ) -> Tape {
     let steps = spec.horizon as usize + 1;
     Tape::soft(&record(NX * steps, |inputs| {
@@ -36,10 +36,13 @@ pub fn measure_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(
             .collect();
         let gamma = Real::lit(spec.gamma);
         let mut measures = vec![reach_avoid(margins.iter().copied(), gamma)];
-        measures.extend(losses.map(|losses| {
+        measures.extend(tightening.map(|tightening| {
             let tightened = margins.iter().enumerate().map(|(t, &(target, constraint))| {
-                let lost = |losses: &[f32]| Expr::lit(losses[t]);
-                (target - lost(&losses.target), constraint - lost(&losses.constraint))
+                let tightened = |margin, by: &[f32]| margin - Expr::lit(by[t]);
+                (
+                    tightened(target, &tightening.target),
+                    tightened(constraint, &tightening.constraint),
+                )
             });
             reach_avoid(tightened, gamma)
         }));

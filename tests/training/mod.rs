@@ -10,7 +10,7 @@ use reachcast::rollout::{RolloutSpec, Stream, Tightening};
 use reachcast::system::System;
 use reachcast::train::analytic::Task;
 use reachcast::train::device::Device;
-use reachcast::train::network::{Network, Shape};
+use reachcast::train::network::{Architecture, Network};
 use reachcast::train::purpose;
 use reachcast::train::settings::TrainSettings;
 
@@ -42,7 +42,7 @@ pub(crate) fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
 ) -> Network {
     let (inputs, hidden) = (intervals(system), hidden.to_vec());
     let (activation, output) = (Activation::Relu, OutputActivation::Tanh);
-    let shape = Shape { inputs, hidden, outputs: NU, activation, output };
+    let shape = Architecture { inputs, hidden, outputs: NU, activation, output };
     Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), last)
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn task<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
         backend,
         device: device.clone(),
         spec: config.spec().unwrap(),
-        losses: None,
+        tightening: None,
         mixture: config.mixture(&system.states()).unwrap(),
         held_out: settings(config).held_out,
         seed: config.seed,

@@ -21,7 +21,7 @@ use crate::scenario::{Context, provenance, tightened};
 use crate::system::System;
 use crate::train::analytic::{Analytic, LAST, Task};
 use crate::train::device::Device;
-use crate::train::network::{Network, Shape};
+use crate::train::network::{Architecture, Network};
 use crate::train::purpose;
 use crate::train::record::{Origin, TrainRecord};
 use crate::train::run::{Learner, Run, Trained};
@@ -94,7 +94,7 @@ impl Training<'_> {
         last: f32,
     ) -> Network {
         let hidden = self.settings.hidden.clone();
-        let shape = Shape { inputs, hidden, outputs, activation: Activation::Relu, output };
+        let shape = Architecture { inputs, hidden, outputs, activation: Activation::Relu, output };
         Network::random(shape, Stream::new(self.config.seed, purpose::WEIGHT, 0), last)
     }
 
@@ -139,8 +139,8 @@ impl SystemWork for Training<'_> {
         let policy = &network.export(axes.each_ref().map(|axis| axis.name.clone()).to_vec())?;
         let program = backend.prepare(&model::Plant::recorded(system, policy))?;
         let context = Context { program: &program, watch };
-        let losses = match settings.analytic.certified > 0.0 {
-            true => Some(tightened(context, &checked)?.losses),
+        let tightening = match settings.analytic.certified > 0.0 {
+            true => Some(tightened(context, &checked)?.tightening),
             false => None,
         };
         let task = Task {
@@ -148,7 +148,7 @@ impl SystemWork for Training<'_> {
             backend,
             device: self.device.clone(),
             spec: checked.spec,
-            losses,
+            tightening,
             mixture: config.mixture(&axes)?,
             held_out: settings.held_out,
             seed: config.seed,

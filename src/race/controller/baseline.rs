@@ -5,7 +5,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::interface::{Active, Controller, Decision, FilterLog, World};
-use super::plan::{Networks, Paths, Plan, fan, first, problem, stream};
+use super::plan::{Networks, Paths, RacePlanner, fan, first, problem, stream};
 use crate::control::mppi::{PolicyPlan, shifted};
 use crate::error::Result;
 use crate::policy::{Mlp, Policy};
@@ -61,7 +61,7 @@ fn filtered(filter: &BarrierFilter, system: &DroneRace, race: &Active, decision:
 /// MPPI, with or without the filter, with or without a warm start.
 pub(in crate::race) struct MppiController<'a> {
     world: World<'a>,
-    plan: Plan<'a>,
+    plan: RacePlanner<'a>,
     filter: Option<BarrierFilter>,
     warm: bool,
     paths: Paths,
@@ -77,7 +77,7 @@ impl<'a> MppiController<'a> {
         races: usize,
         paths: Paths,
     ) -> Result<Self> {
-        let plan = Plan::new(section, settings, &world, Networks::default())?;
+        let plan = RacePlanner::new(section, settings, &world, Networks::default())?;
         Ok(Self { world, plan, filter: None, warm: false, paths, plans: vec![None; races] })
     }
 

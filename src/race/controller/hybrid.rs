@@ -6,9 +6,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::interface::{Active, Controller, Decision, World};
-use super::plan::{Networks, Paths, Plan, fan, first, problem, stream};
+use super::plan::{Networks, Paths, RacePlanner, fan, first, problem, stream};
 use crate::control::mppi::{PolicyPlan, shifted};
-use crate::control::tier::{Asked, Case, Certifier, Standing, Tier};
+use crate::control::tier::{Asked, Case, Certifier, Standing};
 use crate::error::Result;
 use crate::model::Plant;
 use crate::policy::{Mlp, Policy};
@@ -18,6 +18,7 @@ use crate::race::system::DroneRace;
 use crate::rollout::{Disturbance, MppiProblem, MppiResult, ValueTerm};
 use crate::scenario::global::slice_through;
 use crate::scenario::ledger::Ledger;
+use crate::scenario::tier::Tier;
 use crate::system::System;
 
 /// Velocity across above which the study brakes on entering the target, m/s.
@@ -33,8 +34,8 @@ const DISTURBED: [(usize, f32); 3] = [(7, 0.01), (9, 0.01), (11, 0.01)];
 pub(in crate::race) struct Hybrid<'a> {
     world: World<'a>,
     certifier: Certifier<'a>,
-    fast: Plan<'a>,
-    recovery: Plan<'a>,
+    fast: RacePlanner<'a>,
+    recovery: RacePlanner<'a>,
     /// What plans of the policy are rolled out with.
     planned: Plant,
     paths: Paths,
@@ -58,9 +59,9 @@ impl<'a> Hybrid<'a> {
         let HybridSettings { global, local, domain, .. } = *asked;
         let certificates = Asked { global, local, domain };
         let certifier = Certifier::new(world.program, world.certificates, certificates)?;
-        let fast = Plan::new("race.hybrid.fast", &asked.fast, &world, Networks::default())?;
+        let fast = RacePlanner::new("race.hybrid.fast", &asked.fast, &world, Networks::default())?;
         let networks = networks(&world);
-        let recovery = Plan::new("race.hybrid.recovery", &asked.recovery, &world, networks)?;
+        let recovery = RacePlanner::new("race.hybrid.recovery", &asked.recovery, &world, networks)?;
         let ego_gain = if asked.plan_gain > 0.0 { asked.plan_gain } else { world.system.ego_gain };
         let planned = Plant::of(DroneRace { ego_gain, ..*world.system }, world.policy.clone());
         let memory = Memory { reached: false, plan: None, ledger: Ledger::new(world.race.beta)? };

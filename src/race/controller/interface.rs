@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use crate::backend::{Backend, Program};
-use crate::control::tier::{LocalGrowth, Tier};
+use crate::control::tier::LocalGrowth;
 use crate::error::Result;
 use crate::policy::Mlp;
 use crate::race::barrier::FilterStatus;
 use crate::race::settings::RaceSettings;
 use crate::race::system::DroneRace;
 use crate::scenario::settings::Settings;
+use crate::scenario::tier::Tier;
 
 /// The controllers of the study, and the hybrid with a part left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

@@ -4,19 +4,19 @@ use std::time::Instant;
 
 use super::hybrid::{near_gate, shared};
 use super::interface::{Active, Controller, Decision, World};
-use super::plan::{Networks, Paths, Plan, fan, first, problem, stream};
+use super::plan::{Networks, Paths, RacePlanner, fan, first, problem, stream};
 use crate::control::mppi::shifted;
-use crate::control::tier::Tier;
 use crate::error::Result;
 use crate::race::cost::RaceReference;
 use crate::rollout::MppiProblem;
+use crate::scenario::tier::Tier;
 use crate::system::System;
 
 /// The hybrid without policy and certificates: two plans, in the target and outside.
 pub(in crate::race) struct NoPolicy<'a> {
     world: World<'a>,
-    fast: Plan<'a>,
-    outside: Plan<'a>,
+    fast: RacePlanner<'a>,
+    outside: RacePlanner<'a>,
     paths: Paths,
     /// Whether the target was reached once, and the last plan.
     races: Vec<(bool, Option<Vec<f32>>)>,
@@ -26,7 +26,7 @@ impl<'a> NoPolicy<'a> {
     /// The controller of `races` races.
     pub(in crate::race) fn new(world: World<'a>, races: usize, paths: Paths) -> Result<Self> {
         let asked = &world.race.no_policy;
-        let plan = |key: &str, asked| Plan::new(key, asked, &world, Networks::default());
+        let plan = |key: &str, asked| RacePlanner::new(key, asked, &world, Networks::default());
         Ok(Self {
             world,
             fast: plan("race.no_policy.fast", &asked.fast)?,

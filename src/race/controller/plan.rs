@@ -10,7 +10,7 @@ use crate::race::settings::PlanSettings;
 use crate::rollout::{Disturbance, MppiProblem, Planning, Purpose, Stream, ValueTerm};
 
 /// A planner and the speed that it keeps.
-pub(in crate::race) struct Plan<'a> {
+pub(in crate::race) struct RacePlanner<'a> {
     /// The planner.
     pub(in crate::race) planner: Planner<'a>,
     /// Speed toward the gate, m/s.
@@ -26,7 +26,7 @@ pub(in crate::race) struct Networks {
     pub(in crate::race) disturbance: Option<Disturbance>,
 }
 
-impl<'a> Plan<'a> {
+impl<'a> RacePlanner<'a> {
     /// The planner that the `settings` of `section` ask for, prepared.
     pub(in crate::race) fn new(
         section: &str,
@@ -80,7 +80,7 @@ const DRAWN: u32 = 24;
 
 /// The first samples of `problem` around its improved plan: x and y of the ego.
 pub(in crate::race) fn fan(
-    plan: &Plan<'_>,
+    plan: &RacePlanner<'_>,
     problem: &MppiProblem,
     paths: Paths,
 ) -> Vec<Vec<[f32; 2]>> {

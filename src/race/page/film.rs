@@ -4,7 +4,7 @@ use super::moment::{self, Scene};
 use super::verdicts;
 use crate::race::record::{FrameRecord, PictureRecord, RaceRecord};
 use crate::report::figure::{Figure, Swatch, cross, diamond};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::sheet::WIDTH;
 use crate::report::span::Span;
 use crate::report::text::{counted, escape, listed, ordinary};
@@ -97,7 +97,7 @@ fn drawing(record: &RaceRecord, picture: &PictureRecord) -> String {
 
 fn plot(picture: &PictureRecord) -> String {
     let [x, y] = spans(picture);
-    let mut plot = Plot::across_width("race", x, y, Shape::Equal, WIDTH);
+    let mut plot = Plot::across_width("race", x, y, Proportions::Equal, WIDTH);
     fences(&mut plot, x, y);
     let scene = Scene::new(picture);
     for index in 0..picture.frames.len() {

@@ -3,7 +3,7 @@
 use super::words;
 use crate::race::record::{RaceRecord, TierRecord};
 use crate::report::figure::{Figure, Swatch};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::sheet::{WIDTH, panels};
 use crate::report::span::Span;
 
@@ -58,7 +58,7 @@ fn panel(tiers: &TierRecord, index: usize, name: &str) -> Option<String> {
     let steps = Span { low: 0.0, high: tiers.occupancy.len() as f64 };
     let share = Span { low: 0.0, high: 100.0 };
     let id = format!("tiers-{index}");
-    let mut plot = Plot::across_width(&id, steps, share, Shape::Free(190.0), WIDTH);
+    let mut plot = Plot::across_width(&id, steps, share, Proportions::Free(190.0), WIDTH);
     for (number, (band, weave, label)) in BANDS.iter().enumerate() {
         let edges: Vec<[f64; 2]> =
             tiers.occupancy.iter().map(|counts| edges(counts, number)).collect();

@@ -2,7 +2,7 @@
 
 use super::plane::{entry, margins, no_slice, point, same_unit, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, diamond, dot};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
 use crate::report::text::{number, ordinary};
@@ -186,7 +186,8 @@ fn drawing(grid: &Grid, ball: Option<&Ball>) -> String {
     let record = grid.record;
     let states = slice_states(record);
     let [x, y] = spans(grid, ball);
-    let shape = if same_unit(record, states) { Shape::Equal } else { Shape::Free(330.0) };
+    let shape =
+        if same_unit(record, states) { Proportions::Equal } else { Proportions::Free(330.0) };
     let mut plot = Plot::new("certified", x, y, shape);
     let [across, up] = grid.spans();
     let slice = plot.rectangle([across.low, up.low, across.high, up.high]);

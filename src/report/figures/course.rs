@@ -1,7 +1,7 @@
 //! Rollouts of a system with one state: the state from step to step.
 
 use crate::report::figure::{cross, dot};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
 use crate::report::words;
 use crate::scenario::record::{Record, RolloutRecord};
@@ -17,7 +17,7 @@ pub(super) fn only_state(record: &Record) -> Option<usize> {
 /// The drawing; `description` is read out in its place.
 pub(super) fn drawing(record: &Record, y: Span, state: usize, description: &str) -> String {
     let x = Span { low: 0.0, high: f64::from(record.horizon.max(1)) };
-    let mut plot = Plot::new("paths", x, y, Shape::Free(330.0));
+    let mut plot = Plot::new("paths", x, y, Proportions::Free(330.0));
     for rollout in &record.picture.rollouts {
         let class = if rollout.success { "body first" } else { "body first failed" };
         let line = plot.line(points(rollout, state));

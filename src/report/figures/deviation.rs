@@ -1,7 +1,7 @@
 //! The deviation bound against the step.
 
 use crate::report::figure::{Figure, Swatch};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
 use crate::report::text::{lower, number, ordinary, upper};
 use crate::report::words;
@@ -64,7 +64,7 @@ fn drawing(record: &Record) -> Result<String, String> {
         high: all.iter().map(|series| series.len()).max().unwrap_or(1).max(2) as f64 - 1.0,
     };
     let room = Span { low: 0.0, high: if highest.high > 0.0 { 1.06 * highest.high } else { 1.0 } };
-    let mut plot = Plot::new("deviation", steps, room, Shape::Free(250.0));
+    let mut plot = Plot::new("deviation", steps, room, Proportions::Free(250.0));
     let classes = ["bound", "seen-line", "exact"];
     for (class, series) in classes.into_iter().zip(all) {
         let points = (0..).zip(series).map(|(step, &distance)| [f64::from(step), distance]);

@@ -1,7 +1,7 @@
 //! The rounds of local growth: radius tried and failures.
 
 use crate::report::figure::{Figure, Swatch, cross, dot};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
 use crate::report::text::{count, number, ordinary};
 use crate::report::words;
@@ -48,7 +48,7 @@ fn drawing(record: &Record) -> String {
     let highest = Span::of(radii.flatten().chain([0.0])).map_or(0.0, |span| span.high);
     let x = Span { low: 0.5, high: rounds.len() as f64 + 0.5 };
     let y = Span { low: 0.0, high: if highest > 0.0 { 1.18 * highest } else { 1.0 } };
-    let mut plot = Plot::new("growth", x, y, Shape::Free(190.0));
+    let mut plot = Plot::new("growth", x, y, Proportions::Free(190.0));
     for (index, round) in rounds.iter().enumerate() {
         let at = index as f64 + 1.0;
         let stem = plot.line([[at, 0.0], [at, round.radius]]);

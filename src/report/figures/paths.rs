@@ -3,7 +3,7 @@
 use super::course::{self, only_state};
 use super::plane::{entry, margins, point, same_unit, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, dot};
-use crate::report::plot::{Labels, Plot, Shape};
+use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
 use crate::report::text::shorten;
@@ -154,7 +154,7 @@ fn drawing(record: &Record, bodies: &[Body], grid: Option<&Grid>) -> Result<Stri
         (x, y) = (x.join(across), y.join(up));
     }
     let equal = bodies.iter().all(|body| same_unit(record, [body.x, body.y]));
-    let shape = if equal { Shape::Equal } else { Shape::Free(330.0) };
+    let shape = if equal { Proportions::Equal } else { Proportions::Free(330.0) };
     let mut plot = Plot::new("paths", x, y, shape);
     if let Some(grid) = grid {
         target_area(&mut plot, grid);

@@ -3,7 +3,7 @@
 use super::plane::{lines, no_slice, point, same_unit, slice_states};
 use crate::report::figure::{Figure, Swatch, diamond};
 use crate::report::palette::{self, LEVELS};
-use crate::report::plot::{Labels, Plot, Shape, coordinate};
+use crate::report::plot::{Labels, Plot, Proportions, coordinate};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
 use crate::report::text::{number, ordinary};
@@ -64,7 +64,8 @@ fn drawing(grid: &Grid) -> String {
         x = x.join(Span::of([across]).unwrap_or(x));
         y = y.join(Span::of([up]).unwrap_or(y));
     }
-    let shape = if same_unit(record, states) { Shape::Equal } else { Shape::Free(330.0) };
+    let shape =
+        if same_unit(record, states) { Proportions::Equal } else { Proportions::Free(330.0) };
     let mut plot = Plot::new("value", x, y, shape);
     let limit = limit(&record.slice.check_margin);
     for (class, data) in cells(&plot, grid, limit) {

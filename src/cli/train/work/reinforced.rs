@@ -60,7 +60,7 @@ impl Training<'_> {
             backend: self.backend,
             device: self.device.clone(),
             spec: self.config.settings(&axes)?.spec,
-            losses: None,
+            tightening: None,
             mixture: self.config.mixture(&axes)?,
             held_out: self.settings.held_out,
             seed: self.config.seed,
