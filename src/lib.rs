@@ -139,6 +139,38 @@
 //! # Ok::<(), reachcast::Error>(())
 //! ```
 //!
+//! # A plan
+//!
+//! MPPI improves a plan by sampled rollouts; [`control::mppi::Planner`] does so step after step. What is
+//! planned for is data, too: the model, the cost of a stage, and how samples are drawn.
+//!
+//! ```
+//! use reachcast::backend::Backend;
+//! use reachcast::cost::Quadratic;
+//! use reachcast::rollout::{
+//!     CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Planning, Purpose, Stream,
+//! };
+//! use reachcast::system::{DoubleIntegrator, System};
+//!
+//! let system = DoubleIntegrator::default();
+//! let cost = Quadratic { state: [1.0, 0.1], control: [0.01], last: [9.0, 1.0], obstacle: None };
+//! // 256 samples of 20 steps.
+//! let spec = MppiSpec::new(MppiSettings::new(&system.controls(), 256, 20))?;
+//! let planning = Planning::of::<_, _, 2, 1, 3>(&system, cost, spec);
+//!
+//! let backend = Backend::cpu()?;
+//! let program = backend.prepare_plans(&planning)?;
+//! // From rest at 0.5 m, a plan of zeros; the cost wants to know where to be, and which stage is last.
+//! let stage = |t| [0.0, 0.0, f32::from(u8::from(t == 19))];
+//! let context: Vec<_> = (0..20).map(stage).collect();
+//! let stream = Stream::new(1, Purpose::CONTROL_NOISE, 0);
+//! let problems = [MppiProblem::new([0.5, 0.0], &[[0.0]; 20], &context, stream)];
+//! let task = MppiTask { problems: &problems, iteration: 0, costs: CostQuery::Summary };
+//! let plan = &program.improve(&task)?[0].plan;
+//! assert!(plan[0] < 0.0, "to the left, where the middle is");
+//! # Ok::<(), reachcast::Error>(())
+//! ```
+//!
 //! # Features
 //!
 //! * `gpu`: adapters, through wgpu. Without it, [`backend::Backend`] has the CPU alone.

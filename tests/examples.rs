@@ -11,6 +11,9 @@ mod given_at_run_time;
 #[path = "../examples/measures.rs"]
 #[allow(dead_code, missing_docs, reason = "the example's own main is not called")]
 mod measures;
+#[path = "../examples/plan.rs"]
+#[allow(dead_code, missing_docs, reason = "the example's own main is not called")]
+mod plan;
 
 use reachcast::scenario::record::GrowthOutcome;
 
@@ -57,5 +60,14 @@ fn a_text_is_rolled_out_under_each_value_of_its_parameter() {
         let found = given_at_run_time::measures(&backend, &currents).expect("measures");
         assert!(found[0] > 0.1 && found[1] > 0.0, "{found:?}");
         assert!(found[0] > found[1] && found[2] < 0.0, "{found:?}");
+    }
+}
+
+#[test]
+fn a_plan_comes_to_rest_where_it_is_to() {
+    for backend in common::backends() {
+        let [position, velocity] = plan::steer(&backend, 0.5, 60).expect("plans");
+        let far = (position - 0.5).hypot(velocity);
+        assert!(far < 0.05, "{}: {position} m at {velocity} m/s", backend.name());
     }
 }

@@ -51,15 +51,21 @@ impl fmt::Debug for StageCost {
 }
 
 impl StageCost {
+    /// A cost as data, without anything compiled.
+    pub fn new(stage: Graph, contexts: usize, map: Option<MapCost>) -> Self {
+        Self { stage, contexts, map, native: None }
+    }
+
     /// The cost of a stage of `system`: recorded, and compiled together with its dynamics.
     ///
     /// ```
     /// use reachcast::cost::Quadratic;
     /// use reachcast::model::StageCost;
     /// use reachcast::system::DoubleIntegrator;
-    /// let weights = Quadratic { state: [1.0, 0.1], control: [0.01], obstacle: None };
-    /// let cost = StageCost::of(DoubleIntegrator::default(), weights);
-    /// assert_eq!(cost.contexts, 3, "a reference for both states and the control");
+    /// let weights =
+    ///     Quadratic { state: [1.0, 0.1], control: [0.01], last: [5.0, 1.0], obstacle: None };
+    /// let cost = StageCost::of::<_, _, 2, 1, 3>(DoubleIntegrator::default(), weights);
+    /// assert_eq!(cost.contexts, 3, "a reference for both states, and which stage is the last");
     /// ```
     pub fn of<S, C, const NX: usize, const NU: usize, const NC: usize>(system: S, cost: C) -> Self
     where

@@ -1,16 +1,19 @@
 //! What a call of a prepared plant costs the host: nothing that was done before, and as few writes,
 //! submissions, waits and reads as there can be.
 
+use std::sync::Arc;
+
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Gpu, Injection, NetworkKernels, Traffic};
 use reachcast::backend::{Backend, Program};
 use reachcast::model::Plant;
 use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
+use reachcast::race::bench::data;
 use reachcast::rollout::Plant as TypedPlant;
 use reachcast::rollout::{
-    DeviationTask, PairControl, Pairs, Query, ReachAvoidTask, Region, RolloutSpec, Starts, States,
-    Stream,
+    CostQuery, DeviationTask, MppiProblem, MppiTask, PairControl, Pairs, Planning, Query,
+    ReachAvoidTask, Region, RolloutSpec, Starts, States, Stream, ValueTerm,
 };
 use reachcast::scenario::purpose;
 use reachcast::system::{BangBang, DoubleIntegrator};
@@ -296,6 +299,36 @@ fn a_prepared_plant_survives_failures() {
             let Some(gpu) = gpu() else { return };
             let asked = vec![Injection { fault, submission, repeats: false }];
             assert_eq!(plain(gpu.with_failures(asked)), expected, "{fault} at {submission}");
+        }
+    }
+}
+
+/// Plans of the race with a value network, in one chunk.
+fn plans() -> (Planning, MppiProblem) {
+    let (spec, problem) = (data::mppi_spec(500).expect("settings"), data::mppi_problem(1, 0));
+    let network = Arc::new(random_network(&[12, 20, 1], Activation::Tanh));
+    let value = Some(ValueTerm { network, weight: 4.0, threshold: 0.3 });
+    (Planning { value, ..Planning::of(&DroneRace::default(), data::lane(), spec) }, problem)
+}
+
+#[test]
+fn a_plan_is_one_write_one_submission_one_wait_and_one_read() {
+    let (networked, problem) = plans();
+    for planning in [Planning { value: None, ..networked.clone() }, networked] {
+        let Some(gpu) = gpu() else { return };
+        let backend = Backend::Gpu(gpu);
+        let program = backend.prepare_plans(&planning).expect("it fits");
+        for costs in [CostQuery::Summary, CostQuery::Each] {
+            let problems = [problem.clone(), problem.clone(), problem.clone()];
+            let task = |iteration| MppiTask { problems: &problems, iteration, costs };
+            let plan = || program.improve(&task(1)).map(drop);
+            assert_eq!(second(&backend, plan), ONE, "{costs:?}");
+            // Another iteration, other problems, fewer of them in the same room.
+            let before = traffic(&backend);
+            let fewer = MppiTask { problems: &problems[1..], ..task(2) };
+            program.improve(&fewer).expect("it runs");
+            let after = traffic(&backend).since(before);
+            assert_eq!((after.texts, after.pipelines, after.packs), (0, 0, 0));
         }
     }
 }
