@@ -12,15 +12,17 @@ use std::sync::Arc;
 use common::{adapter, backends, cpu};
 use reachcast::backend::{Backend, PlanProgram};
 use reachcast::control::DriveBenchmark;
-use reachcast::formula::record;
+use reachcast::formula::{Expr, record};
 use reachcast::model::{StageCost, text};
-use reachcast::race::{DroneRace, Fence, RaceCost, RaceReference, RecoveryCost, Safety, SafetyCone};
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::race::{
+    DroneRace, Fence, RaceCost, RaceReference, RecoveryCost, Safety, SafetyCone,
+};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, NoiseKind,
     PlanTally, Planning, Purpose, Sigma, Stream, ValueTerm,
 };
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::system::System;
 
 const HORIZON: usize = 12;
@@ -82,7 +84,9 @@ fn samples_cut_into_parts_give_the_bits_of_the_whole() {
         let (program, problems) = (backend.prepare_plans(&planning).unwrap(), problems());
         let whole = program.improve(&task(&problems)).unwrap();
         // Blocks of the CPU are of 256 samples, those of an adapter of 64.
-        for cut in [vec![0..256, 256..700], vec![0..512, 512..700], vec![0..256, 256..512, 512..700]] {
+        for cut in
+            [vec![0..256, 256..700], vec![0..512, 512..700], vec![0..256, 256..512, 512..700]]
+        {
             assert_eq!(in_parts(&program, &problems, &cut), whole, "{} {cut:?}", backend.name());
         }
         // Cut elsewhere, sums are rounded elsewhere, and costs stay what they are.
@@ -157,10 +161,8 @@ fn interpreted_plans_have_the_bits_of_compiled_ones() {
 #[test]
 fn an_interpreted_map_has_the_bits_of_a_compiled_one() {
     let DriveBenchmark { planning, problem, .. } = DriveBenchmark::new(600).unwrap();
-    let as_text = Planning {
-        cost: Arc::new(planning.cost.as_ref().clone().as_text()),
-        ..planning.clone()
-    };
+    let as_text =
+        Planning { cost: Arc::new(planning.cost.as_ref().clone().as_text()), ..planning.clone() };
     let problems = [problem];
     assert_eq!(improve(&cpu(2), &as_text, &problems), improve(&cpu(2), &planning, &problems));
 }
@@ -196,7 +198,7 @@ fn cart_cost(inputs: usize) -> StageCost {
     let time = inputs - 2;
     let stage = record(inputs + 1, |x| {
         let off = x[0] - x[inputs];
-        vec![off * off + Real::lit(0.1) * x[2] * x[2] + x[time]]
+        vec![off * off + Expr::lit(0.1) * x[2] * x[2] + x[time]]
     });
     StageCost::new(stage, 1, None)
 }
@@ -244,7 +246,11 @@ fn plans_of_a_text_see_its_time_and_parameters() {
             for (k, cost) in (0..).zip(&result.costs) {
                 let wanted = truth(&planning.controls(problem, 1, k), problem.first_step);
                 let band = 2e-5 * wanted.abs().max(1.0);
-                assert!((f64::from(*cost) - wanted).abs() < band, "{} {cost} {wanted}", backend.name());
+                assert!(
+                    (f64::from(*cost) - wanted).abs() < band,
+                    "{} {cost} {wanted}",
+                    backend.name()
+                );
             }
         }
     }
@@ -259,7 +265,8 @@ fn networks_inside_formulas_are_planned_through_on_the_cpu() {
     let drag = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity).unwrap();
     std::fs::write(folder.path().join("drag.safetensors"), drag.to_bytes()).unwrap();
     let written = CART.replace("wind * sin(3 * t) + 0.01 * step", "-0.5 * speed");
-    let called = CART.replace("wind * sin(3 * t) + 0.01 * step", "net('drag.safetensors', speed)[0]");
+    let called =
+        CART.replace("wind * sin(3 * t) + 0.01 * step", "net('drag.safetensors', speed)[0]");
     let read = |text: &str| text::read(text, "cart.toml", folder.path()).unwrap().plant().unwrap();
     let [written, called] = [written, called].map(|text| {
         let model = read(&text).model;
