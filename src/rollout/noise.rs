@@ -15,12 +15,20 @@ pub const SPLINE_SUPPORT: usize = 4;
 /// `n % NU` of the draw `n / NU`, a step or a knot, of NU controls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    /// Row by row.
-    factor: Vec<f32>,
+    factor: Factor,
     controls: usize,
     horizon: usize,
     antithetic: bool,
     shape: NoiseShape,
+}
+
+/// The lower triangular factor of the covariance.
+#[derive(Clone, Debug, PartialEq)]
+enum Factor {
+    /// Its diagonal, where there is nothing else.
+    Diagonal(Vec<f32>),
+    /// All of it, row by row.
+    Lower(Vec<f32>),
 }
 
 /// How draws become steps.
@@ -74,12 +82,17 @@ impl Noise {
             NoiseKind::Spline { knots } => spline(knots, settings.horizon)?,
         };
         let horizon = settings.horizon as usize;
+        let factor = Factor::new(factor, controls);
         Ok(Self { factor, controls, horizon, antithetic: settings.antithetic, shape })
     }
 
-    /// Row `i` of the lower triangular factor of the covariance.
-    pub fn factor(&self, i: usize) -> &[f32] {
-        &self.factor[i * self.controls..][..self.controls]
+    /// Entry `j` of row `i` of the lower triangular factor of the covariance.
+    pub fn factor(&self, i: usize, j: usize) -> f32 {
+        match &self.factor {
+            Factor::Diagonal(own) if i == j => own[i],
+            Factor::Diagonal(_) => 0.0,
+            Factor::Lower(all) => all[i * self.controls + j],
+        }
     }
 
     /// Number of controls.
@@ -192,9 +205,21 @@ impl Noise {
     /// `L z`.
     #[inline(always)]
     fn scale<V: Vector, const N: usize>(&self, z: &[Lanes<N>], e: &mut [[f32; N]]) {
-        for (i, e) in e.iter_mut().enumerate() {
-            for at in (0..N).step_by(V::WIDTH) {
-                self.scaled(i, |j| V::load(&z[j].0[at..])).store(&mut e[at..]);
+        match &self.factor {
+            Factor::Diagonal(own) => {
+                for ((e, z), own) in e.iter_mut().zip(z).zip(own) {
+                    for at in (0..N).step_by(V::WIDTH) {
+                        (V::lit(*own) * V::load(&z.0[at..])).store(&mut e[at..]);
+                    }
+                }
+            }
+            Factor::Lower(all) => {
+                for (i, e) in e.iter_mut().enumerate() {
+                    let row = &all[i * self.controls..][..=i];
+                    for at in (0..N).step_by(V::WIDTH) {
+                        scaled(row, |j| V::load(&z[j].0[at..])).store(&mut e[at..]);
+                    }
+                }
             }
         }
     }
@@ -204,22 +229,14 @@ impl Noise {
     fn scale_in_place<V: Vector, const N: usize>(&self, e: &mut [[f32; N]]) {
         for i in (0..e.len()).rev() {
             for at in (0..N).step_by(V::WIDTH) {
-                self.scaled(i, |j| V::load(&e[j][at..])).store(&mut e[i][at..]);
+                let z = |j: usize| V::load(&e[j][at..]);
+                let scaled = match &self.factor {
+                    Factor::Diagonal(own) => V::lit(own[i]) * z(i),
+                    Factor::Lower(all) => scaled(&all[i * self.controls..][..=i], z),
+                };
+                scaled.store(&mut e[i][at..]);
             }
         }
-    }
-
-    /// Entry `i` of `L z`.
-    #[inline(always)]
-    fn scaled<V: Vector>(&self, i: usize, z: impl Fn(usize) -> V) -> V {
-        let row = self.factor(i);
-        let mut sum = V::lit(row[i]) * z(i);
-        for (j, factor) in row[..i].iter().enumerate() {
-            if *factor != 0.0 {
-                sum = sum + V::lit(*factor) * z(j);
-            }
-        }
-        sum
     }
 
     /// The noise of one sample, `[H, controls]`.
@@ -229,6 +246,30 @@ impl Noise {
         self.fill::<Lanes<1>, 1>((stream, iteration), sample, &mut normals, &mut noise);
         noise.into_flattened()
     }
+}
+
+impl Factor {
+    /// The matrix whose rows `all` has one after the other.
+    fn new(all: Vec<f32>, controls: usize) -> Self {
+        let beside = |(place, entry): (usize, &f32)| place % (controls + 1) != 0 && *entry != 0.0;
+        match all.iter().enumerate().any(beside) {
+            true => Self::Lower(all),
+            false => Self::Diagonal(all.into_iter().step_by(controls + 1).collect()),
+        }
+    }
+}
+
+/// The last entry of `L z`, where `row` is the last row of L.
+#[inline(always)]
+fn scaled<V: Vector>(row: &[f32], z: impl Fn(usize) -> V) -> V {
+    let last = row.len() - 1;
+    let mut sum = V::lit(row[last]) * z(last);
+    for (j, factor) in row[..last].iter().enumerate() {
+        if *factor != 0.0 {
+            sum = sum + V::lit(*factor) * z(j);
+        }
+    }
+    sum
 }
 
 /// The next of correlated numbers, in the place of fresh ones.

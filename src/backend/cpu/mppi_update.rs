@@ -1,9 +1,11 @@
 //! The softmin of a unit of samples, lane by lane, so that a group costs a few operations.
 
+use std::marker::PhantomData;
+
 use super::kernel::Kernel;
 use super::tile::is_finite;
 use crate::real::simd::Body;
-use crate::real::{Lanes, Real, per_lane};
+use crate::real::{Lanes, Real, Vector, per_lane};
 use crate::rollout::{HUGE, Partial};
 
 /// Lanes that are summed on their own, whatever the instructions: samples that lie this far apart
@@ -60,7 +62,8 @@ impl<const N: usize> Softmin<N> {
         self.count += live as u32;
         let sums = &mut self.sets[self.turn];
         let temperature = self.temperature;
-        kernel.call(Add { sums, temperature, cost, controls, first, live });
+        let kind = PhantomData::<K>;
+        kernel.call(Add { kind, sums, temperature, cost, controls, first, live });
         self.turn = (self.turn + 1) % self.sets.len();
     }
 
@@ -118,7 +121,8 @@ fn tree(mut terms: [f32; SHARES]) -> f32 {
 }
 
 /// Adds a group to the sums of its lanes.
-struct Add<'a, const N: usize> {
+struct Add<'a, K, const N: usize> {
+    kind: PhantomData<K>,
     sums: &'a mut Sums<N>,
     temperature: f32,
     cost: &'a Lanes<N>,
@@ -127,7 +131,7 @@ struct Add<'a, const N: usize> {
     live: usize,
 }
 
-impl<const N: usize> Body for Add<'_, N> {
+impl<K: Kernel, const N: usize> Body for Add<'_, K, N> {
     type Output = ();
 
     #[inline(always)]
@@ -148,8 +152,12 @@ impl<const N: usize> Body for Add<'_, N> {
         let finite = Lanes(per_lane!(N, i => if counts[i] { cost.0[i] } else { 0.0 }));
         sums.cost = sums.cost + finite;
         sums.non_finite = per_lane!(N, i => sums.non_finite[i] + u32::from(i < live && !counts[i]));
-        for (sum, u) in sums.controls.iter_mut().zip(self.controls) {
-            *sum = *sum * keep + weight * Lanes(*u);
+        for at in (0..N).step_by(K::Vector::WIDTH) {
+            let load = |numbers: &[f32; N]| K::Vector::load(&numbers[at..]);
+            let (keep, weight) = (load(&keep.0), load(&weight.0));
+            for (sum, u) in sums.controls.iter_mut().zip(self.controls) {
+                (load(&sum.0) * keep + weight * load(u)).store(&mut sum.0[at..]);
+            }
         }
     }
 }

@@ -249,11 +249,11 @@ fn recorded_control(spec: &MppiSpec) -> String {
     let graph = record(2 * count, |inputs| {
         let (plan, z) = inputs.split_at(count);
         let control = |i: usize| {
-            let factor = spec.noise().factor(i);
-            let own = Expr::lit(factor[i]) * z[i];
+            let factor = |j: usize| spec.noise().factor(i, j);
+            let own = Expr::lit(factor(i)) * z[i];
             let noise = (0..i)
-                .filter(|&j| factor[j] != 0.0)
-                .fold(own, |sum, j| sum + Expr::lit(factor[j]) * z[j]);
+                .filter(|&j| factor(j) != 0.0)
+                .fold(own, |sum, j| sum + Expr::lit(factor(j)) * z[j]);
             let [low, high] = bounds[i].map(Expr::lit);
             (plan[i] + noise).clamp(low, high)
         };
