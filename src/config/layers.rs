@@ -7,14 +7,11 @@ use toml::{Table, Value};
 
 use super::counts;
 use super::section::{Config, Profile};
-use super::sources::Sources;
+use super::sources::{Layer, Sources};
 use super::{keys, model};
 use crate::error::{Error, Result};
 use crate::model::text::Origin;
 use crate::studies::{self, SYSTEMS};
-
-/// A document with the name that errors have for it.
-pub(super) type Layer = (String, Table);
 
 /// What a configuration is made of, but for the defaults.
 pub(super) struct Layers {

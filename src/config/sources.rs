@@ -2,9 +2,11 @@
 
 use toml::Table;
 
-use super::layers::Layer;
 use crate::error::Error;
 use crate::model::text::Origin;
+
+/// A document with the name that errors have for it.
+pub(super) type Layer = (String, Table);
 
 /// What errors about a described plant call the configuration where its text is not at hand.
 pub(super) const UNNAMED: &str = "configuration";

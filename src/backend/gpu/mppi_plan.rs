@@ -6,7 +6,8 @@ use super::compose::{
     PARTIAL_HEADER, WORKGROUP, input_quads, output_quads, parameter_quads, tile_steps,
 };
 use super::device::Adapter;
-use super::plan::{MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS, network_flops};
+use super::network::network_flops;
+use super::plan::{MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 

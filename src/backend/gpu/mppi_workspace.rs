@@ -4,8 +4,8 @@ use super::buffer::{Buffer, Use};
 use super::compose::{Kernel, PARTIAL_HEADER, Slot};
 use super::flight::Flight;
 use super::kernel::Bound;
+use super::mppi_compiled::PlanCompiled;
 use super::mppi_plan::MppiPlan;
-use super::mppi_program::PlanProgram;
 use super::network::Layers;
 use super::readback::Readback;
 use super::upload::Upload;
@@ -40,24 +40,24 @@ pub(super) struct PlanWorkspace {
 }
 
 impl PlanWorkspace {
-    /// Buffers for `shape`, and the kernels of `program` bound to them.
+    /// Buffers for `shape`, and the kernels of `compiled` bound to them.
     ///
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if the driver refuses a kernel.
     pub(super) fn new(
         flight: &Flight<'_>,
-        program: &PlanProgram,
+        compiled: &PlanCompiled,
         shape: PlanShape,
     ) -> Result<Self> {
         let plan = &shape.plan;
-        let size = program.source.size(plan.problems as usize, plan.samples);
+        let size = compiled.source.size(plan.problems as usize, plan.samples);
         let parts = size.parts(u64::from(plan.problems)).map(|bytes| bytes as usize);
         let dispatches = plan.dispatches(&size) as usize;
         let upload = Upload::new(&flight.device, flight.pool, &parts, dispatches);
         let mut inputs = PlanInputs(upload);
-        inputs.0.put(VALUES, 0, &program.source.values);
-        let buffers = PlanBuffers::new(flight, program, plan);
-        let kernels = Binder { flight, program, inputs: &inputs, buffers: &buffers }.kernels()?;
+        inputs.0.put(VALUES, 0, &compiled.source.values);
+        let buffers = PlanBuffers::new(flight, compiled, plan);
+        let kernels = Binder { flight, compiled, inputs: &inputs, buffers: &buffers }.kernels()?;
         let totals = if shape.costs == CostQuery::Each { 4 * u64::from(plan.stride) } else { 0 };
         let results = buffers.of(Slot::Partials).size() + totals;
         let readback = Readback::new(&flight.device, flight.pool, results);
@@ -108,8 +108,8 @@ pub(super) struct PlanBuffers {
 }
 
 impl PlanBuffers {
-    fn new(flight: &Flight<'_>, program: &PlanProgram, plan: &MppiPlan) -> Self {
-        let source = &program.source;
+    fn new(flight: &Flight<'_>, compiled: &PlanCompiled, plan: &MppiPlan) -> Self {
+        let source = &compiled.source;
         let (spec, stride) = (&source.planning.spec, u64::from(plan.stride));
         let quads = source.planning.model.states.len().div_ceil(4) as u64;
         let colored = matches!(spec.noise().shape(), NoiseShape::Colored { .. });
@@ -161,7 +161,7 @@ pub(super) struct PlanKernels {
 /// What kernels are bound to.
 struct Binder<'a> {
     flight: &'a Flight<'a>,
-    program: &'a PlanProgram,
+    compiled: &'a PlanCompiled,
     inputs: &'a PlanInputs,
     buffers: &'a PlanBuffers,
 }
@@ -177,14 +177,14 @@ impl Binder<'_> {
     }
 
     fn bind(&self, kernel: Kernel) -> Result<Bound> {
-        let pipeline = self.program.pipeline(&self.flight.device, (kernel, 0))?;
+        let pipeline = self.compiled.pipeline(&self.flight.device, (kernel, 0))?;
         let said = |network: usize| {
             let layers = self.buffers.layers[network].as_ref();
             layers.map_or(self.buffers.of(Slot::Totals), Layers::output)
         };
         let buffer = |slot| match slot {
-            Slot::Spline => &self.program.spline,
-            Slot::Cells => self.program.cells.as_ref().unwrap_or(&self.program.spline),
+            Slot::Spline => &self.compiled.spline,
+            Slot::Cells => self.compiled.cells.as_ref().unwrap_or(&self.compiled.spline),
             Slot::Value => said(0),
             Slot::Push => said(1),
             slot => self.buffers.of(slot),
@@ -197,11 +197,11 @@ impl Binder<'_> {
     /// The layers of the network number `network`, which reads the states.
     fn layers(&self, network: usize) -> Result<Vec<Bound>> {
         let layers = self.buffers.layers[network].as_ref();
-        let (Some(layers), Some(weights)) = (layers, &self.program.weights[network]) else {
+        let (Some(layers), Some(weights)) = (layers, &self.compiled.weights[network]) else {
             return Ok(Vec::new());
         };
         layers.bind(self.buffers.of(Slot::State), |kernel, [source, sink]| {
-            let pipeline = self.program.pipeline(&self.flight.device, (kernel, network))?;
+            let pipeline = self.compiled.pipeline(&self.flight.device, (kernel, network))?;
             Ok(pipeline.bind(&self.flight.device, |slot| match slot {
                 Slot::Params => self.inputs.0.params(),
                 Slot::Weights => weights.binding(),

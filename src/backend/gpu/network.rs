@@ -36,6 +36,11 @@ fn pack(layer: &Layer, out: &mut Vec<[f32; 4]>) {
     }
 }
 
+/// Operations of a network for one input.
+pub(super) fn network_flops(mlp: &Mlp) -> u64 {
+    mlp.layers().iter().map(|layer| 2 * layer.weight.len() as u64).sum()
+}
+
 /// The parameters of all layers of `mlp`, one after the other.
 fn packed(mlp: &Mlp) -> Vec<[f32; 4]> {
     let mut packed = Vec::with_capacity(parameter_quads(mlp));

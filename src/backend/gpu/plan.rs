@@ -1,9 +1,10 @@
 //! How a batch is cut up: columns per chunk, steps per dispatch, steps per submission.
 
 use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit};
-use super::chain::ChainLoad;
+use super::chain_load::ChainLoad;
 use super::compose::{Fused, WORKGROUP, input_quads, output_quads, parameter_quads};
 use super::device::{Adapter, AdapterKind};
+use super::network::network_flops;
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 
@@ -161,11 +162,6 @@ impl Size<'_> {
         let called = self.chain.map_or(0, |load| load.flops);
         self.flops + self.network.map_or(0, network_flops) + called
     }
-}
-
-/// Operations of a network for one input.
-pub(super) fn network_flops(mlp: &Mlp) -> u64 {
-    mlp.layers().iter().map(|layer| 2 * layer.weight.len() as u64).sum()
 }
 
 /// How a batch is cut up.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::attempt::Attempt;
 use super::buffer::Pool;
-use super::chain::ChainLoad;
+use super::chain_load::ChainLoad;
 use super::compiled::Compiled;
 use super::device::Device;
 use super::flight::Flight;

@@ -2,7 +2,8 @@
 
 use super::batch::Batch;
 use super::buffer::{Buffer, Use};
-use super::chain::{BoundChain, ChainBinder, ChainBuffers, ChainLoad, ChainStep};
+use super::chain::{BoundChain, ChainBinder, ChainBuffers, ChainStep};
+use super::chain_load::ChainLoad;
 use super::compiled::Compiled;
 use super::compose::{Kernel, Slot};
 use super::flight::Flight;

@@ -6,7 +6,7 @@ use super::axes::{self, State};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
 use super::names::{Scope, Seconds};
-use super::network::NetworkFile;
+use super::network_file::NetworkFile;
 use super::origin::Origin;
 use super::policy::{self, Policy};
 use super::section::Section;

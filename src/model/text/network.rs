@@ -1,43 +1,15 @@
 //! Networks that formulas call by their files: read once each, and held against their calls.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use super::description::Description;
 use super::dynamics::Dynamics;
+use super::network_file::{MOST_NETWORKS, NetworkFile};
 use super::policy::Policy;
 use super::written::Written;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formula::text::{NetworkCall, Networks, shown};
 use crate::policy::Mlp;
-
-/// Most files of networks that the formulas of a model may name.
-pub const MOST_NETWORKS: usize = 8;
-
-/// The file of a network that formulas call.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NetworkFile {
-    /// What formulas call it.
-    pub name: String,
-    /// Where it was read.
-    pub path: PathBuf,
-    /// The file as it was read, for a copy that is sure to be the same.
-    pub bytes: Vec<u8>,
-    /// The network.
-    pub network: Arc<Mlp>,
-}
-
-impl NetworkFile {
-    /// Reads the safetensors file at `path`, which formulas call `name`.
-    ///
-    /// # Errors
-    /// [`Error::File`] if it is missing, damaged, or has a weight that is not finite.
-    pub fn read(name: &str, path: PathBuf) -> Result<Self> {
-        let bytes = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
-        let network = Mlp::from_bytes(&bytes).map_err(|problem| Error::file(&path, problem))?;
-        Ok(Self { name: name.to_owned(), path, bytes, network: Arc::new(network) })
-    }
-}
 
 /// A formula's call of a network.
 type Found<'a> = (&'a Written, &'a NetworkCall);
