@@ -36,6 +36,10 @@ where
 
 /// Which function of the physics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(
+    not(feature = "gpu"),
+    expect(dead_code, reason = "adapters alone print what plans cost")
+)]
 pub(crate) enum Role {
     /// The next state.
     Step,

@@ -12,6 +12,7 @@ mod inputs;
 mod lines;
 mod list;
 mod made;
+#[cfg(feature = "cli")]
 mod npz;
 mod plain;
 mod states;
@@ -32,7 +33,9 @@ pub use inputs::Inputs;
 pub use list::{StateList, States};
 #[cfg(feature = "cli")]
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
-pub(crate) use plain::{ARCHIVE_BYTES, CONFIG_BYTES, RECORD_BYTES, open, read, read_text};
+#[cfg(feature = "import")]
+pub(crate) use plain::ARCHIVE_BYTES;
+pub(crate) use plain::{CONFIG_BYTES, RECORD_BYTES, open, read, read_text};
 pub use states::StateReader;
 #[cfg(feature = "cli")]
 pub use table::{Column, Table};

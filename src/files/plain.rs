@@ -11,6 +11,7 @@ pub(crate) const CONFIG_BYTES: u64 = 1 << 24;
 /// Most bytes of a network, and of a record of results.
 pub(crate) const RECORD_BYTES: u64 = 1 << 30;
 /// Most bytes of an archive of races, of a checkpoint, and of a program.
+#[cfg(feature = "import")]
 pub(crate) const ARCHIVE_BYTES: u64 = 1 << 32;
 
 /// Opens the plain file at `path`, through links.
