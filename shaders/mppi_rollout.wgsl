@@ -1,11 +1,11 @@
 // One thread rolls one sample of one problem over the steps t = step .. step + steps - 1: noise
 // becomes controls, stages are charged. Column p * width + k is the sample first_low + k of the
-// problem p; the columns from `samples` to `width` are padding. Reads streams, plans, contexts and,
+// problem p; the columns from `samples` to `width` are padding. Reads streams, plans and,
 // where there are networks, their outputs (steps = 1 then); writes the state and the cost so far.
 // Twin: backend/cpu/mppi_rollout.rs.
 
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
-// [problems, H, NU]
+// [problems, H, NU + NC]: nominal controls, then what the cost wants to know
 @group(0) @binding(18) var<storage, read> plans: array<f32>;
 @group(0) @binding(21) var<storage, read_write> totals: array<f32>;
 

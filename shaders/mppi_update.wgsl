@@ -8,7 +8,7 @@ const NO_SAMPLE: u32 = 0xffffffffu;
 // Rows of `terms` lie one number more than a workgroup apart, in different memory banks.
 const TERM_PITCH: u32 = WORKGROUP + 1u;
 
-// [problems, H, NU]
+// [problems, H, NU + NC]: nominal controls, then what the cost wants to know
 @group(0) @binding(18) var<storage, read> plans: array<f32>;
 @group(0) @binding(21) var<storage, read> totals: array<f32>;
 // [groups, PARTIAL_HEADER + H * NU], f32 as bits

@@ -486,14 +486,14 @@ mutants! {
 // The map has 13 columns and 9 rows: with its border, 15 and 11.
 mutants! {
     map_parity:
-    map_forgotten: " + contexts[cell]" => "";
-    rows_and_columns_swapped: "cell_at(x)" => "cell_at(State(x[1], x[0], x[2]))";
+    map_forgotten: " + map_cost(x, t)" => "";
+    rows_and_columns_swapped: "cells[min(u32(cell_at(x, t))" => "cells[min(u32(cell_at(State(x[1], x[0], x[2]), t))";
     rows_of_the_map_without_border: "= 15.0f;" => "= 13.0f;";
-    one_cell_off: "min(u32(cell_at(x)), CELLS - 1u)" => "min(u32(cell_at(x)) + 1u, CELLS - 1u)";
+    one_cell_off: "min(u32(cell_at(x, t)), CELLS - 1u)" => "min(u32(cell_at(x, t)) + 1u, CELLS - 1u)";
     columns_not_clamped: "= 14.0f;" => "= 1000.0f;";
     beyond_the_last_row_as_in_it: "= 10.0f;" => "= 9.0f;";
     map_of_the_next_state: "total = charge(total, x, u, stage, nominal, first_step + t);" => "total = charge(total, advance(x, u, first_step + t), u, stage, nominal, first_step + t);";
-    contexts_read_from_the_map: "let at = 165u + row" => "let at = row";
+    contexts_of_the_stage_before: "context_at(stage)" => "context_at(max(stage, 1u) - 1u)";
 }
 
 /// A mutant of what is printed of one function.

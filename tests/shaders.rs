@@ -283,7 +283,6 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
         Slot::Sink => &["sink"],
         Slot::Streams => &["streams"],
         Slot::Plans => &["plans"],
-        Slot::Contexts => &["contexts"],
         Slot::Starts => &["starts"],
         Slot::Totals => &["totals"],
         Slot::Spline => &["spline"],

@@ -81,3 +81,18 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Devices => devices::list(global),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::told;
+    use crate::error::{Error, Fault};
+
+    #[test]
+    fn a_failed_adapter_is_told_with_the_options_that_help() {
+        let error = Error::DeviceFailed { fault: Fault::Timeout, problem: "an adapter".to_owned() };
+        let text = told(&error);
+        assert!(text.starts_with(&error.to_string()), "{text}");
+        assert!(text.contains("`--fallback`") && text.contains("`--backend cpu`"), "{text}");
+        assert_eq!(told(&Error::Refused("no".to_owned())), "stored certificate refused: no");
+    }
+}

@@ -60,7 +60,7 @@ struct Timed<'a> {
 impl Chunk<'_> {
     /// What the samples `samples` of each problem come to.
     fn tally(&self, space: &mut PlanWorkspace, samples: Range<u32>) -> Result<Vec<PlanTally>> {
-        space.inputs.set(self.problems);
+        space.inputs.set(self.problems, self.source.planning.spec.horizon());
         let mut tallies = vec![PlanTally::default(); self.problems.len()];
         let most = space.shape.plan.samples;
         for first in samples.clone().step_by(most as usize) {

@@ -53,15 +53,14 @@ pub(super) struct Size<'a> {
 
 impl Size<'_> {
     /// Bytes that the host sends for `problems` problems: parameters of the model, streams, starts,
-    /// plans, contexts.
-    pub(super) fn parts(&self, problems: u64) -> [u64; 5] {
+    /// plans with their contexts.
+    pub(super) fn parts(&self, problems: u64) -> [u64; 4] {
         let stages = 4 * problems * u64::from(self.horizon);
         [
             16 * self.values.div_ceil(4) as u64,
             16 * problems,
             4 * problems * self.states as u64,
-            stages * self.controls as u64,
-            stages * self.contexts as u64,
+            stages * (self.controls + self.contexts) as u64,
         ]
     }
 
@@ -184,7 +183,7 @@ fn column_bytes(size: &Size<'_>) -> Vec<u64> {
 
 /// Bytes of a problem in its largest buffer.
 fn problem_row_bytes(size: &Size<'_>) -> u64 {
-    let stage = size.controls.max(size.contexts) as u64;
+    let stage = (size.controls + size.contexts) as u64;
     (4 * u64::from(size.horizon) * stage).max(4 * size.states as u64).max(16)
 }
 
@@ -383,7 +382,7 @@ mod tests {
     fn what_cannot_run_is_refused() {
         let small = planned(&Adapter::made_up(1 << 10), &size(3, 20, 500, 1));
         assert!(small.expect_err("no room").to_string().contains("1024 bytes"));
-        let mapped = Size { cells: 1 << 25, ..size(3, 20, 500, 1) };
+        let mapped = Size { cells: (1 << 25) + 1, ..size(3, 20, 500, 1) };
         let mapped = planned(&Adapter::made_up(1 << 27), &mapped);
         assert!(mapped.expect_err("no room for the map").to_string().contains("the map"));
         let wide = planned(&Adapter::made_up(1 << 27), &size(65, 20, 500, 1));

@@ -17,7 +17,6 @@ const VALUES: usize = 0;
 const STREAMS: usize = 1;
 const STARTS: usize = 2;
 const PLANS: usize = 3;
-const CONTEXTS: usize = 4;
 
 /// What decides the sizes of all buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +70,7 @@ pub(super) struct PlanInputs(pub(super) Upload);
 
 impl PlanInputs {
     /// Sets the problems of a chunk.
-    pub(super) fn set(&mut self, problems: &[MppiProblem]) {
+    pub(super) fn set(&mut self, problems: &[MppiProblem], horizon: usize) {
         let stream = |problem: &MppiProblem| {
             let [low, high] = problem.stream.key();
             [low, high, problem.stream.id(), problem.first_step]
@@ -80,8 +79,8 @@ impl PlanInputs {
         self.0.put(STREAMS, 0, &streams);
         for (number, MppiProblem { start, plan, context, .. }) in problems.iter().enumerate() {
             self.0.put(STARTS, number * start.len(), start);
-            self.0.put(PLANS, number * plan.len(), plan);
-            self.0.put(CONTEXTS, number * context.len(), context);
+            let rows = stages(horizon, plan, context);
+            self.0.put(PLANS, number * rows.len(), &rows);
         }
     }
 
@@ -93,10 +92,19 @@ impl PlanInputs {
             Slot::Streams => Some(self.0.part(STREAMS)),
             Slot::Starts => Some(self.0.part(STARTS)),
             Slot::Plans => Some(self.0.part(PLANS)),
-            Slot::Contexts => Some(self.0.part(CONTEXTS)),
             _ => None,
         }
     }
+}
+
+/// The nominal controls and the contexts of each of `horizon` stages, side by side.
+fn stages(horizon: usize, plan: &[f32], context: &[f32]) -> Vec<f32> {
+    let (controls, contexts) = (plan.len() / horizon, context.len() / horizon);
+    let stage = |t: usize| {
+        let nominal = &plan[t * controls..][..controls];
+        nominal.iter().chain(&context[t * contexts..][..contexts]).copied()
+    };
+    (0..horizon).flat_map(stage).collect()
 }
 
 /// The buffers that only kernels write to.

@@ -97,10 +97,8 @@ pub enum Slot {
     Sink = 16,
     /// `streams`: key and stream of each problem's noise.
     Streams = 17,
-    /// `plans`: nominal controls, `[problems, H, NU]`.
+    /// `plans`: nominal controls, and what the cost wants to know, `[problems, H, NU + NC]`.
     Plans = 18,
-    /// `contexts`: what the cost wants to know, `[problems, H, NC]`.
-    Contexts = 19,
     /// `starts`: `[problems, NX]`.
     Starts = 20,
     /// `totals`: cost of each sample so far.

@@ -1,5 +1,7 @@
 //! The text of the MPPI kernels: dynamics, cost, controls and noise of one planning.
 
+use std::ops::Range;
+
 use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
 use super::physics_glue::{Outline, physics_glue};
@@ -70,7 +72,7 @@ impl MppiText {
         Self {
             outline,
             functions,
-            noise: noise_text(spec),
+            noise: noise_text(spec, cost.contexts),
             charge: [
                 charge_text(cost, spec),
                 value_text(value.as_ref()),
@@ -107,7 +109,7 @@ impl MppiText {
         let state = state_glue(states);
         let parts = match kernel {
             Kernel::MppiStart => {
-                vec![loader("start_of", "State", "starts", states), state]
+                vec![loader("start_of", "State", "starts", (states, 0..states)), state]
             }
             Kernel::MppiRollout => vec![state, self.noise.clone(), self.rollout()],
             Kernel::MppiUpdate => {
@@ -136,8 +138,9 @@ impl MppiText {
         let mut text = String::new();
         if contexts > 0 {
             text += &format!("alias Context = array<f32, {contexts}>;\n");
-            text += &storage(Slot::Contexts, "contexts");
-            text += &loader("context_at", "Context", "contexts", contexts);
+            let controls = self.outline.controls;
+            let row = (controls + contexts, controls..controls + contexts);
+            text += &loader("context_at", "Context", "plans", row);
         }
         let functions: Vec<&Function> = self.functions.iter().collect();
         [text, physics_glue(&self.outline, &functions), self.charge.clone()].concat()
@@ -150,7 +153,6 @@ fn rollout_tables(planning: &Planning, functions: &[Function]) -> Vec<(Slot, Acc
     let reads = functions.iter().any(|function| function.reads(Part::Parameters));
     let read = |slot| (slot, Access::Read);
     let mut tables = vec![];
-    tables.extend((cost.contexts > 0).then_some(read(Slot::Contexts)));
     tables.extend(cost.map.as_ref().map(|_| read(Slot::Cells)));
     tables.extend(value.as_ref().map(|_| read(Slot::Value)));
     tables.extend(disturbance.as_ref().map(|_| read(Slot::Push)));
@@ -164,7 +166,7 @@ fn storage(slot: Slot, name: &str) -> String {
 }
 
 /// The generator, the shape of the noise and the controls that it makes of a plan.
-fn noise_text(spec: &MppiSpec) -> String {
+fn noise_text(spec: &MppiSpec, contexts: usize) -> String {
     let controls = spec.controls();
     let noise = spec.noise();
     let antithetic = noise.antithetic();
@@ -183,7 +185,7 @@ fn noise_text(spec: &MppiSpec) -> String {
         draw(controls),
         recorded,
         shape.to_owned(),
-        loader("plan_at", "Control", "plans", controls),
+        loader("plan_at", "Control", "plans", (controls + contexts, 0..controls)),
         recorded_control(spec),
     ]
     .join("\n")
@@ -205,9 +207,9 @@ fn draw(controls: usize) -> String {
     text + &format!("    return Control({});\n}}\n", all.join(", "))
 }
 
-/// A function that loads row `row` of a table of rows of `length` numbers.
-fn loader(name: &str, kind: &str, table: &str, length: usize) -> String {
-    let all: Vec<String> = (0..length).map(|i| format!("{table}[at + {i}u]")).collect();
+/// A function that loads the numbers `part` of row `row` of a table of rows of `length` numbers.
+fn loader(name: &str, kind: &str, table: &str, (length, part): (usize, Range<usize>)) -> String {
+    let all: Vec<String> = part.map(|i| format!("{table}[at + {i}u]")).collect();
     format!(
         "fn {name}(row: u32) -> {kind} {{\n    let at = row * {length}u;\n    \
          return {kind}({});\n}}\n",
