@@ -63,7 +63,8 @@ impl Sources {
             return Error::Invalid { place, problem };
         };
         let place = match self.sets.iter().rev().find(|(_, set)| has(set, path)) {
-            Some((name, _)) if name.contains(&format!(" {path}=")) => name.clone(),
+            // The whole option says what it sets; of a list, which part is meant.
+            Some((name, _)) if inner == path && name.contains(&format!(" {path}=")) => name.clone(),
             Some((name, _)) => format!("{name}: {inner}"),
             None => format!("{}: {inner}", file.place(path)),
         };
