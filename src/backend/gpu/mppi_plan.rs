@@ -274,7 +274,7 @@ mod tests {
     fn size(controls: usize, horizon: u32, samples: u32, problems: usize) -> Size<'static> {
         let networks = [None; 2];
         let (states, contexts, cells, values, flops) = (12, 8, 0, 6, 300);
-        let sizes = Size {
+        Size {
             states,
             controls,
             contexts,
@@ -285,8 +285,7 @@ mod tests {
             problems,
             flops,
             networks,
-        };
-        sizes
+        }
     }
 
     fn planned(adapter: &Adapter, size: &Size<'_>) -> Result<MppiPlan> {
