@@ -26,8 +26,8 @@ const PICTURED: usize = 12;
 /// `config` is stored as it is; it is what a later check starts from.
 ///
 /// # Errors
-/// [`Error::TooFewScenarios`] and [`Error::Invalid`] before any work; those of the backend;
-/// [`Error::Interrupted`] if `watch` says so.
+/// [`crate::Error::TooFewScenarios`] and [`crate::Error::Invalid`] before any work; those of the backend;
+/// [`crate::Error::Interrupted`] if `watch` says so.
 pub fn certify(
     program: &Program<'_>,
     settings: &Settings,
@@ -79,7 +79,7 @@ pub fn certify(
 /// that are too few, claims that spend more than 1 together, an empty box.
 ///
 /// # Errors
-/// [`Error::TooFewScenarios`] and [`Error::Invalid`].
+/// [`crate::Error::TooFewScenarios`] and [`crate::Error::Invalid`].
 pub fn check_settings(settings: &Settings) -> Result<()> {
     growth::check_scenarios(&settings.growth)?;
     deviation::check_scenarios(&settings.deviation, settings.spec.horizon)?;

@@ -19,7 +19,7 @@ pub(super) fn tightening(
 /// Constants and deviation bound that `settings` ask for, and what they take off the margins.
 ///
 /// # Errors
-/// [`Error::TooFewScenarios`] and [`Error::Invalid`] before any work; those of the backend.
+/// [`crate::Error::TooFewScenarios`] and [`crate::Error::Invalid`] before any work; those of the backend.
 pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened> {
     Region::new_box(&*settings.low, &*settings.high)?;
     let constants = constants(context.model(), settings)?;

@@ -20,7 +20,7 @@ impl Description {
     /// `place(i, name)`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming formula and column of a call whose network cannot be read, or that gives
+    /// [`crate::Error::Invalid`] naming formula and column of a call whose network cannot be read, or that gives
     /// it another number of inputs or asks for an output that it does not have.
     pub fn networks(&self, place: impl Fn(usize, &str) -> PathBuf) -> Result<Vec<NetworkFile>> {
         let mut files: Vec<NetworkFile> = Vec::new();
