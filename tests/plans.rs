@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use common::{adapter, backends, cpu};
+use reachcast::backend::cpu::Cpu;
 use reachcast::backend::{Backend, PlanProgram};
 use reachcast::control::DriveBenchmark;
 use reachcast::formula::{Expr, record};
@@ -155,6 +156,24 @@ fn interpreted_plans_have_the_bits_of_compiled_ones() {
         assert_eq!(improve(&backend, &as_text, &problems()), wanted);
         let half = Planning { cost: as_text.cost, ..compiled };
         assert_eq!(improve(&backend, &half, &problems()), wanted, "a compiled system alone");
+    }
+}
+
+/// Whatever instructions the processor has, compiled or interpreted.
+#[test]
+fn plans_have_the_same_bits_with_any_instructions() {
+    let compiled = planning(|settings| settings.noise = NoiseKind::Colored { time: 4.0 });
+    let as_text =
+        Planning { cost: Arc::new(compiled.cost.as_ref().clone().as_text()), ..compiled.clone() };
+    for planning in [compiled, as_text] {
+        let each = Cpu::each(Some(1)).unwrap().into_iter().map(|cpu| {
+            let name = cpu.instructions();
+            (name, improve(&Backend::Cpu(cpu), &planning, &problems()))
+        });
+        let each: Vec<_> = each.collect();
+        for (name, plans) in &each {
+            assert_eq!(*plans, each[0].1, "{name}");
+        }
     }
 }
 

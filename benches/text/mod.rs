@@ -3,15 +3,19 @@
 mod plants;
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use reachcast::Result;
 use reachcast::backend::cpu::Cpu;
-use reachcast::backend::{Backend, Program};
-use reachcast::model::{Controller, Model, Plant};
+use reachcast::backend::{Backend, PlanProgram, Program};
+use reachcast::model::{Controller, Model, Plant, StageCost};
 use reachcast::policy::Policy;
 use reachcast::race::DroneRace;
 use reachcast::race::bench::data::{self, Data};
-use reachcast::rollout::{Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
+use reachcast::rollout::{
+    CostQuery, MppiTask, Planning, Purpose, Query, ReachAvoidTask, Region, Starts, Stream,
+    Tightening,
+};
 use reachcast::system::System;
 
 use crate::ratio;
@@ -20,6 +24,8 @@ use plants::{Dubins, Feedback, Quadrotor};
 
 /// Rollouts of a call.
 const ROLLOUTS: u64 = 4096;
+/// Samples of a plan.
+const SAMPLES: u32 = 1024;
 /// Smallest share of the rate of the compiled plant: formulas alone, and under a network.
 const FORMULA: f64 = 0.45;
 const NETWORK: f64 = 0.9;
@@ -46,6 +52,7 @@ fn hold_with(cpu: Cpu, data: &Data) -> bool {
         ("race", share(backend, race, Damping), FORMULA),
         ("dubins", share(backend, Dubins, Feedback), FORMULA),
         ("quadrotor", share(backend, Quadrotor, Feedback), FORMULA),
+        ("mppi, race", plans(backend), FORMULA),
         ("race under 3x64", share(backend, race, network("3x64")), NETWORK),
         ("race under 3x128", share(backend, race, network("3x128")), NETWORK),
     ];
@@ -71,6 +78,24 @@ where
     let [text, compiled] =
         [&text, &compiled].map(|plant| backend.prepare(plant).expect("a sound plant"));
     1.0 / ratio(|| measures(&text, &starts), || measures(&compiled, &starts))
+}
+
+/// The rate of plans of the race as text over that of the same plans as compiled.
+fn plans(backend: &Backend) -> f64 {
+    let spec = data::mppi_spec(SAMPLES).expect("settings");
+    let compiled = Planning::of(&DroneRace::default(), data::lane(), spec);
+    let text = Planning {
+        model: Arc::new(Model::clone(&compiled.model).as_text()),
+        cost: Arc::new(StageCost::clone(&compiled.cost).as_text()),
+        ..compiled.clone()
+    };
+    let [text, compiled] =
+        [&text, &compiled].map(|planning| backend.prepare_plans(planning).expect("sound plans"));
+    let problems = [data::mppi_problem(1, 0)];
+    let task = MppiTask { problems: &problems, iteration: 0, costs: CostQuery::Summary };
+    let improve =
+        |program: &PlanProgram<'_>| program.improve(&task).map(|plan| drop(black_box(plan)));
+    1.0 / ratio(|| improve(&text), || improve(&compiled))
 }
 
 /// Starts in the default box of `system`.

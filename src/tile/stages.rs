@@ -120,8 +120,8 @@ where
     #[inline(always)]
     fn run<V: Vector>(self) {
         // Samples of a group, known to the compiler: it leaves out all tests of indices.
-        match V::WIDTH {
-            16 => self.groups::<V, 32>(),
+        match self.stages.group {
+            32 => self.groups::<V, 32>(),
             _ => self.groups::<V, 16>(),
         }
     }
