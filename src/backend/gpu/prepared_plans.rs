@@ -7,6 +7,7 @@ use super::adapter::Gpu;
 use super::mppi_source::PlanSource;
 use super::recover;
 use super::traffic::Count;
+use crate::backend::cpu::{self, Cpu};
 use crate::backend::{Action, Event};
 use crate::error::{Error, Fault, Result};
 use crate::rollout::{MppiTask, PlanTally, Planning};
@@ -15,15 +16,15 @@ use crate::rollout::{MppiTask, PlanTally, Planning};
 /// kernel compiled when it is first needed. Where the adapter is opened again, so is all of that.
 pub(in crate::backend) struct PreparedPlanning<'a> {
     gpu: &'a Gpu,
-    work: Work,
+    work: Work<'a>,
 }
 
 /// Who improves plans.
-enum Work {
+enum Work<'a> {
     /// The adapter.
     Adapter(Arc<PlanSource>),
     /// The CPU, which is allowed to do what the adapter does not.
-    Cpu(Planning),
+    Cpu(&'a Cpu, Box<cpu::PreparedPlanning>),
 }
 
 /// What the kernels of plans do not do.
@@ -54,13 +55,14 @@ impl Gpu {
 
     /// Leaves `planning` to the CPU, if that is allowed.
     fn on_cpu(&self, planning: &Planning) -> Result<PreparedPlanning<'_>> {
-        if self.fallback.is_none() {
+        let Some(cpu) = &self.fallback else {
             return Err(Error::Device(CALLS.to_owned()));
-        }
+        };
         let (fault, action) = (Fault::Unfit, Action::Cpu);
         let (problem, work) = (CALLS.to_owned(), "problems".to_owned());
         self.note(Event { fault, problem, work, index: 0, action });
-        Ok(PreparedPlanning { gpu: self, work: Work::Cpu(planning.clone()) })
+        let work = Work::Cpu(cpu, Box::new(cpu.prepare_plans(planning)));
+        Ok(PreparedPlanning { gpu: self, work })
     }
 }
 
@@ -72,13 +74,12 @@ impl PreparedPlanning<'_> {
         samples: Range<u32>,
         sink: &mut dyn FnMut(Vec<PlanTally>),
     ) -> Result<()> {
-        match (&self.work, &self.gpu.fallback) {
-            (Work::Cpu(planning), Some(cpu)) => {
-                cpu.prepare_plans(planning).tally(cpu, task, samples, sink);
+        match &self.work {
+            Work::Adapter(source) => recover::tally(self.gpu, source, (task, samples), sink),
+            Work::Cpu(cpu, prepared) => {
+                prepared.tally(cpu, task, samples, sink);
                 Ok(())
             }
-            (Work::Cpu(_), None) => Err(Error::Device(CALLS.to_owned())),
-            (Work::Adapter(source), _) => recover::tally(self.gpu, source, (task, samples), sink),
         }
     }
 }

@@ -26,6 +26,11 @@ impl<T> Recent<T> {
     /// Keeps `item`.
     pub(super) fn keep(&self, item: T) {
         let mut items = self.items.lock().unwrap_or_else(PoisonError::into_inner);
+        self.push(&mut items, item);
+    }
+
+    /// Adds `item`; the oldest goes where they would be too many.
+    fn push(&self, items: &mut Vec<T>, item: T) {
         items.push(item);
         if items.len() > self.most {
             items.remove(0);
@@ -49,10 +54,7 @@ impl<T> Recent<T> {
             Some(at) => items.remove(at),
             None => make()?,
         };
-        items.push(item.clone());
-        if items.len() > self.most {
-            items.remove(0);
-        }
+        self.push(&mut items, item.clone());
         Ok(item)
     }
 

@@ -5,6 +5,7 @@ mod film;
 mod findings;
 pub(in crate::race) mod losses;
 mod moment;
+pub(in crate::race) mod provenance;
 mod success;
 mod table;
 mod tiers;

@@ -1,5 +1,6 @@
 //! The tables of the race page: every number of the record but the moments of the picture.
 
+use super::provenance::provenance;
 use super::verdicts::{self, CLASSES};
 use super::words::{self, points};
 use crate::race::judge::Judge;
@@ -32,7 +33,7 @@ pub(super) fn wide(record: &RaceRecord) -> String {
 
 /// The tables of two columns.
 pub(super) fn narrow(record: &RaceRecord) -> String {
-    starts(record) + &absent(record) + &bounds(record) + &provenance(record)
+    starts(record) + &absent(record) + &bounds(record) + &made_by(record)
 }
 
 fn success(record: &RaceRecord, judge: Judge) -> String {
@@ -237,23 +238,11 @@ fn bounds(record: &RaceRecord) -> String {
     )
 }
 
-fn provenance(record: &RaceRecord) -> String {
-    let provenance = &record.provenance;
-    pairs(
-        "Provenance",
-        &[
-            ("reachcast", provenance.version.clone()),
-            ("layout of the record", record.schema.to_string()),
-            ("seed", provenance.seed.to_string()),
-            ("generator", provenance.generator.clone()),
-            ("backend", provenance.backend.clone()),
-            ("device", provenance.device.clone()),
-            ("policy", provenance.policy.clone()),
-            ("policy SHA-256", provenance.policy_sha256.clone()),
-            ("value network SHA-256", or_dash(record.value_sha256.as_ref())),
-            ("disturbance network SHA-256", or_dash(record.disturbance_sha256.as_ref())),
-            ("PPO policy SHA-256", or_dash(record.ppo_sha256.as_ref())),
-            ("physics SHA-256", provenance.physics_sha256.clone()),
-        ],
-    )
+fn made_by(record: &RaceRecord) -> String {
+    let networks = [
+        ("value network SHA-256", record.value_sha256.as_ref()),
+        ("disturbance network SHA-256", record.disturbance_sha256.as_ref()),
+        ("PPO policy SHA-256", record.ppo_sha256.as_ref()),
+    ];
+    provenance(record.schema, &record.provenance, &networks)
 }

@@ -3,6 +3,7 @@
 use super::grid::Grid;
 use super::readings::{certificate, judged, race, share};
 use crate::race::judge::{FailureClass, Judge};
+use crate::race::page::provenance::provenance;
 use crate::race::page::verdicts;
 use crate::race::sweep::record::{CertificatePoint, RacePoint, SweepRecord};
 use crate::report::sortable::{Cell, Column, Order, sortable};
@@ -169,7 +170,7 @@ fn outcomes(all: &[&CertificatePoint]) -> Column {
 
 /// The tables of two columns.
 pub(super) fn narrow(record: &SweepRecord) -> String {
-    starts(record) + &provenance(record)
+    starts(record) + &provenance(record.schema, &record.provenance, &[])
 }
 
 fn starts(record: &SweepRecord) -> String {
@@ -189,22 +190,4 @@ fn starts(record: &SweepRecord) -> String {
         values.push(("safe at t = 0", format!("{}, {}", count(safe), percent(share))));
     }
     pairs("Starts and noise", &values)
-}
-
-fn provenance(record: &SweepRecord) -> String {
-    let provenance = &record.provenance;
-    pairs(
-        "Provenance",
-        &[
-            ("reachcast", provenance.version.clone()),
-            ("layout of the record", record.schema.to_string()),
-            ("seed", provenance.seed.to_string()),
-            ("generator", provenance.generator.clone()),
-            ("backend", provenance.backend.clone()),
-            ("device", provenance.device.clone()),
-            ("policy", provenance.policy.clone()),
-            ("policy SHA-256", provenance.policy_sha256.clone()),
-            ("physics SHA-256", provenance.physics_sha256.clone()),
-        ],
-    )
 }
