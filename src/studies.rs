@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{Config, PlantWork, Profile, SystemWork, no_formula, positive_f32, profile};
+use crate::config::{Config, Profile, no_formula, positive_f32, profile};
 use crate::error::Result;
+use crate::model::{Model, Plant};
 use crate::race::system::{Cone, DroneRace};
-use crate::rollout::Plant;
 use crate::system::{BangBang, DoubleIntegrator};
 
 pub(crate) use crate::race::bench::export::export;
@@ -87,29 +87,26 @@ pub(crate) enum BuiltIn {
 }
 
 impl BuiltIn {
-    /// Does `work` on the system.
-    ///
-    /// # Errors
-    /// Those of the work.
-    pub(crate) fn with_system<W: SystemWork>(&self, work: W) -> Result<W::Output> {
+    /// The system as data.
+    pub(crate) fn model(&self) -> Model {
         match self {
-            Self::DroneRace(system) => work.run(system),
-            Self::DoubleIntegrator(system) => work.run(system),
+            Self::DroneRace(system) => Model::of(system.clone()),
+            Self::DoubleIntegrator(system) => Model::of(system.clone()),
         }
     }
 
-    /// Does `work` on the system under its formula `name`.
+    /// The system under its formula `name`.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for a formula that the system does not have, and those of the work.
-    pub(crate) fn with_formula<W: PlantWork>(&self, name: &str, work: W) -> Result<W::Output> {
+    /// [`crate::Error::Invalid`] for a formula that the system does not have.
+    pub(crate) fn under_formula(&self, name: &str) -> Result<Plant> {
         match self {
             Self::DoubleIntegrator(system) if name == "bang-bang" => {
-                let policy = &BangBang { acceleration: system.acceleration };
-                work.run(Plant { system, policy })
+                let policy = BangBang { acceleration: system.acceleration };
+                Ok(Plant::of(system.clone(), policy))
             }
-            Self::DoubleIntegrator(system) => Err(no_formula(system, name, "bang-bang")),
-            Self::DroneRace(system) => Err(no_formula(system, name, "none")),
+            Self::DoubleIntegrator(_) => Err(no_formula(&self.model().name, name, "bang-bang")),
+            Self::DroneRace(_) => Err(no_formula(&self.model().name, name, "none")),
         }
     }
 }

@@ -4,14 +4,11 @@
 //! is one operation, so a multiply-add is two. Not counted: integer work, such as the generator's,
 //! and the activations of networks.
 
-use std::array::from_fn;
-
-use crate::cost::Cost;
 use crate::formula::{Graph, Node, record};
-use crate::policy::{Mlp, Policy};
+use crate::model::{Controller, Law, Model, Plant};
+use crate::policy::Mlp;
 use crate::real::Real;
-use crate::rollout::{Plant, normal_pair};
-use crate::system::System;
+use crate::rollout::{Planning, normal_pair};
 
 /// Of a state's part in the fold: what both margins lose, then two products with the discount and
 /// the discount's own, two minima and a maximum.
@@ -39,86 +36,52 @@ pub fn network(network: &Mlp) -> f64 {
     network.layers().iter().map(|layer| 2.0 * layer.weight.len() as f64).sum()
 }
 
-/// Of a policy at one state.
-pub fn policy<P, const NX: usize, const NU: usize>(policy: &P) -> f64
-where
-    P: Policy<NX, NU>,
-{
-    match policy.network() {
-        Some(layers) => network(layers),
-        None => formula(&record(NX, |x| policy.control(from_fn(|i| x[i])).to_vec())),
+/// Of a controller at one state.
+pub fn control(controller: &Controller) -> f64 {
+    match &controller.law {
+        Law::Formula(graph) => formula(graph),
+        Law::Network { observe, network: layers, act } => {
+            let beside = [observe, act].into_iter().flatten().map(formula);
+            network(layers) + beside.sum::<f64>()
+        }
     }
 }
 
-/// Of a step of the system.
-pub fn step<S, const NX: usize, const NU: usize>(system: &S) -> f64
-where
-    S: System<NX, NU>,
-{
-    let step = record(NX + NU, |inputs| {
-        system.step(from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i])).to_vec()
-    });
-    formula(&step)
-}
-
 /// Of both margins of a state and its part in the measure.
-pub fn judge<S, const NX: usize, const NU: usize>(system: &S) -> f64
-where
-    S: System<NX, NU>,
-{
-    let margins = record(NX, |x| {
-        let x = from_fn(|i| x[i]);
-        vec![system.target(x), system.constraint(x)]
-    });
-    formula(&margins) + FOLD
+pub fn judge(model: &Model) -> f64 {
+    formula(&Graph::joined(&[&model.target, &model.constraint])) + FOLD
 }
 
 /// Of the measure of a rollout of `steps` steps, which may be a mean.
-pub fn rollout<S, P, const NX: usize, const NU: usize>(plant: Plant<'_, S, P>, steps: f64) -> f64
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let Plant { system, policy: by } = plant;
-    steps * (policy(by) + step(system)) + (steps + 1.0) * judge(system)
+pub fn rollout(plant: &Plant, steps: f64) -> f64 {
+    let Plant { model, controller } = plant;
+    steps * (control(controller) + formula(&model.step)) + (steps + 1.0) * judge(model)
 }
 
 /// Of a pair whose perturbed rollout takes the controls of the nominal one; drawing it apart.
-pub fn replayed_pair<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    steps: f64,
-) -> f64
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+pub fn replayed_pair(plant: &Plant, steps: f64) -> f64 {
+    let model = &plant.model;
     // Per state a difference, a square and a sum; then the root.
-    let distance = 3.0 * NX as f64 + 1.0;
-    let perturbed = steps * step(plant.system) + (steps + 1.0) * judge(plant.system);
+    let distance = 3.0 * model.states.len() as f64 + 1.0;
+    let perturbed = steps * formula(&model.step) + (steps + 1.0) * judge(model);
     rollout(plant, steps) + perturbed + (steps + 1.0) * distance
 }
 
-/// Of an MPPI sample of `horizon` steps without networks, its noise independent over steps and
-/// controls, and of its part in the new plan.
-pub fn sample<S, C, const NX: usize, const NU: usize, const NC: usize>(
-    system: &S,
-    cost: &C,
-    horizon: usize,
-) -> f64
-where
-    S: System<NX, NU>,
-    C: Cost<NX, NU, NC>,
-{
-    let stage = record(NX + NU + NC, |inputs| {
-        let (x, u) = (from_fn(|i| inputs[i]), from_fn(|i| inputs[NX + i]));
-        let mut outputs = system.step(x, u).to_vec();
-        outputs.push(cost.stage(x, u, from_fn(|i| inputs[NX + NU + i])));
-        outputs.extend(cost.map(x).map(|(map, place)| map.cell(place)));
+/// Of an MPPI sample without networks, its noise independent over steps and controls, and of its part
+/// in the new plan.
+pub fn sample(planning: &Planning) -> f64 {
+    let Planning { model, cost, spec, .. } = planning;
+    let horizon = spec.horizon();
+    let stage = record(cost.stage.inputs, |inputs| {
+        let own = &inputs[..model.inputs()];
+        let mut outputs = model.step.recorded_at(own);
+        outputs.extend(cost.stage.recorded_at(inputs));
+        outputs.extend(cost.map.iter().flat_map(|map| map.cell.recorded_at(own)));
         outputs
     });
     let normals = record(2, |uniforms| normal_pair(uniforms[0], uniforms[1]).to_vec());
     let exponential = record(1, |x| vec![x[0].exp_negative()]);
-    let controls = (NU * horizon) as f64;
+    let controls = (spec.controls() * horizon) as f64;
     // Normals come in blocks of four, two pairs.
     let pairs = 2.0 * (controls / 4.0).ceil();
     let noise = pairs * (UNIFORMS + formula(&normals));
@@ -140,7 +103,8 @@ mod tests {
     /// of the two parameters.
     #[test]
     fn steps_of_the_race() {
-        assert_eq!(step(&DroneRace::default()), 6.0 * 2.0 + 3.0 * 4.0 + 2.0 * 4.0 + 3.0 + 5.0);
+        let model = Model::of(DroneRace::default());
+        assert_eq!(formula(&model.step), 6.0 * 2.0 + 3.0 * 4.0 + 2.0 * 4.0 + 3.0 + 5.0);
     }
 
     /// Its margins by hand. Target: 2 differences, 1 minimum; twice a sum, a difference, a
@@ -151,7 +115,7 @@ mod tests {
     fn margins_of_the_race() {
         let target = 3.0 + 6.0 + 3.0;
         let constraint = 5.0 + 5.0 + 8.0 + 2.0;
-        assert_eq!(judge(&DroneRace::default()), target + constraint + FOLD);
+        assert_eq!(judge(&Model::of(DroneRace::default())), target + constraint + FOLD);
     }
 
     #[test]
@@ -165,8 +129,7 @@ mod tests {
         let layers = vec![layer(12, 64), layer(64, 64), layer(64, 64), layer(64, 3)];
         let mlp = Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap();
         assert_eq!(network(&mlp), 2.0 * (768.0 + 4096.0 + 4096.0 + 192.0));
-        let system = DroneRace::default();
-        let plant = Plant { system: &system, policy: &mlp };
+        let plant = &Plant::of(DroneRace::default(), mlp);
         assert_eq!(rollout(plant, 30.0), 30.0 * (18_304.0 + 40.0) + 31.0 * 40.0);
         let pair = replayed_pair(plant, 30.0) - rollout(plant, 30.0);
         assert_eq!(pair, 30.0 * 40.0 + 31.0 * (40.0 + 37.0));
@@ -175,7 +138,8 @@ mod tests {
     #[test]
     fn a_formula_policy_counts_its_operations() {
         // A comparison with its choice between two literals.
-        assert_eq!(policy::<_, 2, 1>(&BangBang { acceleration: 1.0 }), 1.0);
-        assert!(step::<_, 2, 1>(&DoubleIntegrator::default()) > 0.0);
+        let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
+        assert_eq!(control(&plant.controller), 1.0);
+        assert!(formula(&plant.model.step) > 0.0);
     }
 }

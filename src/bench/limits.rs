@@ -10,7 +10,8 @@ use crate::backend::Backend;
 use crate::backend::gpu::DeviceLimits;
 use crate::error::Result;
 use crate::files::{CONFIG_BYTES, read_text};
-use crate::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
+use crate::model::Plant;
+use crate::rollout::{Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
 use crate::system::{BangBang, DoubleIntegrator};
 
 /// Rows and columns of the square matrices: three of them fit the inner caches of a core.
@@ -190,9 +191,8 @@ impl AdapterLimits {
             tightening: &Tightening::none(&spec),
             query: Query::Measure,
         };
-        let plant = Plant { system: &system, policy: &policy };
-        let round_trip =
-            measure(protocol, || backend.reach_avoid(plant, &task, &mut |_, _| Ok(())))?;
+        let program = backend.prepare(&Plant::of(system, policy))?;
+        let round_trip = measure(protocol, || program.reach_avoid(&task, &mut |_, _| Ok(())))?;
         Ok(Some(Self { round_trip, device: gpu.measure_limits()? }))
     }
 }

@@ -16,7 +16,7 @@ mod value;
 
 pub use crate::studies::SystemSection;
 pub use model::copy_name;
-pub use plant::{PlantWork, PolicySource, SystemWork};
+pub use plant::PolicySource;
 pub use section::{
     BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
     GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,

@@ -1,47 +1,13 @@
-//! From names to types: the system and the policy that a configuration names, for one generic work.
+//! From names to a plant: the system and the policy that a configuration names.
 
 use std::path::{Path, PathBuf};
 
 use super::section::{Config, FormulaSection};
 use crate::error::{Error, Result};
 use crate::files::{RECORD_BYTES, read};
-use crate::model;
-use crate::policy::{Mlp, Policy};
-use crate::rollout::Plant;
+use crate::model::{Model, Plant};
+use crate::policy::Mlp;
 use crate::studies::BuiltIn;
-use crate::system::System;
-
-/// Work on a plant of any system and policy.
-pub trait PlantWork {
-    /// What comes of it.
-    type Output;
-
-    /// Does the work.
-    ///
-    /// # Errors
-    /// Those of the work.
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<Self::Output>
-    where
-        S: System<NX, NU> + Clone + Send + Sync + 'static,
-        P: Policy<NX, NU> + Clone + Send + Sync + 'static;
-}
-
-/// Work on any system.
-pub trait SystemWork {
-    /// What comes of it.
-    type Output;
-
-    /// Does the work.
-    ///
-    /// # Errors
-    /// Those of the work.
-    fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Self::Output>
-    where
-        S: System<NX, NU> + Clone + Send + Sync + 'static;
-}
 
 /// The policy that a configuration names: a formula, or a network and the bytes of its file.
 #[derive(Clone, Debug)]
@@ -91,39 +57,33 @@ impl Config {
     /// The plant: model and policy, checked against each other.
     ///
     /// # Errors
-    /// Those of [`Config::with_plant`].
-    pub fn plant(&self, policy: &PolicySource) -> Result<model::Plant> {
+    /// [`Error::Invalid`] for a parameter out of range or a formula that the system does not
+    /// have, [`Error::File`] for a network of the wrong shape, and those of a description.
+    pub fn plant(&self, policy: &PolicySource) -> Result<Plant> {
         self.built(policy).map_err(|error| self.placed(error))
     }
 
-    fn built(&self, policy: &PolicySource) -> Result<model::Plant> {
+    fn built(&self, policy: &PolicySource) -> Result<Plant> {
         if let Some(model) = &self.model {
             return self.described_plant(model, policy);
         }
-        self.with_plant(policy, AsModel)
-    }
-
-    /// Builds the system, checks the policy against it, and does `work` on both.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for a parameter out of range or a formula that the system does not
-    /// have, [`Error::File`] for a network of the wrong shape, and those of the work.
-    pub fn with_plant<W: PlantWork>(&self, policy: &PolicySource, work: W) -> Result<W::Output> {
         let system = self.built_in()?;
         match policy {
-            PolicySource::Formula(name) => system.with_formula(name, work),
+            PolicySource::Formula(name) => system.under_formula(name),
             PolicySource::Network { path, network, .. } => {
-                system.with_system(UnderNetwork { path, network, work })
+                let model = system.model();
+                check_network(&model, path, network)?;
+                Ok(Plant::under(&model.into(), network.clone()))
             }
         }
     }
 
-    /// Builds the system and does `work` on it.
+    /// The model of a system that the program carries, its parameters checked.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a parameter out of range, and those of the work.
-    pub fn with_system<W: SystemWork>(&self, work: W) -> Result<W::Output> {
-        self.built_in()?.with_system(work)
+    /// [`Error::Invalid`] for a parameter out of range, and for a model that is given as text.
+    pub fn carried_model(&self) -> Result<Model> {
+        self.built_in().map(|system| system.model())
     }
 
     /// The system, its parameters checked.
@@ -137,67 +97,15 @@ impl Config {
     }
 }
 
-/// Makes a plant of plain data.
-struct AsModel;
-
-impl PlantWork for AsModel {
-    type Output = model::Plant;
-
-    fn run<S, P, const NX: usize, const NU: usize>(
-        self,
-        plant: Plant<'_, S, P>,
-    ) -> Result<model::Plant>
-    where
-        S: System<NX, NU> + Clone + Send + Sync + 'static,
-        P: Policy<NX, NU> + Clone + Send + Sync + 'static,
-    {
-        Ok(model::Plant::of(plant.system.clone(), plant.policy.clone()))
-    }
-}
-
-/// Work on a system under the network of `path`, once it fits.
-struct UnderNetwork<'a, W> {
-    path: &'a Path,
-    network: &'a Mlp,
-    work: W,
-}
-
-impl<W: PlantWork> SystemWork for UnderNetwork<'_, W> {
-    type Output = W::Output;
-
-    fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<W::Output>
-    where
-        S: System<NX, NU> + Clone + Send + Sync + 'static,
-    {
-        check_network(system, self.path, self.network)?;
-        self.work.run(Plant { system, policy: self.network })
-    }
-}
-
 /// The refusal of the formula `name`.
-pub(crate) fn no_formula<S, const NX: usize, const NU: usize>(
-    system: &S,
-    name: &str,
-    has: &str,
-) -> Error
-where
-    S: System<NX, NU>,
-{
-    let system = system.name();
+pub(crate) fn no_formula(system: &str, name: &str, has: &str) -> Error {
     let problem = format!("`{name}` is unknown; formulas of {system}: {has}, or give a `file`");
     Error::invalid("policy.formula", problem)
 }
 
-/// Refuses the network of `path` if it does not fit the system.
-pub(crate) fn check_network<S, const NX: usize, const NU: usize>(
-    system: &S,
-    path: &Path,
-    network: &Mlp,
-) -> Result<()>
-where
-    S: System<NX, NU>,
-{
-    let states = system.states();
-    let names = states.each_ref().map(|axis| axis.name.as_str());
-    network.check_fits(&names, NU).map_err(|problem| Error::file(path, problem))
+/// Refuses the network of `path` if it does not fit the model.
+pub(crate) fn check_network(model: &Model, path: &Path, network: &Mlp) -> Result<()> {
+    let names: Vec<&str> = model.states.iter().map(|axis| axis.name.as_str()).collect();
+    let fits = network.check_fits(&names, model.controls.len());
+    fits.map_err(|problem| Error::file(path, problem))
 }

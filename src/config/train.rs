@@ -127,7 +127,7 @@ impl Config {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the key whose interval is empty, not finite or of no state.
-    pub fn mixture<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Mixture<NX>> {
+    pub fn mixture(&self, axes: &[Axis]) -> Result<Mixture> {
         let (low, high) = self.corners(axes)?;
         let part = |(number, part): (usize, &StartsSection)| {
             let (mut low, mut high) = (low.clone(), high.clone());
@@ -146,7 +146,7 @@ impl Config {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the key of no state, and those of [`Self::train_settings`].
-    pub fn disturbed<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Vec<(usize, f32)>> {
+    pub fn disturbed(&self, axes: &[Axis]) -> Result<Vec<(usize, f32)>> {
         coordinates("train.ddpg.disturbance", &self.train_settings()?.ddpg.disturbance, axes)
     }
 
@@ -154,7 +154,7 @@ impl Config {
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the key of no state, and those of [`Self::train_settings`].
-    pub fn goal<const NX: usize>(&self, axes: &[Axis; NX]) -> Result<Vec<(usize, f32)>> {
+    pub fn goal(&self, axes: &[Axis]) -> Result<Vec<(usize, f32)>> {
         coordinates("train.ppo.reward.goal", &self.train_settings()?.ppo.reward.goal, axes)
     }
 }

@@ -45,6 +45,11 @@ impl<'a> States<'a> {
         &self.numbers[index * self.size..][..self.size]
     }
 
+    /// All their numbers, one state after the other.
+    pub fn numbers(&self) -> &'a [f32] {
+        self.numbers
+    }
+
     /// One after the other.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &'a [f32]> + use<'a> {
         self.numbers.chunks_exact(self.size)
@@ -93,6 +98,14 @@ impl StateList {
     pub fn push(&mut self, state: &[f32]) {
         assert_eq!(state.len(), self.size, "numbers of a state");
         self.numbers.extend_from_slice(state);
+    }
+
+    /// Puts `state` in the place of number `index`.
+    ///
+    /// # Panics
+    /// If it has another size, or there is no such place.
+    pub fn set(&mut self, index: usize, state: &[f32]) {
+        self.numbers[index * self.size..][..self.size].copy_from_slice(state);
     }
 
     /// The list with `more` states behind.

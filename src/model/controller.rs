@@ -38,6 +38,12 @@ pub enum Law {
 }
 
 impl Controller {
+    /// A network that sees the states in order and says the controls.
+    pub fn network_alone(network: impl Into<Arc<Mlp>>) -> Self {
+        let network = network.into();
+        Self::new(network.in_words(), Law::Network { observe: None, network, act: None })
+    }
+
     /// A policy as data, without anything compiled.
     pub fn new(name: impl Into<String>, law: Law) -> Self {
         Self { name: name.into(), law, native: None }

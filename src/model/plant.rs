@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{Controller, Law, Model};
-use crate::formula::Graph;
-use crate::policy::Policy;
+use crate::formula::{Graph, Node};
+use crate::policy::{Mlp, Policy};
 use crate::real::Real;
 use crate::system::System;
 
@@ -42,14 +42,10 @@ impl Plant {
         Self::new(Model::of(system), controller)
     }
 
-    /// The same of a system and a policy that are borrowed, without their compiled forms.
-    #[cfg(feature = "train")]
-    pub(crate) fn recorded<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Self
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        Self::new(Model::recorded(system), Controller::recorded(system, policy))
+    /// A model under a network that sees its states in order and says its controls.
+    pub fn under(model: &Arc<Model>, network: impl Into<Arc<Mlp>>) -> Self {
+        let controller = Arc::new(Controller::network_alone(network));
+        Self { model: Arc::clone(model), controller }
     }
 
     /// The controls at `x`, `[controls]`, at a step.
@@ -75,11 +71,25 @@ impl Plant {
 impl Model {
     /// The inputs of the formulas.
     pub(crate) fn arguments<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
-        let parameters = self.parameters.iter().map(|parameter| R::lit(parameter.value));
         // A step is a whole number below 2^24: exact.
-        let step = R::lit(step as f32);
+        self.arguments_at(x, u, R::lit(step as f32))
+    }
+
+    /// The same where each lane may be at a step of its own.
+    pub(crate) fn arguments_at<R: Real>(&self, x: &[R], u: &[R], step: R) -> Vec<R> {
+        let parameters = self.parameters.iter().map(|parameter| R::lit(parameter.value));
         let time = step * R::lit(self.period.unwrap_or(0.0));
         x.iter().chain(u).copied().chain(parameters).chain([time, step]).collect()
+    }
+
+    /// Whether no formula of it reads the time: all steps are alike.
+    pub fn is_stationary(&self) -> bool {
+        // Time and step are the last two inputs.
+        let first = self.inputs() as u32 - 2;
+        let reads = |node: &Node| matches!(node, Node::Input(i) if *i >= first);
+        [&self.step, &self.target, &self.constraint]
+            .iter()
+            .all(|graph| !graph.nodes.iter().any(reads))
     }
 
     /// The state after `x` under the control `u`, `[states]`.

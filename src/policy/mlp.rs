@@ -214,6 +214,12 @@ impl Mlp {
         x
     }
 
+    /// Its kind and widths: `mlp 12-64-64-3`.
+    pub fn in_words(&self) -> String {
+        let widths: Vec<String> = self.widths().iter().map(ToString::to_string).collect();
+        format!("mlp {}", widths.join("-"))
+    }
+
     /// Refuses a network without layers, with shapes that do not fit, or a weight not finite.
     pub(super) fn validate(&self) -> std::result::Result<(), String> {
         if self.layers.is_empty() {

@@ -44,8 +44,7 @@ impl<P: Policy<NX, NU>, const NX: usize, const NU: usize> Policy<NX, NU> for &P 
 
 impl<const NX: usize, const NU: usize> Policy<NX, NU> for Mlp {
     fn name(&self) -> String {
-        let widths: Vec<String> = self.widths().iter().map(ToString::to_string).collect();
-        format!("mlp {}", widths.join("-"))
+        self.in_words()
     }
 
     fn network(&self) -> Option<&Mlp> {

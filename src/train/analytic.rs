@@ -17,18 +17,18 @@ use super::starts::Mixture;
 use super::tape::Tape;
 use crate::backend::Backend;
 use crate::error::Result;
+use crate::model::{Model, Plant};
 use crate::policy::Mlp;
-use crate::rollout::{Plant, RolloutSpec, Tightening};
-use crate::system::System;
+use crate::rollout::{RolloutSpec, StateList, States, Tightening};
 
 /// Weights of the last layer at first, as a share of the others': no output is near saturation.
 pub const LAST: f32 = 0.1;
 
 /// What is trained, on what.
 #[derive(Clone, Debug)]
-pub struct Task<'a, S, const NX: usize> {
-    /// The system.
-    pub system: &'a S,
+pub struct Task<'a> {
+    /// The plant.
+    pub model: Arc<Model>,
     /// Who runs the rollouts that the policy is scored by.
     pub backend: &'a Backend,
     /// Where its tensors lie.
@@ -38,7 +38,7 @@ pub struct Task<'a, S, const NX: usize> {
     /// What the margins lose in `V_check`; none if it has no part in the objective.
     pub tightening: Option<Tightening>,
     /// Where starts are drawn from.
-    pub mixture: Mixture<NX>,
+    pub mixture: Mixture,
     /// Starts that the policy is scored on.
     pub held_out: u64,
     /// Seed of every stream.
@@ -47,23 +47,39 @@ pub struct Task<'a, S, const NX: usize> {
 
 /// A policy under training.
 #[derive(Debug)]
-pub struct Analytic<'a, S, const NX: usize, const NU: usize> {
-    task: Task<'a, S, NX>,
+pub struct Analytic<'a> {
+    task: Task<'a>,
     settings: AnalyticSettings,
     step: Arc<Tape>,
     measure: Arc<Tape>,
     network: Network,
     adam: Adam,
-    held_out: Vec<[f32; NX]>,
+    held_out: StateList,
 }
 
-impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX, NU> {
+impl Task<'_> {
+    /// Names of the states, in order.
+    pub(super) fn order(&self) -> Vec<String> {
+        self.model.states.iter().map(|axis| axis.name.clone()).collect()
+    }
+
+    /// Whether each of `starts` succeeds under `network`.
+    pub(super) fn succeeds(
+        &self,
+        network: impl Into<Arc<Mlp>>,
+        starts: States<'_>,
+    ) -> Result<Vec<bool>> {
+        successes(self.backend, &Plant::under(&self.model, network), self.spec, starts)
+    }
+}
+
+impl<'a> Analytic<'a> {
     /// Trains `network` from the parameters that it has.
-    pub fn new(task: Task<'a, S, NX>, network: Network, settings: AnalyticSettings) -> Self {
+    pub fn new(task: Task<'a>, network: Network, settings: AnalyticSettings) -> Self {
         let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
         Self {
-            step: Arc::new(step_tape(task.system)),
-            measure: Arc::new(measure_tape(task.system, &task.spec, task.tightening.as_ref())),
+            step: Arc::new(step_tape(&task.model)),
+            measure: Arc::new(measure_tape(&task.model, &task.spec, task.tightening.as_ref())),
             adam: Adam::new(network.parameters.len()),
             network,
             held_out,
@@ -73,12 +89,14 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX
     }
 
     /// The softened measures `[starts, 1 or 2]` of rollouts under `network`: G and `V_check`.
-    pub fn measures(&self, network: &Bound, starts: &[[f32; NX]], temperature: f32) -> Tensor<2> {
-        let mut x = self.task.device.tensor(starts.as_flattened().to_vec(), [starts.len(), NX]);
+    pub fn measures(&self, network: &Bound, starts: States<'_>, temperature: f32) -> Tensor<2> {
+        let (device, count) = (&self.task.device, starts.len());
+        let mut x = device.tensor(starts.numbers().to_vec(), [count, starts.size()]);
         let mut states = vec![x.clone()];
-        for _ in 0..self.task.spec.horizon {
+        for step in 0..self.task.spec.horizon {
             let u = network.forward(x.clone());
-            x = apply(&self.step, temperature, [x, u]);
+            let step = device.tensor(vec![step as f32; count], [count, 1]);
+            x = apply(&self.step, temperature, [x, u, step]);
             states.push(x.clone());
         }
         apply(&self.measure, temperature, [Tensor::cat(states, 1)])
@@ -103,17 +121,16 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX
 
     /// The policy as the engine takes it.
     pub fn policy(&self) -> Result<Mlp> {
-        let order = self.task.system.states().map(|axis| axis.name);
-        self.network.export(order.to_vec())
+        self.network.export(self.task.order())
     }
 }
 
-impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Analytic<'_, S, NX, NU> {
+impl Learner for Analytic<'_> {
     fn update(&mut self, iteration: u64) -> Result<f64> {
         let (seed, batch) = (self.task.seed, self.settings.batch);
         let starts = self.task.mixture.draw(seed, purpose::START, iteration, batch);
         let bound = self.network.bind(&self.task.device);
-        let measures = self.measures(&bound, &starts, self.temperature(iteration));
+        let measures = self.measures(&bound, starts.view(), self.temperature(iteration));
         let loss = self.gain(measures).neg();
         let gradient = bound.gradient(&loss.backward());
         let progress = [iteration, self.settings.iterations];
@@ -127,9 +144,8 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Analytic<'
     }
 
     fn scores(&self) -> Result<Vec<f64>> {
-        let Task { system, backend, spec, .. } = self.task;
-        let plant = Plant { system, policy: &self.policy()? };
-        Ok(vec![share(successes(backend, plant, spec, &self.held_out)?.into_iter())])
+        let found = self.task.succeeds(self.policy()?, self.held_out.view())?;
+        Ok(vec![share(found.into_iter())])
     }
 
     fn networks(&self) -> Result<Vec<(&'static str, Mlp)>> {

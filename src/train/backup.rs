@@ -1,7 +1,7 @@
 //! The backup of reach-avoid learning: what a state is worth, given what the next one is.
 
+use crate::model::Model;
 use crate::real::Real;
-use crate::system::System;
 
 /// Both margins of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,9 +13,9 @@ pub struct Margins<R> {
 }
 
 impl<R: Real> Margins<R> {
-    /// The margins of `x`.
-    pub fn of<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S, x: [R; NX]) -> Self {
-        Self { target: system.target(x), constraint: system.constraint(x) }
+    /// The margins of `x` at a step.
+    pub fn of(model: &Model, x: &[R], step: u32) -> Self {
+        Self { target: model.target_at(x, step), constraint: model.constraint_at(x, step) }
     }
 
     /// What the state is worth where the next one is worth `next`: `min(c, max(r, gamma next))`,

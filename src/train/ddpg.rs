@@ -1,26 +1,27 @@
 //! Min-max DDPG: a critic of the reach-avoid backup, a control that ascends it, and a disturbance
 //! that descends it.
 
-use std::array::from_fn;
+use std::sync::Arc;
 
 use burn_tensor::Tensor;
 
 use super::agent::Agent;
 use super::analytic::{LAST, Task};
-use super::backup::Margins;
 use super::device::{floats, number};
-use super::disturbed::{Disturbed, pushed};
+use super::disturbed::{disturbed, pushed};
 use super::environments::Environments;
 use super::network::{Architecture, Network};
 use super::purpose;
 use super::replay::Replay;
+use super::rows::Rows;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::DdpgSettings;
+use super::starts::check_stationary;
 use crate::error::Result;
+use crate::model::Plant;
 use crate::policy::{Activation, Mlp, OutputActivation};
-use crate::rollout::{Plant, RolloutSpec, Stream};
-use crate::system::System;
+use crate::rollout::{RolloutSpec, StateList, States, Stream};
 
 /// The backup knows no horizon: what the critic tells is compared with rollouts so many times as
 /// long as those that are scored.
@@ -39,23 +40,28 @@ pub struct Game {
 
 /// Control, disturbance and critic under training.
 #[derive(Debug)]
-pub struct Ddpg<'a, S, const NX: usize, const NU: usize> {
-    task: Task<'a, S, NX>,
+pub struct Ddpg<'a> {
+    task: Task<'a>,
     entries: Vec<(usize, f32)>,
     settings: DdpgSettings,
-    environments: Environments<NX>,
+    environments: Environments,
     /// Rows of state, control and disturbance: all else follows from them.
     replay: Replay,
     control: Agent,
     disturbance: Agent,
     critic: Agent,
-    held_out: Vec<[f32; NX]>,
+    held_out: StateList,
 }
 
-impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU> {
+impl<'a> Ddpg<'a> {
     /// Random networks, and plants at their starts.
-    pub fn new(task: Task<'a, S, NX>, game: Game, settings: DdpgSettings) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] for a model whose formulas read the time: the backup knows none.
+    pub fn new(task: Task<'a>, game: Game, settings: DdpgSettings) -> Result<Self> {
+        check_stationary(&task.model)?;
         let Game { entries, states, hidden } = game;
+        let controls = task.model.controls.len();
         let random = |number: u32, inputs: Vec<[f32; 2]>, outputs, output, last| {
             let (hidden, activation) = (hidden.clone(), Activation::Relu);
             let shape = Architecture { inputs, hidden, outputs, activation, output };
@@ -64,11 +70,11 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
         };
         let actor =
             |number, outputs| random(number, states.clone(), outputs, OutputActivation::Tanh, LAST);
-        let acts = vec![[-1.0, 1.0]; NU + entries.len()];
+        let acts = vec![[-1.0, 1.0]; controls + entries.len()];
         let joint = [states.clone(), acts].concat();
         let horizon = task.spec.horizon;
-        Self {
-            control: actor(0, NU),
+        Ok(Self {
+            control: actor(0, controls),
             disturbance: actor(1, entries.len()),
             replay: Replay::new(settings.replay, joint.len()),
             critic: random(2, joint, 1, OutputActivation::Identity, 1.0),
@@ -82,37 +88,49 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
             entries,
             settings,
             task,
-        }
+        })
     }
 
-    /// The state after `x` under the acts `[NU + disturbances]`.
-    fn next(&self, x: [f32; NX], acts: &[f32]) -> [f32; NX] {
-        let (u, d) = acts.split_at(NU);
-        pushed(self.task.system.step(x, from_fn(|i| u[i])), &self.entries, d)
+    /// Acts of both players at a state: controls, then disturbances.
+    fn acts(&self) -> usize {
+        self.task.model.controls.len() + self.entries.len()
+    }
+
+    /// The states after `states` under the acts of each.
+    fn next(&self, states: States<'_>, acts: &[f32]) -> Vec<f32> {
+        let controls = self.task.model.controls.len();
+        let acts = || acts.chunks_exact(self.acts());
+        let u: Vec<f32> = acts().flat_map(|acts| &acts[..controls]).copied().collect();
+        let mut next = Rows::new(&self.task.model, states.numbers()).next(&u);
+        for (x, acts) in next.chunks_exact_mut(states.size()).zip(acts()) {
+            pushed(x, &self.entries, &acts[controls..]);
+        }
+        next
     }
 
     /// One step of every plant, remembered.
     fn explore(&mut self, iteration: u64) {
         let count = self.environments.len();
         let first = iteration * count as u64;
-        let states = self.environments.each();
-        let acts = self.tried(first, &states);
-        let mut next = Vec::with_capacity(count);
-        for (i, (x, acts)) in states.iter().zip(&acts).enumerate() {
-            self.replay.write(first + i as u64, &[&x[..], acts].concat());
-            next.push(self.next(*x, acts));
+        let numbers = self.environments.states.clone();
+        let states = States::new(&numbers, self.task.model.states.len());
+        let acts = self.tried(first, states);
+        for (i, (x, acts)) in states.iter().zip(acts.chunks_exact(self.acts())).enumerate() {
+            self.replay.write(first + i as u64, &[x, acts].concat());
         }
-        let system = self.task.system;
+        let next = self.next(states, &acts);
+        let rows = Rows::new(&self.task.model, &next);
+        let margins = rows.margins();
         // Where an episode ends says what is seen, not what it is worth: no state is terminal.
-        self.environments.advance(iteration, &next, |x| system.constraint(*x) <= 0.0);
+        self.environments.advance(iteration, rows.states, |i| margins[i].constraint <= 0.0);
     }
 
     /// What both players try at `states`, whose first is sample number `first`: their own acts
-    /// with noise, or for a share of the plants any act.
-    fn tried(&self, first: u64, states: &[[f32; NX]]) -> Vec<Vec<f32>> {
-        let size = NU + self.entries.len();
+    /// with noise, or for a share of the plants any act; row by row.
+    fn tried(&self, first: u64, states: States<'_>) -> Vec<f32> {
+        let size = self.acts();
         let device = &self.task.device;
-        let rows = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let rows = device.tensor(states.numbers().to_vec(), [states.len(), states.size()]);
         let [u, d] = [&self.control, &self.disturbance]
             .map(|actor| actor.network.fixed(device).forward(rows.clone()));
         let own = floats(Tensor::cat(vec![u, d], 1).inner());
@@ -123,17 +141,17 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
             // Spread over the parts of the mixture, which stand one after the other.
             if ((i + 1) as f64 * random).floor() > (i as f64 * random).floor() {
                 let drawn = uniform.in_box::<1>(&vec![-1.0; size], &vec![1.0; size], index);
-                return drawn.into_iter().map(|lane| lane.0[0]).collect();
+                return drawn.into_iter().map(|lane| lane.0[0]).collect::<Vec<_>>();
             }
             let noise = noise.normals(index, size);
             let noisy =
                 |(act, z): (&f32, f32)| (act + self.settings.noise as f32 * z).clamp(-1.0, 1.0);
             own.iter().zip(noise).map(noisy).collect()
         };
-        own.chunks_exact(size).enumerate().map(act).collect()
+        own.chunks_exact(size).enumerate().flat_map(act).collect()
     }
 
-    /// Rows that were remembered, `[batch, NX + NU + disturbances]`.
+    /// Rows that were remembered, each of a state and the acts there.
     fn remembered(&self, iteration: u64) -> Vec<f32> {
         let batch = self.settings.batch;
         let written = (iteration + 1) * self.environments.len() as u64;
@@ -148,29 +166,26 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
     /// What the critic should tell for `rows`: the backup of what the slow copies tell of the next
     /// states, held where the margins there say that it lies.
     fn wanted(&self, rows: &[f32]) -> Vec<f32> {
-        let rows: Vec<([f32; NX], &[f32])> = rows
-            .chunks_exact(NX + NU + self.entries.len())
-            .map(|row| (from_fn(|i| row[i]), &row[NX..]))
-            .collect();
-        let next: Vec<[f32; NX]> = rows.iter().map(|(x, acts)| self.next(*x, acts)).collect();
+        let (model, gamma) = (&self.task.model, self.task.spec.gamma);
+        let size = model.states.len();
+        let rows = || rows.chunks_exact(size + self.acts());
+        let states: Vec<f32> = rows().flat_map(|row| &row[..size]).copied().collect();
+        let acts: Vec<f32> = rows().flat_map(|row| &row[size..]).copied().collect();
+        let now = Rows::new(model, &states);
+        let next = self.next(now.states, &acts);
+        let next = Rows::new(model, &next);
         let slow = [&self.control.slow, &self.disturbance.slow, &self.critic.slow];
-        let mut wanted = self.told(slow, &next);
-        let (system, gamma) = (self.task.system, self.task.spec.gamma);
-        for ((value, next), (x, _)) in wanted.iter_mut().zip(next).zip(rows) {
-            let held = Margins::of(system, next).hold(*value);
-            *value = Margins::of(system, x).backup(gamma, held);
+        let mut wanted = self.told(slow, next.states);
+        for ((value, next), now) in wanted.iter_mut().zip(next.margins()).zip(now.margins()) {
+            *value = now.backup(gamma, next.hold(*value));
         }
         wanted
     }
 
     /// What `critic` tells of `states` under the acts of both players.
-    fn told(
-        &self,
-        [control, disturbance, critic]: [&Network; 3],
-        states: &[[f32; NX]],
-    ) -> Vec<f32> {
+    fn told(&self, [control, disturbance, critic]: [&Network; 3], states: States<'_>) -> Vec<f32> {
         let device = &self.task.device;
-        let x = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+        let x = device.tensor(states.numbers().to_vec(), [states.len(), states.size()]);
         let acts = [control, disturbance].map(|actor| actor.fixed(device).forward(x.clone()));
         floats(critic.fixed(device).forward(joint(&x, acts)).inner())
     }
@@ -192,10 +207,11 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
 
     /// One update of both players at the states of `rows`, from one reverse sweep.
     fn play(&mut self, rows: &[f32], progress: [u64; 2]) {
-        let columns = NX + NU + self.entries.len();
-        let states = rows.chunks_exact(columns).flat_map(|row| &row[..NX]).copied().collect();
+        let size = self.task.model.states.len();
+        let columns = size + self.acts();
+        let states = rows.chunks_exact(columns).flat_map(|row| &row[..size]).copied().collect();
         let device = &self.task.device;
-        let x = device.tensor(states, [rows.len() / columns, NX]);
+        let x = device.tensor(states, [rows.len() / columns, size]);
         let [control, disturbance] =
             [&self.control, &self.disturbance].map(|actor| actor.network.bind(device));
         let acts = [&control, &disturbance].map(|actor| actor.forward(x.clone()));
@@ -213,8 +229,8 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ddpg<'a, S, NX, NU
     /// # Errors
     /// [`crate::Error::Invalid`] if a parameter is not finite.
     pub fn exported(&self) -> Result<[Mlp; 3]> {
-        let order = self.task.system.states().map(|axis| axis.name).to_vec();
-        let controls = self.task.system.controls().map(|axis| axis.name);
+        let order = self.task.order();
+        let controls = self.task.model.controls.iter().map(|axis| axis.name.clone());
         let pushes = self.entries.iter().map(|(i, _)| format!("push_{}", order[*i]));
         let joint = order.iter().cloned().chain(controls).chain(pushes).collect();
         Ok([
@@ -230,7 +246,7 @@ fn joint(x: &Tensor<2>, [u, d]: [Tensor<2>; 2]) -> Tensor<2> {
     Tensor::cat(vec![x.clone(), u, d], 1)
 }
 
-impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ddpg<'_, S, NX, NU> {
+impl Learner for Ddpg<'_> {
     fn update(&mut self, iteration: u64) -> Result<f64> {
         self.explore(iteration);
         let rows = self.remembered(iteration);
@@ -249,16 +265,17 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ddpg<'_, S
     }
 
     fn scores(&self) -> Result<Vec<f64>> {
-        let Task { system, backend, spec, .. } = self.task;
-        let [policy, disturbance, _] = &self.exported()?;
-        let calm = successes(backend, Plant { system, policy }, spec, &self.held_out)?;
-        let system = &Disturbed::new(system, disturbance, &self.entries);
-        let plant = Plant { system, policy };
-        let pushed = successes(backend, plant, spec, &self.held_out)?;
+        let Task { model, backend, spec, .. } = &self.task;
+        let [policy, disturbance, _] = self.exported()?.map(Arc::new);
+        let starts = self.held_out.view();
+        let calm = self.task.succeeds(Arc::clone(&policy), starts)?;
+        let model = Arc::new(disturbed(model, &disturbance, &self.entries));
+        let plant = Plant::under(&model, policy);
+        let pushed = successes(backend, &plant, *spec, starts)?;
         let longer = RolloutSpec::new(LONGER * spec.horizon, spec.gamma)?;
-        let ever = successes(backend, plant, longer, &self.held_out)?;
+        let ever = successes(backend, &plant, longer, starts)?;
         let networks = [&self.control, &self.disturbance, &self.critic].map(|agent| &agent.network);
-        let told = self.told(networks, &self.held_out);
+        let told = self.told(networks, starts);
         let right = told.iter().zip(ever).map(|(told, success)| (*told > 0.0) == success);
         Ok(vec![share(calm.into_iter()), share(pushed.into_iter()), share(right)])
     }

@@ -26,6 +26,7 @@ pub mod purpose;
 pub mod record;
 pub mod replay;
 pub mod reward;
+pub mod rows;
 pub mod run;
 pub mod samples;
 pub mod score;

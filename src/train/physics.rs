@@ -14,11 +14,9 @@ use burn_tensor::Tensor;
 use super::device::{Host, parts, primitive, values};
 #[cfg(feature = "train-gpu")]
 use super::device::{Remote, on_host};
+use super::rows::{WIDTH, columns, store};
 use super::tape::Tape;
 use crate::real::Lanes;
-
-/// Rows that go through a tape side by side.
-const WIDTH: usize = 16;
 
 /// The outputs `[rows, outputs]` of `tape` for inputs that stand side by side, `[rows, columns]`
 /// each, with derivatives, on their device.
@@ -155,24 +153,6 @@ impl Batch {
     /// The rows of tile number `tile` as columns of lanes; lanes without a row hold zeros.
     fn load(&self, tile: usize, lanes: &mut Vec<Lanes<WIDTH>>) {
         lanes.clear();
-        for (values, columns) in &self.parts {
-            let first = lanes.len();
-            lanes.resize(first + columns, Lanes([0.0; WIDTH]));
-            let rows = values.chunks_exact(*columns).skip(tile * WIDTH).take(WIDTH);
-            for (lane, row) in rows.enumerate() {
-                for (lanes, value) in lanes[first..].iter_mut().zip(row) {
-                    lanes.0[lane] = *value;
-                }
-            }
-        }
-    }
-}
-
-/// Columns of lanes as rows.
-fn store(lanes: impl Iterator<Item = Lanes<WIDTH>>, rows: &mut [f32], columns: usize) {
-    for (i, lanes) in lanes.enumerate() {
-        for (row, value) in rows.chunks_exact_mut(columns).zip(lanes.0) {
-            row[i] = value;
-        }
+        self.parts.iter().for_each(|(values, count)| lanes.extend(columns(values, *count, tile)));
     }
 }

@@ -1,7 +1,5 @@
 //! Proximal policy optimisation on the ordinary reward of a task.
 
-use std::array::from_fn;
-
 use burn_tensor::Tensor;
 
 use super::adam::Adam;
@@ -11,14 +9,14 @@ use super::environments::Environments;
 use super::gae::{Step, advantages};
 use super::network::{Architecture, Network};
 use super::purpose;
-use super::reward::Reward;
+use super::reward::{Reward, Visited};
+use super::rows::Rows;
 use super::run::Learner;
-use super::score::{share, successes};
+use super::score::share;
 use super::settings::PpoSettings;
 use crate::error::Result;
 use crate::policy::{Activation, Mlp, OutputActivation};
-use crate::rollout::{Plant, Stream};
-use crate::system::System;
+use crate::rollout::{StateList, Stream};
 
 /// What is rewarded, and what the networks see.
 #[derive(Clone, Debug)]
@@ -36,26 +34,26 @@ pub struct Lesson {
 /// The control is normal around the network's output, which goes through tanh, with one standard
 /// deviation per control for all states; the plant clips it. What is exported is the mean.
 #[derive(Debug)]
-pub struct Ppo<'a, S, const NX: usize, const NU: usize> {
-    task: Task<'a, S, NX>,
+pub struct Ppo<'a> {
+    task: Task<'a>,
     settings: PpoSettings,
     reward: Reward,
-    environments: Environments<NX>,
+    environments: Environments,
     policy: Network,
     /// Logarithms of the standard deviations.
     spread: Vec<f32>,
     value: Network,
     /// Moments of policy, spread and value.
     moments: [Adam; 3],
-    held_out: Vec<[f32; NX]>,
+    held_out: StateList,
 }
 
 /// Steps of all plants under one policy, row by row.
 #[derive(Clone, Debug, Default)]
 struct Experience {
-    /// States, `NX` a row.
+    /// States, row by row.
     states: Vec<f32>,
-    /// Controls as drawn, not clipped, `NU` a row.
+    /// Controls as drawn, not clipped, row by row.
     controls: Vec<f32>,
     /// Logarithms of their densities, but for a constant.
     densities: Vec<f32>,
@@ -65,23 +63,24 @@ struct Experience {
     returns: Vec<f32>,
 }
 
-impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU> {
+impl<'a> Ppo<'a> {
     /// Random networks, and plants at their starts.
-    pub fn new(task: Task<'a, S, NX>, lesson: Lesson, settings: PpoSettings) -> Self {
+    pub fn new(task: Task<'a>, lesson: Lesson, settings: PpoSettings) -> Self {
         let Lesson { reward, states, hidden } = lesson;
+        let controls = task.model.controls.len();
         let random = |number: u32, outputs, output, last| {
             let (inputs, hidden, activation) = (states.clone(), hidden.clone(), Activation::Relu);
             let shape = Architecture { inputs, hidden, outputs, activation, output };
             Network::random(shape, Stream::new(task.seed, purpose::WEIGHT, number), last)
         };
-        let policy = random(0, NU, OutputActivation::Tanh, LAST);
+        let policy = random(0, controls, OutputActivation::Tanh, LAST);
         let value = random(1, 1, OutputActivation::Identity, 1.0);
-        let moments = [policy.parameters.len(), NU, value.parameters.len()].map(Adam::new);
+        let moments = [policy.parameters.len(), controls, value.parameters.len()].map(Adam::new);
         let (horizon, count) = (task.spec.horizon, settings.environments);
         Self {
             environments: Environments::new(task.mixture.clone(), task.seed, horizon, count),
             held_out: task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize),
-            spread: vec![settings.spread.ln() as f32; NU],
+            spread: vec![settings.spread.ln() as f32; controls],
             policy,
             value,
             moments,
@@ -96,7 +95,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
     /// # Errors
     /// [`crate::Error::Invalid`] if a parameter is not finite.
     pub fn exported(&self) -> Result<Mlp> {
-        self.policy.export(self.task.system.states().map(|axis| axis.name).to_vec())
+        self.policy.export(self.task.order())
     }
 
     /// Flies all plants for the steps of one iteration.
@@ -106,20 +105,26 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         let (mut flown, mut after) = (Vec::new(), Vec::new());
         for t in 0..steps {
             let number = iteration * steps as u64 + t as u64;
-            let states = self.environments.each();
-            let next = self.step(number, &states, &mut seen);
-            let system = self.task.system;
-            let violates = |x: &[f32; NX]| system.constraint(*x) <= 0.0;
-            let last = self.environments.advance(number, &next, violates);
-            for ((before, next), last) in states.iter().zip(&next).zip(last) {
-                let reward = self.reward.of(system, *before, *next);
-                flown.push((reward, violates(next), last));
+            let Environments { states, ages, .. } = self.environments.clone();
+            let next = self.step(number, [&states, &ages], &mut seen);
+            let later: Vec<f32> = ages.iter().map(|age| age + 1.0).collect();
+            let [before, after_it] = [(&states, &ages), (&next, &later)]
+                .map(|(states, steps)| Rows { steps, ..Rows::new(&self.task.model, states) });
+            let margins = [before.margins(), after_it.margins()];
+            let violates = |i: usize| margins[1][i].constraint <= 0.0;
+            let last = self.environments.advance(number, after_it.states, violates);
+            for (i, last) in last.into_iter().enumerate() {
+                let [before, next] =
+                    [(before, &margins[0]), (after_it, &margins[1])].map(|(rows, margins)| {
+                        Visited { state: rows.states.row(i), margins: margins[i] }
+                    });
+                flown.push((self.reward.of(before, next), violates(i), last));
             }
-            after.extend_from_slice(next.as_flattened());
+            after.extend_from_slice(&next);
         }
         let device = &self.task.device;
         let told = |rows: &[f32]| {
-            let rows = device.tensor(rows.to_vec(), [count * steps, NX]);
+            let rows = device.tensor(rows.to_vec(), [count * steps, rows.len() / (count * steps)]);
             floats(self.value.fixed(device).forward(rows).inner())
         };
         let values = told(&seen.states).into_iter().zip(told(&after));
@@ -139,22 +144,24 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
 
     /// One step of all plants, number `number`: draws their controls, notes them, and returns the
     /// next states.
-    fn step(&self, number: u64, states: &[[f32; NX]], seen: &mut Experience) -> Vec<[f32; NX]> {
-        let device = &self.task.device;
-        let rows = device.tensor(states.as_flattened().to_vec(), [states.len(), NX]);
+    fn step(&self, number: u64, [states, ages]: [&[f32]; 2], seen: &mut Experience) -> Vec<f32> {
+        let (device, model) = (&self.task.device, &self.task.model);
+        let (count, width) = (ages.len(), model.controls.len());
+        let rows = device.tensor(states.to_vec(), [count, model.states.len()]);
         let means = floats(self.policy.fixed(device).forward(rows).inner());
         let noise = Stream::new(self.task.seed, purpose::NOISE, 0);
-        let first = number * states.len() as u64;
-        let next = |(i, (x, mean)): (usize, (&[f32; NX], &[f32]))| {
-            let z = noise.normals(first + i as u64, NU);
-            let u: [f32; NU] = from_fn(|j| mean[j] + self.spread[j].exp() * z[j]);
+        let first = number * count as u64;
+        let mut controls = Vec::with_capacity(count * width);
+        for (i, mean) in means.chunks_exact(width).enumerate() {
+            let z = noise.normals(first + i as u64, width);
+            controls.extend((0..width).map(|j| mean[j] + self.spread[j].exp() * z[j]));
             let density = z.iter().zip(&self.spread).map(|(z, spread)| -0.5 * z * z - spread);
-            seen.states.extend_from_slice(x);
-            seen.controls.extend_from_slice(&u);
             seen.densities.push(density.sum());
-            self.task.system.step(*x, u)
-        };
-        states.iter().zip(means.chunks_exact(NU)).enumerate().map(next).collect()
+        }
+        let next = Rows { steps: ages, ..Rows::new(model, states) }.next(&controls);
+        seen.states.extend_from_slice(states);
+        seen.controls.extend(controls);
+        next
     }
 
     /// Advantages and returns of `steps`, plant after plant within each step.
@@ -178,10 +185,11 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
             let row = |&i: &usize| from[i * columns..(i + 1) * columns].iter().copied();
             device.tensor(chosen.iter().flat_map(row).collect(), [rows, columns])
         };
-        let states = take(&seen.states, NX);
+        let controls = self.spread.len();
+        let states = take(&seen.states, self.task.model.states.len());
         let (policy, value) = (self.policy.bind(device), self.value.bind(device));
-        let spread = device.tensor(self.spread.clone(), [1, NU]).require_grad();
-        let apart = take(&seen.controls, NU) - policy.forward(states.clone());
+        let spread = device.tensor(self.spread.clone(), [1, controls]).require_grad();
+        let apart = take(&seen.controls, controls) - policy.forward(states.clone());
         let density = density(apart, &spread);
         let ratio = (density - take(&seen.densities, 1)).exp();
         let gain = clipped(ratio, scaled(take(&seen.advantages, 1)), self.settings.clip);
@@ -189,7 +197,7 @@ impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Ppo<'a, S, NX, NU>
         let missed = value.forward(states) - take(&seen.returns, 1);
         let loss = (missed.clone() * missed).mean().mul_scalar(0.5) - gain - entropy;
         let slopes = loss.backward();
-        let spreads = spread.grad(&slopes).map_or(vec![0.0; NU], floats);
+        let spreads = spread.grad(&slopes).map_or(vec![0.0; controls], floats);
         let gradients = [policy.gradient(&slopes), spreads, value.gradient(&slopes)];
         let parameters =
             [&mut self.policy.parameters, &mut self.spread, &mut self.value.parameters];
@@ -230,7 +238,7 @@ fn scaled(advantages: Tensor<2>) -> Tensor<2> {
     centred / variance.sqrt().add_scalar(1e-8)
 }
 
-impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ppo<'_, S, NX, NU> {
+impl Learner for Ppo<'_> {
     fn update(&mut self, iteration: u64) -> Result<f64> {
         let seen = self.fly(iteration);
         let PpoSettings { epochs, batch, iterations, .. } = self.settings;
@@ -252,9 +260,8 @@ impl<S: System<NX, NU>, const NX: usize, const NU: usize> Learner for Ppo<'_, S,
     }
 
     fn scores(&self) -> Result<Vec<f64>> {
-        let Task { system, backend, spec, .. } = self.task;
-        let plant = Plant { system, policy: &self.exported()? };
-        Ok(vec![share(successes(backend, plant, spec, &self.held_out)?.into_iter())])
+        let found = self.task.succeeds(self.exported()?, self.held_out.view())?;
+        Ok(vec![share(found.into_iter())])
     }
 
     fn networks(&self) -> Result<Vec<(&'static str, Mlp)>> {

@@ -1,7 +1,7 @@
 //! The ordinary reward of a task, which knows neither measure nor certificate.
 
+use super::backup::Margins;
 use super::settings::RewardSettings;
-use crate::system::System;
 
 /// What a step earns: progress toward a goal, the target set, and a penalty for what is not safe.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,24 +12,25 @@ pub struct Reward {
     pub weights: RewardSettings,
 }
 
+/// A state and its margins.
+#[derive(Clone, Copy, Debug)]
+pub struct Visited<'a> {
+    /// The state.
+    pub state: &'a [f32],
+    /// Its margins.
+    pub margins: Margins<f32>,
+}
+
 impl Reward {
     /// The reward of a step from `before` to `after`, section 12 of `docs/method.md`.
     ///
     /// A violation that leads out of the target costs nothing: past a gate no fence holds.
-    pub fn of<S, const NX: usize, const NU: usize>(
-        &self,
-        system: &S,
-        before: [f32; NX],
-        after: [f32; NX],
-    ) -> f32
-    where
-        S: System<NX, NU>,
-    {
+    pub fn of(&self, before: Visited<'_>, after: Visited<'_>) -> f32 {
         let RewardSettings { progress, target, violation, .. } = self.weights;
-        let inside = [before, after].map(|x| system.target(x) > 0.0);
+        let inside = [before, after].map(|visited| visited.margins.target > 0.0);
         let [from, to] = inside.map(|inside| f64::from(u8::from(inside)));
-        let violated = system.constraint(after) <= 0.0 && !inside[0];
-        let nearer = f64::from(self.distance(&before) - self.distance(&after));
+        let violated = after.margins.constraint <= 0.0 && !inside[0];
+        let nearer = f64::from(self.distance(before.state) - self.distance(after.state));
         let penalty = if violated { violation } else { 0.0 };
         (progress * nearer + target * (to - from) - penalty) as f32
     }

@@ -1,18 +1,12 @@
 //! What value networks learn from: states, or states with a control, and the measures there.
 
 use super::purpose;
-use super::starts::Mixture;
-use crate::backend::Backend;
+use super::rows::{Rows, WIDTH, columns};
+use super::starts::{Mixture, check_stationary};
+use crate::backend::Program;
 use crate::error::Result;
-use crate::policy::Policy;
 use crate::real::Lanes;
-use crate::rollout::{
-    NON_FINITE, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
-};
-use crate::system::System;
-
-/// Rollouts side by side.
-const WIDTH: usize = 16;
+use crate::rollout::{NON_FINITE, Purpose, RolloutSpec, StateList, States, Stream};
 
 /// Inputs `[count, columns]`, row by row, and the measure of each row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,78 +20,70 @@ pub struct Samples {
 }
 
 /// Where samples come from.
-#[derive(Clone, Debug)]
-pub struct Source<'a, S, P, const NX: usize> {
-    /// System and policy whose rollouts are measured.
-    pub plant: Plant<'a, S, P>,
-    /// Who runs them.
-    pub backend: &'a Backend,
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// The plant whose rollouts are measured, prepared on who runs them.
+    pub program: &'a Program<'a>,
     /// Length and discount.
     pub spec: RolloutSpec,
     /// Where starts are drawn from.
-    pub mixture: Mixture<NX>,
+    pub mixture: &'a Mixture,
     /// Share of the states that the policy meets on its way, in place of starts.
     pub visited: f64,
     /// Seed of every stream.
     pub seed: u64,
 }
 
-impl<S, P, const NX: usize> Source<'_, S, P, NX> {
+impl Source<'_> {
     /// `count` states with `V(x)`, the measure of the policy's rollout.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn values<const NU: usize>(&self, purpose: Purpose, count: usize) -> Result<Samples>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let states = self.states::<NU>(purpose, count);
-        let measures = self.measures::<NU>(&states, self.spec)?;
-        Ok(Samples::new(NX, states.as_flattened().to_vec(), measures))
+    pub fn values(&self, purpose: Purpose, count: usize) -> Result<Samples> {
+        let states = self.states(purpose, count);
+        let measures = self.program.measures(&states, &self.spec)?;
+        Ok(Samples::new(states.view().size(), states.view().numbers().to_vec(), measures))
     }
 
     /// `count` states and random controls with `Q(x, u)`, the measure after one step under u and
     /// the others under the policy: `min(c, max(r, gamma V(f(x, u))))`, V over one step less.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for a horizon of one step, and those of the device.
-    pub fn action_values<const NU: usize>(&self, purpose: Purpose, count: usize) -> Result<Samples>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let system = self.plant.system;
-        let (low, high): (Vec<f32>, Vec<f32>) =
-            system.controls().iter().map(|axis| (axis.low, axis.high)).unzip();
-        let stream = Stream::new(self.seed, purpose::CONTROL, purpose.number());
-        let states = self.states::<NU>(purpose, count);
-        let control = |i: usize| -> [f32; NU] {
-            let drawn = stream.in_box::<1>(&low, &high, i as u64);
-            std::array::from_fn(|j| drawn[j].0[0])
-        };
-        let controls: Vec<[f32; NU]> = (0..count).map(control).collect();
-        let pairs = || states.iter().zip(&controls);
-        let next: Vec<[f32; NX]> = pairs().map(|(x, u)| system.step(*x, *u)).collect();
+    /// [`crate::Error::Invalid`] for a horizon of one step and for a model whose formulas read the time,
+    /// since V starts at the first step; and those of the device.
+    pub fn action_values(&self, purpose: Purpose, count: usize) -> Result<Samples> {
+        let model = &*self.program.plant().model;
+        check_stationary(model)?;
+        let states = self.states(purpose, count);
+        let (controls, states) = (self.controls(purpose, count), states.view());
+        let rows = Rows { model, states, steps: &[] };
+        let next = rows.next(&controls);
         let spec = RolloutSpec::new(self.spec.horizon - 1, self.spec.gamma)?;
-        let mut measures = self.measures::<NU>(&next, spec)?;
-        for (measure, x) in measures.iter_mut().zip(&states) {
-            let reached = system.target(*x).max(spec.gamma * *measure);
+        let mut measures = self.program.measures(States::new(&next, states.size()), &spec)?;
+        for (measure, margins) in measures.iter_mut().zip(rows.margins()) {
             // A state that is not finite stays marked as such.
             if *measure > NON_FINITE {
-                *measure = system.constraint(*x).min(reached);
+                *measure = margins.backup(spec.gamma, *measure);
             }
         }
-        let inputs = pairs().flat_map(|(x, u)| x.iter().chain(u).copied()).collect();
-        Ok(Samples::new(NX + NU, inputs, measures))
+        let acts = controls.chunks_exact(model.controls.len());
+        let inputs = states.iter().zip(acts).flat_map(|(x, u)| x.iter().chain(u).copied());
+        Ok(Samples::new(states.size() + model.controls.len(), inputs.collect(), measures))
+    }
+
+    /// Controls anywhere between their bounds, `[count, controls]`.
+    fn controls(&self, purpose: Purpose, count: usize) -> Vec<f32> {
+        let axes = &self.program.plant().model.controls;
+        let (low, high): (Vec<f32>, Vec<f32>) =
+            axes.iter().map(|axis| (axis.low, axis.high)).unzip();
+        let stream = Stream::new(self.seed, purpose::CONTROL, purpose.number());
+        let drawn = |i: u64| stream.in_box::<1>(&low, &high, i).into_iter().map(|lane| lane.0[0]);
+        (0..count as u64).flat_map(drawn).collect()
     }
 
     /// Starts, and states that the policy meets: of each group of starts those at one step.
-    fn states<const NU: usize>(&self, purpose: Purpose, count: usize) -> Vec<[f32; NX]>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+    fn states(&self, purpose: Purpose, count: usize) -> StateList {
+        let plant = self.program.plant();
         let mut states = self.mixture.draw(self.seed, purpose, 0, count);
         let met = (self.visited * count as f64).round() as usize;
         let starts = self.mixture.draw(self.seed, purpose, 1, count);
@@ -105,39 +91,18 @@ impl<S, P, const NX: usize> Source<'_, S, P, NX> {
         for group in 0..met.div_ceil(WIDTH) {
             // Spread over the parts of the mixture, which stand one after the other.
             let place = |i: usize| ((group * WIDTH + i) as f64 * stride) as usize;
-            let list: Vec<[f32; NX]> =
-                (0..WIDTH).map(|i| starts[place(i).min(count - 1)]).collect();
-            let mut x = [Lanes([0.0; WIDTH]); NX];
-            Starts::listed(&list).load(0, &mut x);
-            for _ in 0..group as u32 % (self.spec.horizon + 1) {
-                x = self.plant.system.step(x, self.plant.policy.control(x));
+            let rows = (0..WIDTH).flat_map(|i| starts.row(place(i).min(count - 1)));
+            let rows: Vec<f32> = rows.copied().collect();
+            let mut x = columns(&rows, starts.view().size(), 0);
+            for step in 0..group as u32 % (self.spec.horizon + 1) {
+                x = plant.model.next(&x, &plant.control(&x, step), step);
             }
             for i in 0..WIDTH.min(met - group * WIDTH) {
-                states[place(i)] = x.map(|lane: Lanes<WIDTH>| lane.0[i]);
+                let state: Vec<f32> = x.iter().map(|lane: &Lanes<WIDTH>| lane.0[i]).collect();
+                states.set(place(i), &state);
             }
         }
         states
-    }
-
-    /// The measure of each state.
-    fn measures<const NU: usize>(&self, states: &[[f32; NX]], spec: RolloutSpec) -> Result<Vec<f32>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let task = ReachAvoidTask {
-            starts: Starts::listed(states),
-            range: 0..states.len() as u64,
-            spec,
-            tightening: &Tightening::none(&spec),
-            query: Query::Measure,
-        };
-        let mut measures = Vec::with_capacity(states.len());
-        self.backend.reach_avoid(self.plant, &task, &mut |_, values| {
-            measures.extend_from_slice(values);
-            Ok(())
-        })?;
-        Ok(measures)
     }
 }
 

@@ -2,33 +2,28 @@
 
 use crate::backend::Backend;
 use crate::error::Result;
-use crate::policy::Policy;
-use crate::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
-use crate::system::System;
+use crate::model::Plant;
+use crate::rollout::{Query, ReachAvoidTask, RolloutSpec, Starts, States, Tightening};
 
 /// Whether the rollout from each of `starts` has G > 0.
 ///
 /// # Errors
 /// Those of the device.
-pub fn successes<S, P, const NX: usize, const NU: usize>(
+pub fn successes(
     backend: &Backend,
-    plant: Plant<'_, S, P>,
+    plant: &Plant,
     spec: RolloutSpec,
-    starts: &[[f32; NX]],
-) -> Result<Vec<bool>>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+    starts: States<'_>,
+) -> Result<Vec<bool>> {
     let task = ReachAvoidTask {
-        starts: Starts::listed(starts),
+        starts: Starts::Listed(starts),
         range: 0..starts.len() as u64,
         spec,
         tightening: &Tightening::none(&spec),
         query: Query::Sign,
     };
     let mut successes = Vec::with_capacity(starts.len());
-    backend.reach_avoid(plant, &task, &mut |_, signs| {
+    backend.prepare(plant)?.reach_avoid(&task, &mut |_, signs| {
         successes.extend(signs.iter().map(|sign| *sign > 0.0));
         Ok(())
     })?;

@@ -1,38 +1,32 @@
-//! A system as tapes: its step, and the softened measures of a whole rollout.
+//! A model as tapes: its step, and the softened measures of a whole rollout.
 
 use super::tape::Tape;
 use crate::formula::{Expr, record};
+use crate::model::Model;
 use crate::real::Real;
 use crate::rollout::{RolloutSpec, Tightening, reach_avoid};
-use crate::system::System;
 
-/// The step: states and controls `[NX + NU]` to the next states `[NX]`.
-pub fn step_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Tape {
-    Tape::hard(&record(NX + NU, |inputs| {
-        let x = std::array::from_fn(|i| inputs[i]);
-        let u = std::array::from_fn(|i| inputs[NX + i]);
-        system.step(x, u).to_vec()
+/// The step: states, controls and the number of the step to the next states.
+pub fn step_tape(model: &Model) -> Tape {
+    let (states, controls) = (model.states.len(), model.controls.len());
+    Tape::hard(&record(states + controls + 1, |inputs| {
+        let (x, rest) = inputs.split_at(states);
+        let (u, step) = rest.split_at(controls);
+        model.step.eval(&model.arguments_at(x, u, step[0]))
     }))
 }
 
-/// The measures of a rollout: its states `[T + 1, NX]` to the softened G and, where the margins are
+/// The measures of a rollout: its states `[T + 1, states]` to the softened G and, where the margins are
 /// to lose something, the softened `V_check` (`docs/method.md`, sections 1 and 4).
 ///
 /// Soft are the maximum and the minimum over time and the minima that the margins end in. At
 /// temperature 0 they would be the measures that the engine computes.
-pub fn measure_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &S,
-    spec: &RolloutSpec,
-    tightening: Option<&Tightening>,
-) -> Tape {
-    let steps = spec.horizon as usize + 1;
-    Tape::soft(&record(NX * steps, |inputs| {
-        let margins: Vec<(Expr, Expr)> = inputs
-            .chunks_exact(NX)
-            .map(|state| {
-                let x: [Expr; NX] = std::array::from_fn(|i| state[i]);
-                (system.target(x), system.constraint(x))
-            })
+pub fn measure_tape(model: &Model, spec: &RolloutSpec, tightening: Option<&Tightening>) -> Tape {
+    let states = model.states.len();
+    Tape::soft(&record(states * (spec.horizon as usize + 1), |inputs| {
+        let margins: Vec<(Expr, Expr)> = (0..)
+            .zip(inputs.chunks_exact(states))
+            .map(|(step, x)| (model.target_at(x, step), model.constraint_at(x, step)))
             .collect();
         let gamma = Real::lit(spec.gamma);
         let mut measures = vec![reach_avoid(margins.iter().copied(), gamma)];

@@ -1,19 +1,24 @@
 //! Where training draws its starts from: a mixture of boxes, each start a function of its index.
 
-use crate::rollout::{Purpose, Region, Starts, Stream};
+use crate::error::{Error, Result};
+use crate::model::Model;
+use crate::rollout::{Purpose, Region, Starts, StateList, Stream};
 
 /// Boxes with the share of the starts that each gets.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mixture<const NX: usize> {
-    /// Shares above 0, and boxes.
+pub struct Mixture {
+    /// Shares above 0, and boxes; at least one, all of the same size.
     pub parts: Vec<(f64, Region)>,
 }
 
-impl<const NX: usize> Mixture<NX> {
+impl Mixture {
     /// Batch number `batch` of `count` starts for `purpose`, part by part.
-    pub fn draw(&self, seed: u64, purpose: Purpose, batch: u64, count: usize) -> Vec<[f32; NX]> {
+    ///
+    /// # Panics
+    /// If the mixture has no part.
+    pub fn draw(&self, seed: u64, purpose: Purpose, batch: u64, count: usize) -> StateList {
         let total: f64 = self.parts.iter().map(|(share, _)| share).sum();
-        let mut starts = Vec::with_capacity(count);
+        let mut starts = StateList::new(self.parts[0].1.size());
         let mut filled = 0.0;
         for (number, (share, region)) in self.parts.iter().enumerate() {
             filled += share / total;
@@ -22,10 +27,24 @@ impl<const NX: usize> Mixture<NX> {
             let drawn = Starts::Drawn { region: region.clone(), stream };
             // Each batch has `count` indices of each part's stream to itself.
             let first = batch * count as u64;
-            let more =
-                (starts.len()..end.min(count)).map(|place| drawn.start_array(first + place as u64));
-            starts.extend(more.collect::<Vec<_>>());
+            for place in starts.len()..end.min(count) {
+                starts.push(&drawn.start(first + place as u64));
+            }
         }
         starts
     }
+}
+
+/// Refuses a model whose formulas read the time, for what is learned of states alone, whenever they are
+/// met.
+///
+/// # Errors
+/// [`Error::Invalid`] saying so.
+pub(super) fn check_stationary(model: &Model) -> Result<()> {
+    if model.is_stationary() {
+        return Ok(());
+    }
+    let problem = "its formulas read the time; train with `analytic`, `ppo` or `value`, which know at \
+                   which step a state is met, or make the time a state";
+    Err(Error::invalid("model", problem))
 }

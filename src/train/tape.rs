@@ -1,6 +1,6 @@
 //! A recorded graph with a reverse sweep: values forward, derivatives backward, in any [`Real`].
 
-use crate::formula::{Graph, Node};
+use crate::formula::{Graph, Node, record};
 use crate::real::Real;
 
 /// A recorded graph whose constants are folded and whose choices at the top may be soft.
@@ -23,13 +23,10 @@ enum Op {
 }
 
 impl Tape {
-    /// The graph as it is, its functions as polynomials.
-    ///
-    /// # Panics
-    /// If it calls a network: training knows systems in Rust alone, and they call none.
+    /// The graph as it is, its functions as polynomials and the networks that it calls neuron by
+    /// neuron: the sweep knows sums and products alone.
     pub fn hard(graph: &Graph) -> Self {
-        assert!(graph.calls.is_empty(), "the reverse sweep has no networks inside formulas");
-        let graph = graph.expanded();
+        let graph = record(graph.inputs, |inputs| graph.eval(inputs)).expanded();
         let ops = folded(&graph.nodes).into_iter().map(Op::Plain).collect();
         Self { inputs: graph.inputs, ops, outputs: graph.outputs }
     }

@@ -4,21 +4,22 @@ mod reinforced;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::backend::{Backend, Program};
 use crate::cli::options::{BackendName, Global};
 use crate::cli::progress::Progress;
 use crate::cli::{Outcome, devices, report};
-use crate::config::{Config, PlantWork, SystemWork};
+use crate::config::Config;
 use crate::error::Result;
 use crate::files::{Existing, Staged, json};
-use crate::model;
-use crate::policy::{Activation, OutputActivation, Policy};
+use crate::model::{Model, Plant};
+use crate::policy::{Activation, OutputActivation};
 use crate::report::train_html;
-use crate::rollout::{Plant, Purpose, Stream};
+use crate::rollout::{Purpose, Stream};
 use crate::scenario::{Context, provenance, tightened};
-use crate::system::System;
+use crate::system::Axis;
 use crate::train::analytic::{Analytic, LAST, Task};
 use crate::train::device::Device;
 use crate::train::network::{Architecture, Network};
@@ -43,12 +44,7 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path, out: &Path) -
     let (backend_used, watch) = (&backend, &progress);
     let training =
         Training { config, settings, backend: backend_used, device, watch, out, existing };
-    let mut trained = match settings.method {
-        Method::Analytic | Method::Ddpg | Method::Ppo => config.with_system(training)?,
-        Method::Value | Method::ActionValue => {
-            config.with_plant(&config.policy_source(folder)?, training)?
-        }
-    };
+    let mut trained = training.run(folder)?;
     progress.finish();
     devices::note_events(global, &backend);
     trained.record.events = backend.events();
@@ -117,76 +113,61 @@ impl Training<'_> {
     }
 }
 
-impl SystemWork for Training<'_> {
-    type Output = Trained;
-
-    fn run<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Trained>
-    where
-        S: System<NX, NU>,
-    {
+impl Training<'_> {
+    /// Does the work.
+    fn run(self, folder: &Path) -> Result<Trained> {
+        let model = Arc::new(self.config.carried_model()?);
         match self.settings.method {
-            Method::Ddpg => return self.ddpg(system),
-            Method::Ppo => return self.ppo(system),
-            _ => {}
+            Method::Analytic => self.analytic(&model),
+            Method::Ddpg => self.ddpg(&model),
+            Method::Ppo => self.ppo(&model),
+            Method::Value | Method::ActionValue => {
+                let plant = self.config.plant(&self.config.policy_source(folder)?)?;
+                self.value(&plant)
+            }
         }
+    }
+
+    /// A policy of `model` through its dynamics.
+    fn analytic(self, model: &Arc<Model>) -> Result<Trained> {
         let Self { config, settings, backend, watch, .. } = self;
-        let axes = system.states();
-        let checked = config.settings(&axes)?;
-        let inputs = (0..NX).map(|i| [checked.low[i], checked.high[i]]).collect();
-        let network = self.network(inputs, NU, OutputActivation::Tanh, LAST);
+        let (inputs, controls) = (self.intervals(model)?, model.controls.len());
+        let network = self.network(inputs, controls, OutputActivation::Tanh, LAST);
         // On a plant that is linear in the state, replayed controls deviate by the same under any
         // policy; on others this is the deviation under the untrained one.
-        let policy = &network.export(axes.each_ref().map(|axis| axis.name.clone()).to_vec())?;
-        let program = backend.prepare(&model::Plant::recorded(system, policy))?;
+        let policy = network.export(names(&model.states))?;
+        let program = backend.prepare(&Plant::under(model, policy))?;
         let context = Context { program: &program, watch };
         let tightening = match settings.analytic.certified > 0.0 {
-            true => Some(tightened(context, &checked)?.tightening),
+            true => Some(tightened(context, &config.settings(&model.states)?)?.tightening),
             false => None,
         };
-        let task = Task {
-            system,
-            backend,
-            device: self.device.clone(),
-            spec: checked.spec,
-            tightening,
-            mixture: config.mixture(&axes)?,
-            held_out: settings.held_out,
-            seed: config.seed,
-        };
+        let task = Task { tightening, ..self.task(model)? };
         let mut learner = Analytic::new(task, network, settings.analytic);
         self.train(&mut learner, settings.analytic.iterations, &program)
     }
-}
 
-impl PlantWork for Training<'_> {
-    type Output = Trained;
-
-    fn run<S, P, const NX: usize, const NU: usize>(self, plant: Plant<'_, S, P>) -> Result<Trained>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+    /// What rollouts of `plant` are worth.
+    fn value(self, plant: &Plant) -> Result<Trained> {
         let Self { config, settings, backend, .. } = self;
-        let (axes, controls) = (plant.system.states(), plant.system.controls());
-        let checked = config.settings(&axes)?;
+        let model = &plant.model;
+        let program = backend.prepare(plant)?;
         let source = Source {
-            plant,
-            backend,
-            spec: checked.spec,
-            mixture: config.mixture(&axes)?,
+            program: &program,
+            spec: config.settings(&model.states)?.spec,
+            mixture: &config.mixture(&model.states)?,
             visited: settings.value.visited,
             seed: config.seed,
         };
-        let mut inputs: Vec<_> = (0..NX).map(|i| [checked.low[i], checked.high[i]]).collect();
-        let mut order = axes.map(|axis| axis.name).to_vec();
+        let (mut inputs, mut order) = (self.intervals(model)?, names(&model.states));
         let acts = settings.method == Method::ActionValue;
         if acts {
-            inputs.extend(controls.each_ref().map(|axis| [axis.low, axis.high]));
-            order.extend(controls.map(|axis| axis.name));
+            inputs.extend(model.controls.iter().map(|axis| [axis.low, axis.high]));
+            order.extend(names(&model.controls));
         }
         let samples = |purpose: Purpose, count: u64| match acts {
-            true => source.action_values::<NU>(purpose, count as usize),
-            false => source.values::<NU>(purpose, count as usize),
+            true => source.action_values(purpose, count as usize),
+            false => source.values(purpose, count as usize),
         };
         let lesson = Lesson {
             name: if acts { "action_value" } else { "value" },
@@ -198,9 +179,13 @@ impl PlantWork for Training<'_> {
         };
         let network = self.network(inputs, 1, OutputActivation::Identity, 1.0);
         let mut learner = Value::new(lesson, network, settings.value)?;
-        let program = backend.prepare(&model::Plant::recorded(plant.system, plant.policy))?;
         self.train(&mut learner, settings.value.iterations, &program)
     }
+}
+
+/// Names of axes, in order.
+fn names(axes: &[Axis]) -> Vec<String> {
+    axes.iter().map(|axis| axis.name.clone()).collect()
 }
 
 /// Writes the results.

@@ -57,15 +57,14 @@ impl Description {
         let networks = self.table()?;
         let observe = policy.observe.as_deref();
         let observe = observe.map(|formulas| self.recorded("policy.observe", formulas, &networks));
-        let outputs = outputs(&network);
+        let (name, outputs) = (network.in_words(), outputs(&network));
         let act = policy.act.as_deref().map(|formulas| self.act(formulas, outputs, &networks));
-        let widths: Vec<String> = network.widths().iter().map(ToString::to_string).collect();
         let law = Law::Network {
             observe: observe.transpose()?,
             network: Arc::new(network),
             act: act.transpose()?,
         };
-        Ok(Controller::new(format!("mlp {}", widths.join("-")), law))
+        Ok(Controller::new(name, law))
     }
 
     /// Refuses a network that does not take what it would be given.

@@ -62,14 +62,11 @@ pub(super) fn all(data: &Data) -> Result<Vec<Workload>> {
     all.push(pairs(format!("deviation/{name}/{PAIRS}"), data, network, PAIRS)?);
     for samples in SAMPLES {
         let (spec, problem) = (data::mppi_spec(samples)?, data::mppi_problem(data.seed, 0));
-        let (system, cost) = (DroneRace::default(), data::lane());
-        let flops = flops::sample(&system, &cost, spec.horizon());
-        let planning = Planning::of(&system, cost, spec);
-        all.push(plan(format!("mppi/lane/{samples}"), flops, planning, problem));
+        let planning = Planning::of(&DroneRace::default(), data::lane(), spec);
+        all.push(plan(format!("mppi/lane/{samples}"), planning, problem));
     }
-    let DriveBenchmark { system, cost, planning, problem } = DriveBenchmark::new(DRIVE_SAMPLES)?;
-    let flops = flops::sample(&system, &cost, planning.spec.horizon());
-    all.push(plan(format!("mppi/drive/{DRIVE_SAMPLES}"), flops, planning, problem));
+    let DriveBenchmark { planning, problem, .. } = DriveBenchmark::new(DRIVE_SAMPLES)?;
+    all.push(plan(format!("mppi/drive/{DRIVE_SAMPLES}"), planning, problem));
     Ok(all)
 }
 
@@ -92,9 +89,9 @@ fn reach_avoid(
     count: u64,
     (query, steps): (Query, f64),
 ) -> Result<Workload> {
-    let plant = rollout::Plant { system: &DroneRace::default(), policy: &**policy };
-    let flops = flops::rollout(plant, steps);
-    let kind = Kind::Measures { rollouts: driven(data, policy, count)?, query };
+    let rollouts = driven(data, policy, count)?;
+    let flops = flops::rollout(&rollouts.plant, steps);
+    let kind = Kind::Measures { rollouts, query };
     Ok(Workload { name, unit: "rollout", units: count, steps, flops, kind })
 }
 
@@ -125,15 +122,16 @@ fn decided_steps(data: &Data, policy: &Mlp) -> Result<f64> {
 /// Pairs around the first `count` starts, the perturbed rollout under the nominal controls.
 fn pairs(name: String, data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Workload> {
     let steps = f64::from(data::HORIZON);
-    let plant = rollout::Plant { system: &DroneRace::default(), policy: &**network };
-    let flops = flops::replayed_pair(plant, steps);
+    let rollouts = driven(data, network, count)?;
+    let flops = flops::replayed_pair(&rollouts.plant, steps);
     let stream = Stream::new(data.seed, Purpose::USER, 0);
-    let kind = Kind::Pairs { rollouts: driven(data, network, count)?, radius: RADIUS, stream };
+    let kind = Kind::Pairs { rollouts, radius: RADIUS, stream };
     Ok(Workload { name, unit: "pair", units: count, steps, flops, kind })
 }
 
 /// One improvement of a plan, its noise drawn anew.
-fn plan(name: String, flops: f64, planning: Planning, problem: MppiProblem) -> Workload {
+fn plan(name: String, planning: Planning, problem: MppiProblem) -> Workload {
+    let flops = flops::sample(&planning);
     let settings = planning.spec.settings();
     let (units, steps) = (u64::from(settings.samples), f64::from(settings.horizon));
     Workload { name, unit: "sample", units, steps, flops, kind: Kind::Plan { planning, problem } }

@@ -8,7 +8,7 @@ use crate::cli::inputs::inputs;
 use crate::config::{Config, Overrides, PolicySource, check_network, no_formula};
 use crate::error::{Error, Result};
 use crate::files::{Inputs, StateReader};
-use crate::model::Plant;
+use crate::model::{Model, Plant};
 use crate::policy::Mlp;
 use crate::race::controller::{Name, World};
 use crate::race::settings::RaceSettings;
@@ -123,9 +123,9 @@ fn system(config: &Config) -> Result<DroneRace> {
 /// The policy, a network that fits.
 fn policy_of<'a>(system: &DroneRace, policy: &'a PolicySource) -> Result<&'a Mlp> {
     match policy {
-        PolicySource::Formula(name) => Err(no_formula(system, name, "none")),
+        PolicySource::Formula(name) => Err(no_formula(system.name(), name, "none")),
         PolicySource::Network { path, network, .. } => {
-            check_network(system, path, network)?;
+            check_network(&Model::of(system.clone()), path, network)?;
             Ok(network)
         }
     }

@@ -1,9 +1,10 @@
 //! Training by reinforcement.
 
+use std::sync::Arc;
+
 use super::Training;
 use crate::error::Result;
-use crate::model::Plant;
-use crate::system::System;
+use crate::model::{Model, Plant};
 use crate::train::analytic::Task;
 use crate::train::ddpg::{Ddpg, Game};
 use crate::train::ppo::{Lesson, Ppo};
@@ -11,68 +12,51 @@ use crate::train::reward::Reward;
 use crate::train::run::Trained;
 
 impl Training<'_> {
-    /// Control, disturbance and critic of `system`.
-    pub(super) fn ddpg<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Trained>
-    where
-        S: System<NX, NU>,
-    {
+    /// Control, disturbance and critic of `model`.
+    pub(super) fn ddpg(self, model: &Arc<Model>) -> Result<Trained> {
         let game = Game {
-            entries: self.config.disturbed(&system.states())?,
-            states: self.intervals(system)?,
+            entries: self.config.disturbed(&model.states)?,
+            states: self.intervals(model)?,
             hidden: self.settings.hidden.clone(),
         };
         let settings = &self.settings.ddpg;
-        let mut learner = Ddpg::new(self.task(system)?, game, settings.clone());
-        let [policy, ..] = &learner.exported()?;
-        let program = self.backend.prepare(&Plant::recorded(system, policy))?;
+        let mut learner = Ddpg::new(self.task(model)?, game, settings.clone())?;
+        let [policy, ..] = learner.exported()?;
+        let program = self.backend.prepare(&Plant::under(model, policy))?;
         self.train(&mut learner, settings.iterations, &program)
     }
 
-    /// A policy of `system` on its ordinary reward.
-    pub(super) fn ppo<S, const NX: usize, const NU: usize>(self, system: &S) -> Result<Trained>
-    where
-        S: System<NX, NU>,
-    {
+    /// A policy of `model` on its ordinary reward.
+    pub(super) fn ppo(self, model: &Arc<Model>) -> Result<Trained> {
         let settings = &self.settings.ppo;
-        let goal = self.config.goal(&system.states())?;
+        let goal = self.config.goal(&model.states)?;
         let lesson = Lesson {
             reward: Reward { goal, weights: settings.reward.clone() },
-            states: self.intervals(system)?,
+            states: self.intervals(model)?,
             hidden: self.settings.hidden.clone(),
         };
-        let mut learner = Ppo::new(self.task(system)?, lesson, settings.clone());
-        let policy = &learner.exported()?;
-        let program = self.backend.prepare(&Plant::recorded(system, policy))?;
+        let mut learner = Ppo::new(self.task(model)?, lesson, settings.clone());
+        let program = self.backend.prepare(&Plant::under(model, learner.exported()?))?;
         self.train(&mut learner, settings.iterations, &program)
     }
 
-    /// What is trained on `system`, on what.
-    fn task<'a, S, const NX: usize, const NU: usize>(
-        &'a self,
-        system: &'a S,
-    ) -> Result<Task<'a, S, NX>>
-    where
-        S: System<NX, NU>,
-    {
-        let axes = system.states();
+    /// What is trained on `model`, on what.
+    pub(super) fn task(&self, model: &Arc<Model>) -> Result<Task<'_>> {
         Ok(Task {
-            system,
+            model: Arc::clone(model),
             backend: self.backend,
             device: self.device.clone(),
-            spec: self.config.settings(&axes)?.spec,
+            spec: self.config.settings(&model.states)?.spec,
             tightening: None,
-            mixture: self.config.mixture(&axes)?,
+            mixture: self.config.mixture(&model.states)?,
             held_out: self.settings.held_out,
             seed: self.config.seed,
         })
     }
 
     /// The box of the states, interval by interval.
-    fn intervals<S, const NX: usize, const NU: usize>(&self, system: &S) -> Result<Vec<[f32; 2]>>
-    where
-        S: System<NX, NU>,
-    {
-        let checked = self.config.settings(&system.states())?;
-        Ok((0..NX).map(|i| [checked.low[i], checked.high[i]]).collect())
+    pub(super) fn intervals(&self, model: &Model) -> Result<Vec<[f32; 2]>> {
+        let checked = self.config.settings(&model.states)?;
+        Ok(checked.low.into_iter().zip(checked.high).map(|(low, high)| [low, high]).collect())
     }
 }
