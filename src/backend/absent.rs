@@ -4,12 +4,8 @@ use std::ops::Range;
 
 use super::{Event, MeasureSink, PairSink};
 use crate::error::{Error, Result};
-use crate::model;
-use crate::policy::Policy;
-use crate::rollout::{
-    DeviationTask, Farthest, MppiTask, PlanTally, Planning, Plant, ReachAvoidTask,
-};
-use crate::system::System;
+use crate::model::Plant;
+use crate::rollout::{DeviationTask, Farthest, MppiTask, PlanTally, Planning, ReachAvoidTask};
 
 /// An adapter: none, since this build knows none. No value of it exists, so that nothing below is
 /// ever called, and code over both backends need not ask which build it is in.
@@ -36,33 +32,7 @@ impl Gpu {
         match *self {}
     }
 
-    pub(super) fn prepare(&self, _plant: &model::Plant) -> Result<Prepared<'_>> {
-        match *self {}
-    }
-
-    pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
-        &self,
-        _plant: Plant<'_, S, P>,
-        _task: &ReachAvoidTask<'_>,
-        _sink: MeasureSink<'_>,
-    ) -> Result<()>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        match *self {}
-    }
-
-    pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
-        &self,
-        _plant: Plant<'_, S, P>,
-        _task: &DeviationTask<'_>,
-        _sink: PairSink<'_>,
-    ) -> Result<Vec<Farthest>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
+    pub(super) fn prepare(&self, _plant: &Plant) -> Result<Prepared<'_>> {
         match *self {}
     }
 

@@ -15,11 +15,6 @@ mod program;
 mod sink;
 mod task;
 
-use crate::error::Result;
-use crate::policy::Policy;
-use crate::rollout::{DeviationTask, Farthest, Plant, ReachAvoidTask};
-use crate::system::System;
-
 use cpu::Cpu;
 use gpu::Gpu;
 
@@ -64,47 +59,6 @@ impl Backend {
         match self {
             Self::Cpu(cpu) => cpu.events(),
             Self::Gpu(gpu) => gpu.events(),
-        }
-    }
-
-    /// Reach-avoid measure, or its sign, of each start of `task`; sent to `sink` in order.
-    ///
-    /// # Errors
-    /// Those of the device, and the first of the sink.
-    pub fn reach_avoid<S, P, const NX: usize, const NU: usize>(
-        &self,
-        plant: Plant<'_, S, P>,
-        task: &ReachAvoidTask<'_>,
-        sink: MeasureSink<'_>,
-    ) -> Result<()>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        match self {
-            Self::Cpu(cpu) => cpu.reach_avoid(plant, task, sink),
-            Self::Gpu(gpu) => gpu.reach_avoid(plant, task, sink),
-        }
-    }
-
-    /// Rolls pairs out side by side: the farthest pair of each step, `[T + 1]`, and the measures
-    /// of each pair sent to `sink` in order.
-    ///
-    /// # Errors
-    /// Those of the device, and the first of the sink.
-    pub fn deviation<S, P, const NX: usize, const NU: usize>(
-        &self,
-        plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_>,
-        sink: PairSink<'_>,
-    ) -> Result<Vec<Farthest>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        match self {
-            Self::Cpu(cpu) => cpu.deviation(plant, task, sink),
-            Self::Gpu(gpu) => gpu.deviation(plant, task, sink),
         }
     }
 }

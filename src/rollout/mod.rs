@@ -6,7 +6,6 @@ mod mppi_settings;
 mod noise;
 mod philox;
 mod planning;
-mod reference;
 mod region;
 pub mod replay;
 mod sample;
@@ -23,11 +22,10 @@ pub use philox::philox;
 pub use planning::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiTask, Planning, ValueTerm,
 };
-pub use reference::{measure, pair_measures, trajectory};
 pub use region::{Ball, Region, sample_ball};
 pub use sample::{GENERATOR, Purpose, Stream, normal_pair};
 pub use spec::{
-    DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Plant, Query, ReachAvoidTask,
+    DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Query, ReachAvoidTask,
     RolloutSpec, Tightening,
 };
 pub use starts::{Pairs, Starts};

@@ -10,23 +10,6 @@ use crate::error::{Error, Result};
 /// Longest horizon, steps.
 pub const MAX_HORIZON: u32 = 10_000;
 
-/// A system and the policy that drives it.
-#[derive(Debug)]
-pub struct Plant<'a, S, P> {
-    /// Dynamics and margins.
-    pub system: &'a S,
-    /// The controls.
-    pub policy: &'a P,
-}
-
-impl<S, P> Clone for Plant<'_, S, P> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<S, P> Copy for Plant<'_, S, P> {}
-
 /// Length and discount of a rollout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RolloutSpec {

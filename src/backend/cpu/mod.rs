@@ -36,16 +36,13 @@ pub(super) use self::prepared::Prepared;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
-use self::tile::{Drive, Driven};
-use super::task::check_task;
+use self::tile::Driven;
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
 use crate::files::{CONFIG_BYTES, read_text};
-use crate::policy::{Mlp, Policy};
+use crate::policy::Mlp;
 use crate::real::simd::Instructions;
-use crate::rollout::{DeviationTask, Farthest, PairMeasure, Plant, ReachAvoidTask};
-use crate::system::System;
-use crate::tile::{Clock, CompiledPolicy, CompiledSystem, Layout};
+use crate::rollout::{DeviationTask, Farthest, PairMeasure, ReachAvoidTask};
 
 /// The host's processor.
 #[derive(Debug)]
@@ -131,34 +128,6 @@ impl Cpu {
         self.pool.current_num_threads()
     }
 
-    /// See [`super::Backend::reach_avoid`].
-    pub(super) fn reach_avoid<S, P, const NX: usize, const NU: usize>(
-        &self,
-        plant: Plant<'_, S, P>,
-        task: &ReachAvoidTask<'_>,
-        sink: MeasureSink<'_>,
-    ) -> Result<()>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        self.with_compiled(plant, |plant| self.measures(plant, task, sink))
-    }
-
-    /// See [`super::Backend::deviation`].
-    pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
-        &self,
-        plant: Plant<'_, S, P>,
-        task: &DeviationTask<'_>,
-        sink: PairSink<'_>,
-    ) -> Result<Vec<Farthest>>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        self.with_compiled(plant, |plant| self.pairs(plant, task, sink))
-    }
-
     /// Measures of starts under any plant.
     fn measures(
         &self,
@@ -166,7 +135,6 @@ impl Cpu {
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
-        check_task(&task.starts, task.range.end, task.tightening, &task.spec)?;
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, plant.widest());
@@ -188,7 +156,6 @@ impl Cpu {
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
-        check_task(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
@@ -206,37 +173,6 @@ impl Cpu {
             sink(chunk.first, &measures)?;
         }
         Ok(farthest)
-    }
-
-    /// Calls `run` with a system and a policy as compiled.
-    fn with_compiled<S, P, T, const NX: usize, const NU: usize>(
-        &self,
-        Plant { system, policy }: Plant<'_, S, P>,
-        run: impl FnOnce(Driven<'_>) -> Result<T>,
-    ) -> Result<T>
-    where
-        S: System<NX, NU>,
-        P: Policy<NX, NU>,
-    {
-        let network = match policy.network() {
-            Some(network) => {
-                Packed::check(network, NX, NU)?;
-                Some(self.packed(network))
-            }
-            None => None,
-        };
-        let formula = CompiledPolicy(policy);
-        let drive = match &network {
-            Some(network) => Drive::Network { network, observe: None, act: None },
-            None => Drive::Formula(&formula),
-        };
-        run(Driven {
-            system: &CompiledSystem(system),
-            drive,
-            layout: Layout { states: NX, controls: NU, own: 0 },
-            clock: Clock::Ignored,
-            with: self.instructions,
-        })
     }
 
     /// `network`, packed for the kernel.

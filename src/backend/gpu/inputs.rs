@@ -5,7 +5,6 @@ use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
 use super::upload::Upload;
-use crate::error::{Error, Result};
 use crate::rollout::{Region, RolloutSpec, Starts, Tightening};
 
 /// Bytes of a vector of 4 numbers.
@@ -62,22 +61,13 @@ impl Inputs {
 
     /// Sets the schedule, per step: discount, and what both margins lose. The discount is multiplied
     /// up step by step in f32, as the host's fold does.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if the tightening has not one entry per step.
-    pub(super) fn set_schedule(
-        &mut self,
-        spec: &RolloutSpec,
-        tightening: &Tightening,
-    ) -> Result<()> {
-        check_tightening(spec, tightening)?;
+    pub(super) fn set_schedule(&mut self, spec: &RolloutSpec, tightening: &Tightening) {
         let losses = tightening.target.iter().zip(&tightening.constraint);
         let mut discount = 1.0;
         for (step, (&target, &constraint)) in losses.enumerate() {
             self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, 0.0]);
             discount *= spec.gamma;
         }
-        Ok(())
     }
 
     /// Sets the region that starts are drawn from, one vector per coordinate, as
@@ -114,20 +104,4 @@ impl Inputs {
     pub(super) fn write(&mut self, device: &Device, batch: &Batch<'_>) {
         self.0.write(device, batch);
     }
-}
-
-/// # Errors
-/// [`Error::Invalid`] if the tightening has not one entry per step.
-fn check_tightening(spec: &RolloutSpec, tightening: &Tightening) -> Result<()> {
-    let rows = spec.horizon as usize + 1;
-    let (target, constraint) = (tightening.target.len(), tightening.constraint.len());
-    if target == rows && constraint == rows {
-        return Ok(());
-    }
-    let problem = format!(
-        "{target} and {constraint} entries for the target and constraint margin; \
-         a horizon of {} needs {rows} each",
-        spec.horizon
-    );
-    Err(Error::invalid("tightening", problem))
 }

@@ -9,7 +9,7 @@ use super::plan::{Plan, Work};
 use super::program::Program;
 use super::source::Source;
 use super::workspace::{Shape, Workspace};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::rollout::{RolloutSpec, Starts, Tightening};
 
 /// What a call rolls out: a plant, and the values of its parameters.
@@ -42,14 +42,13 @@ impl<'a> Job<'a> {
     /// The call for `request` of `subject`: its inputs set, nothing written or submitted yet.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the parts of the request do not fit, and those of the device.
+    /// Those of the device.
     pub(super) fn new(
         (opened, attempt): (&'a Opened, &Attempt),
         subject: Subject<'_>,
         request: Request<'_>,
     ) -> Result<Self> {
         let Request { work, starts, spec, tightening, count } = request;
-        check_starts(starts, subject.source.text.states())?;
         // Before the first buffer is made: what fails from here on is this call's.
         let flight = opened.flight();
         let program = opened.program(&flight, subject.source)?;
@@ -58,7 +57,7 @@ impl<'a> Job<'a> {
         let shape = Shape { work, listed, horizon: spec.horizon, plan };
         let mut space = program.take(&flight, shape)?;
         space.inputs.set_values(subject.values);
-        space.inputs.set_schedule(spec, tightening)?;
+        space.inputs.set_schedule(spec, tightening);
         space.inputs.set_region(starts);
         Ok(Self { flight, plan, space, program })
     }
@@ -67,17 +66,4 @@ impl<'a> Job<'a> {
     pub(super) fn finish(self) {
         self.program.keep(self.space);
     }
-}
-
-/// # Errors
-/// [`Error::Invalid`] for an empty list of starts, and for starts that are no states.
-fn check_starts(starts: &Starts<'_>, states: usize) -> Result<()> {
-    let problem = match starts {
-        Starts::Listed(list) if list.is_empty() => "the list is empty".to_owned(),
-        _ if starts.size() != states => {
-            format!("starts of {} numbers; the model has {states} states", starts.size())
-        }
-        _ => return Ok(()),
-    };
-    Err(Error::invalid("starts", problem))
 }

@@ -42,7 +42,6 @@ mod source;
 mod state;
 mod timing;
 mod traffic;
-mod typed;
 mod upload;
 mod workspace;
 

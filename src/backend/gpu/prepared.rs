@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use super::adapter::Gpu;
 use super::job::Subject;
-use super::recover::{self, Instead};
+use super::recover;
 use super::source::Source;
 use super::traffic::Count;
-use crate::backend::cpu::Cpu;
 use crate::backend::{MeasureSink, PairSink};
 use crate::error::{Error, Result};
 use crate::model::Plant;
@@ -63,26 +62,5 @@ impl Prepared<'_> {
     /// What calls roll out.
     fn subject(&self) -> Subject<'_> {
         Subject { source: &self.source, values: &self.values }
-    }
-}
-
-/// A CPU prepares the plant when it takes over, once per call that it takes over.
-impl Instead for Plant {
-    fn reach_avoid(
-        &self,
-        cpu: &Cpu,
-        task: &ReachAvoidTask<'_>,
-        sink: MeasureSink<'_>,
-    ) -> Result<()> {
-        cpu.prepare(self)?.reach_avoid(cpu, task, sink)
-    }
-
-    fn deviation(
-        &self,
-        cpu: &Cpu,
-        task: &DeviationTask<'_>,
-        sink: PairSink<'_>,
-    ) -> Result<Vec<Farthest>> {
-        cpu.prepare(self)?.deviation(cpu, task, sink)
     }
 }

@@ -16,6 +16,7 @@ use super::{deviation, mppi, reach_avoid};
 use crate::backend::cpu::Cpu;
 use crate::backend::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
+use crate::model::Plant;
 use crate::rollout::{DeviationTask, Farthest, MppiTask, PairMeasure, PlanTally, ReachAvoidTask};
 
 /// Who makes an attempt.
@@ -42,29 +43,10 @@ impl Progress {
     }
 }
 
-/// The CPU's part of a call, for where the adapter fails for good.
-pub(super) trait Instead {
-    /// See [`crate::backend::Program::reach_avoid`].
-    fn reach_avoid(
-        &self,
-        cpu: &Cpu,
-        task: &ReachAvoidTask<'_>,
-        sink: MeasureSink<'_>,
-    ) -> Result<()>;
-
-    /// See [`crate::backend::Program::deviation`].
-    fn deviation(
-        &self,
-        cpu: &Cpu,
-        task: &DeviationTask<'_>,
-        sink: PairSink<'_>,
-    ) -> Result<Vec<Farthest>>;
-}
-
 /// See [`crate::backend::Program::reach_avoid`].
 pub(super) fn reach_avoid(
     gpu: &Gpu,
-    (subject, instead): (Subject<'_>, &dyn Instead),
+    (subject, plant): (Subject<'_>, &Plant),
     task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
 ) -> Result<()> {
@@ -76,7 +58,8 @@ pub(super) fn reach_avoid(
             Runner::Adapter(opened, attempt) => {
                 reach_avoid::reach_avoid((opened, attempt), subject, &task, sink)
             }
-            Runner::Cpu(cpu) => instead.reach_avoid(cpu, &task, sink),
+            // A CPU prepares the plant when it takes over, once per call that it takes over.
+            Runner::Cpu(cpu) => cpu.prepare(plant)?.reach_avoid(cpu, &task, sink),
         }
     })
 }
@@ -84,7 +67,7 @@ pub(super) fn reach_avoid(
 /// See [`crate::backend::Program::deviation`].
 pub(super) fn deviation(
     gpu: &Gpu,
-    (subject, instead): (Subject<'_>, &dyn Instead),
+    (subject, plant): (Subject<'_>, &Plant),
     task: &DeviationTask<'_>,
     sink: PairSink<'_>,
 ) -> Result<Vec<Farthest>> {
@@ -99,7 +82,7 @@ pub(super) fn deviation(
                 deviation::deviation((opened, attempt), subject, &task, (&mut farthest, sink))
             }
             Runner::Cpu(cpu) => {
-                let rest = instead.deviation(cpu, &task, sink)?;
+                let rest = cpu.prepare(plant)?.deviation(cpu, &task, sink)?;
                 let steps = farthest.iter_mut().zip(rest);
                 steps.for_each(|(farthest, found)| *farthest = farthest.merge(found));
                 Ok(())

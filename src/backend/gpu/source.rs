@@ -66,15 +66,15 @@ fn same_bits(one: &Mlp, other: &Mlp) -> bool {
 #[derive(Default)]
 pub(super) struct Sources(Mutex<Vec<Remembered>>);
 
-/// A source, and the plant that it was printed for, where that is shared.
+/// A source, and the plant that it was last asked for with.
 struct Remembered {
-    plant: Option<Plant>,
+    plant: Plant,
     source: Arc<Source>,
 }
 
 impl Sources {
-    /// The source of a plant that is shared: a look-up if the same one was asked for before; else
-    /// `printed` notes that it was printed.
+    /// The source of `plant`: a look-up if the same one was asked for before; else `printed` notes that
+    /// it was printed.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] where its parts do not fit.
@@ -84,12 +84,7 @@ impl Sources {
         }
         printed();
         let source = Source::new(&plant.model, &plant.controller)?;
-        Ok(self.remember(Some(plant.clone()), source))
-    }
-
-    /// The source that is the same as `source`, if one was asked for before, else itself.
-    pub(super) fn shared(&self, source: Source) -> Arc<Source> {
-        self.remember(None, source)
+        Ok(self.remember(plant.clone(), source))
     }
 
     /// The source of this very plant.
@@ -99,23 +94,16 @@ impl Sources {
                 && Arc::ptr_eq(&known.controller, &plant.controller)
         };
         let list = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = list.iter().find(|known| known.plant.as_ref().is_some_and(same));
+        let found = list.iter().find(|known| same(&known.plant));
         found.map(|known| Arc::clone(&known.source))
     }
 
-    fn remember(&self, plant: Option<Plant>, source: Source) -> Arc<Source> {
+    /// Notes `source`, or the one that is the same as it, as the last one that was asked for.
+    fn remember(&self, plant: Plant, source: Source) -> Arc<Source> {
         let mut list = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = list.iter().position(|known| known.source.same(&source));
-        // The last one asked for stands last.
-        let entry = match known {
-            Some(at) => {
-                let Remembered { plant: before, source } = list.remove(at);
-                Remembered { plant: plant.or(before), source }
-            }
-            None => Remembered { plant, source: Arc::new(source) },
-        };
-        let source = Arc::clone(&entry.source);
-        list.push(entry);
+        let source = known.map_or_else(|| Arc::new(source), |at| list.remove(at).source);
+        list.push(Remembered { plant, source: Arc::clone(&source) });
         if list.len() > REMEMBERED {
             list.remove(0);
         }
