@@ -48,14 +48,14 @@ pub fn control(controller: &Controller) -> f64 {
 }
 
 /// Of both margins of a state and its part in the measure.
-pub fn judge(model: &Model) -> f64 {
+pub fn scored(model: &Model) -> f64 {
     formula(&Graph::joined(&[&model.target, &model.constraint])) + FOLD
 }
 
 /// Of the measure of a rollout of `steps` steps, which may be a mean.
 pub fn rollout(plant: &Plant, steps: f64) -> f64 {
     let Plant { model, controller } = plant;
-    steps * (control(controller) + formula(&model.step)) + (steps + 1.0) * judge(model)
+    steps * (control(controller) + formula(&model.step)) + (steps + 1.0) * scored(model)
 }
 
 /// Of a pair whose perturbed rollout takes the controls of the nominal one; drawing it apart.
@@ -63,7 +63,7 @@ pub fn replayed_pair(plant: &Plant, steps: f64) -> f64 {
     let model = &plant.model;
     // Per state a difference, a square and a sum; then the root.
     let distance = 3.0 * model.states.len() as f64 + 1.0;
-    let perturbed = steps * formula(&model.step) + (steps + 1.0) * judge(model);
+    let perturbed = steps * formula(&model.step) + (steps + 1.0) * scored(model);
     rollout(plant, steps) + perturbed + (steps + 1.0) * distance
 }
 
@@ -115,7 +115,7 @@ mod tests {
     fn margins_of_the_race() {
         let target = 3.0 + 6.0 + 3.0;
         let constraint = 5.0 + 5.0 + 8.0 + 2.0;
-        assert_eq!(judge(&Model::of(DroneRace::default())), target + constraint + FOLD);
+        assert_eq!(scored(&Model::of(DroneRace::default())), target + constraint + FOLD);
     }
 
     #[test]

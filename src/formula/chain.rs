@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::call::Call;
 use super::node::Node;
-use super::record::{Expr, Graph, record};
+use super::recorder::{Expr, Graph, record};
 use crate::policy::Mlp;
 
 /// Numbers that a network's inputs and outputs lie at multiples of: kernels take vectors of them.

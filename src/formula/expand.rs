@@ -1,7 +1,7 @@
 //! Graphs in the primitives: functions as the polynomials that every scalar computes.
 
 use super::node::Node;
-use super::record::{Graph, operators, primitives, push, push_call, recorded};
+use super::recorder::{Graph, operators, primitives, push, push_call, recorded};
 use crate::real::Real;
 
 impl Graph {

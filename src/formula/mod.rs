@@ -4,7 +4,7 @@ mod call;
 mod chain;
 mod expand;
 mod node;
-mod record;
+mod recorder;
 #[cfg(test)]
 mod tests;
 pub mod text;
@@ -13,4 +13,4 @@ pub mod wgsl;
 pub use call::{Call, Scalar};
 pub(crate) use chain::{Ask, Chain, Link, Place};
 pub use node::{Function, Node};
-pub use record::{Expr, Graph, record, record_with};
+pub use recorder::{Expr, Graph, record, record_with};

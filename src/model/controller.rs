@@ -7,6 +7,7 @@ use crate::policy::{Mlp, Policy};
 use crate::system::System;
 use crate::tile::{CompiledPolicy, NativeFormula};
 
+use super::compiled::CompiledForm;
 use super::recorded::recorded;
 
 /// A policy as data.
@@ -17,7 +18,7 @@ pub struct Controller {
     /// How the controls come about.
     pub law: Law,
     /// The formula as compiled, where it is written in Rust.
-    native: Option<Arc<dyn NativeFormula>>,
+    native: Option<Arc<CompiledForm<dyn NativeFormula>>>,
 }
 
 /// How controls come about.
@@ -57,15 +58,20 @@ impl Controller {
         P: Policy<NX, NU> + Send + Sync + 'static,
     {
         let controller = Self::recorded(system, &policy);
-        let native = match controller.law {
-            Law::Formula(_) => Some(Arc::new(CompiledPolicy(policy)) as Arc<dyn NativeFormula>),
+        let native = match &controller.law {
+            Law::Formula(graph) => {
+                let code: Arc<dyn NativeFormula> = Arc::new(CompiledPolicy(policy));
+                let parameters = system.parameters();
+                let values = parameters.iter().map(|parameter| parameter.value).collect();
+                Some(CompiledForm::new(code, &[graph], values))
+            }
             Law::Network { .. } => None,
         };
         Self { native, ..controller }
     }
 
     /// The same of a policy that is borrowed, without its compiled form.
-    pub(crate) fn recorded<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Self
+    fn recorded<S, P, const NX: usize, const NU: usize>(system: &S, policy: &P) -> Self
     where
         S: System<NX, NU>,
         P: Policy<NX, NU>,
@@ -96,8 +102,12 @@ impl Controller {
         }
     }
 
-    /// The formula as compiled, where it is written in Rust.
-    pub(crate) fn native(&self) -> Option<&Arc<dyn NativeFormula>> {
-        self.native.as_ref()
+    /// The compiled form of a formula, where it and the `values` of the model's parameters are still
+    /// those that it was compiled with.
+    pub(crate) fn compiled(&self, values: &[f32]) -> Option<&Arc<dyn NativeFormula>> {
+        match &self.law {
+            Law::Formula(graph) => self.native.as_ref()?.of(&[graph], values),
+            Law::Network { .. } => None,
+        }
     }
 }

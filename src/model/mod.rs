@@ -1,5 +1,6 @@
 //! The model: a plant and its task as plain data, recorded from Rust or read from text.
 
+mod compiled;
 mod controller;
 mod identity;
 mod plant;
@@ -13,6 +14,7 @@ pub use controller::{Controller, Law};
 pub use plant::Plant;
 pub use stage::{MapCost, StageCost};
 
+use self::compiled::CompiledForm;
 use crate::formula::Graph;
 pub use crate::system::Parameter;
 use crate::system::{Axis, Body, Feature};
@@ -44,8 +46,8 @@ pub struct Model {
     pub bodies: Vec<Body>,
     /// The narrowest thing that the margins know of, where it is known.
     pub smallest_feature: Option<Feature>,
-    /// The system as compiled, where it is written in Rust; its parameters are those of the model.
-    pub(crate) native: Option<Arc<dyn NativeSystem>>,
+    /// The system as compiled, where it is written in Rust.
+    pub(crate) native: Option<Arc<CompiledForm<dyn NativeSystem>>>,
 }
 
 /// Models are equal where all that is computed and drawn is; whether somebody compiled them, or said

@@ -4,9 +4,10 @@ use std::array::from_fn;
 use std::sync::Arc;
 
 use super::Model;
+use super::compiled::CompiledForm;
 use crate::formula::{Expr, Graph, record_with};
 use crate::system::System;
-use crate::tile::CompiledSystem;
+use crate::tile::{CompiledSystem, NativeSystem};
 
 impl Model {
     /// The model of `system`: its formulas recorded, its declared parameters as inputs.
@@ -24,11 +25,13 @@ impl Model {
         S: System<NX, NU> + Send + Sync + 'static,
     {
         let model = Self::recorded(&system);
-        Self { native: Some(Arc::new(CompiledSystem(system))), ..model }
+        let code: Arc<dyn NativeSystem> = Arc::new(CompiledSystem(system));
+        let native = Some(CompiledForm::new(code, &model.formulas(), model.values()));
+        Self { native, ..model }
     }
 
     /// The same of a system that is borrowed, without its compiled form.
-    pub(crate) fn recorded<S, const NX: usize, const NU: usize>(system: &S) -> Self
+    pub(super) fn recorded<S, const NX: usize, const NU: usize>(system: &S) -> Self
     where
         S: System<NX, NU>,
     {
@@ -47,6 +50,16 @@ impl Model {
             smallest_feature: system.smallest_feature(),
             native: None,
         }
+    }
+
+    /// The compiled form, where formulas and parameters are still those of the system.
+    pub(crate) fn compiled(&self) -> Option<&Arc<dyn NativeSystem>> {
+        self.native.as_ref()?.of(&self.formulas(), &self.values())
+    }
+
+    /// What a compiled form computes.
+    fn formulas(&self) -> [&Graph; 3] {
+        [&self.step, &self.target, &self.constraint]
     }
 }
 

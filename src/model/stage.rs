@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::Model;
+use super::compiled::CompiledForm;
 use super::recorded::recorded_with;
 use crate::cost::{Cost, CostMap};
 use crate::error::{Error, Result};
@@ -25,7 +26,7 @@ pub struct StageCost {
     /// What a map charges besides.
     pub map: Option<MapCost>,
     /// System and cost as compiled, where they are written in Rust.
-    pub(crate) native: Option<Arc<dyn NativeStages>>,
+    native: Option<CompiledCost>,
 }
 
 /// A map, and where a state lies on it.
@@ -35,6 +36,13 @@ pub struct MapCost {
     pub map: Arc<CostMap>,
     /// The number of the cell, [`CostMap::cell`] of the place, of the inputs of the model.
     pub cell: Graph,
+}
+
+/// A cost as compiled, and the map that it charges by.
+#[derive(Clone)]
+struct CompiledCost {
+    stages: Arc<CompiledForm<dyn NativeStages>>,
+    map: Option<Arc<CostMap>>,
 }
 
 impl fmt::Debug for StageCost {
@@ -83,8 +91,26 @@ impl StageCost {
                 place.into_iter().map(|(map, place)| map.cell(place)).collect()
             }),
         });
-        let native = Some(Arc::new(CompiledStages { system, cost }) as Arc<dyn NativeStages>);
-        Self { stage, contexts: NC, map, native }
+        let model = Model::recorded(&system);
+        let code: Arc<dyn NativeStages> = Arc::new(CompiledStages { system, cost });
+        let formulas: Vec<&Graph> =
+            [&model.step, &stage].into_iter().chain(map.iter().map(|map| &map.cell)).collect();
+        let stages = CompiledForm::new(code, &formulas, model.values());
+        let charged = map.as_ref().map(|map| Arc::clone(&map.map));
+        Self { stage, contexts: NC, map, native: Some(CompiledCost { stages, map: charged }) }
+    }
+
+    /// The compiled form of the stages of `model`, where its dynamics, its parameters and this cost are
+    /// still those that were compiled together.
+    pub(crate) fn compiled(&self, model: &Model) -> Option<&Arc<dyn NativeStages>> {
+        // A model that is asked to be run as text is.
+        model.compiled()?;
+        let CompiledCost { stages, map } = self.native.as_ref()?;
+        let at = |map: Option<&Arc<CostMap>>| map.map(Arc::as_ptr);
+        let cells = self.map.iter().map(|map| &map.cell);
+        let formulas: Vec<&Graph> = [&model.step, &self.stage].into_iter().chain(cells).collect();
+        let same = at(map.as_ref()) == at(self.map.as_ref().map(|map| &map.map));
+        stages.of(&formulas, &model.values()).filter(|_| same)
     }
 
     /// The same without its compiled form, as if it were given as text: for benches of the two.

@@ -138,7 +138,7 @@ impl<'a> Ppo<'a> {
                 last,
             })
             .collect();
-        self.judge(&steps, &mut seen);
+        self.weigh(&steps, &mut seen);
         seen
     }
 
@@ -165,7 +165,7 @@ impl<'a> Ppo<'a> {
     }
 
     /// Advantages and returns of `steps`, plant after plant within each step.
-    fn judge(&self, steps: &[Step], seen: &mut Experience) {
+    fn weigh(&self, steps: &[Step], seen: &mut Experience) {
         let count = self.environments.len();
         seen.advantages = vec![0.0; steps.len()];
         for plant in 0..count {

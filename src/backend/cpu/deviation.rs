@@ -3,7 +3,7 @@
 use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::load::Loader;
-use super::tile::{Driven, Driver, Loss, Score, is_finite, lanes};
+use super::tile::{Loss, Score, TilePlant, TileRunner, is_finite, lanes};
 use crate::real::simd::Body;
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure};
@@ -12,7 +12,7 @@ use crate::tile::Frame;
 /// Consecutive pairs for one thread; twin: `shaders/deviation.wgsl`.
 pub(super) struct Deviation<'a> {
     /// The plant.
-    pub(super) plant: Driven<'a>,
+    pub(super) plant: TilePlant<'a>,
     /// The task.
     pub(super) task: &'a DeviationTask<'a>,
     /// Most pairs in lockstep.
@@ -29,17 +29,17 @@ impl Unit for Deviation<'_> {
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Vec<Farthest> {
         let Self { task, width, .. } = self;
-        let mut driver = Driver::new(self.plant, kernel, width);
+        let mut runner = TileRunner::new(self.plant, kernel, width);
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
-        let mut pairs = Pairs::<K, N>::new(&driver, width);
+        let mut pairs = Pairs::<K, N>::new(&runner, width);
         for (tile, out) in self.out.chunks_mut(width).enumerate() {
             let first = self.first + (tile * width) as u64;
             pairs.load(task, first, out.len());
             for (t, farthest) in farthest.iter_mut().enumerate() {
                 if t > 0 {
-                    pairs.step(&mut driver, task.control);
+                    pairs.step(&mut runner, task.control);
                 }
-                pairs.judge(&driver, task, t, farthest);
+                pairs.judge(&runner, task, t, farthest);
             }
             pairs.write(out);
         }
@@ -60,12 +60,12 @@ struct Pairs<K, const N: usize> {
 
 impl<K: Kernel, const N: usize> Pairs<K, N> {
     /// Room for `width` pairs.
-    fn new(driver: &Driver<'_, K>, width: usize) -> Self {
-        let nominal = driver.frame();
+    fn new(runner: &TileRunner<'_, K>, width: usize) -> Self {
+        let nominal = runner.frame();
         Self {
-            loader: Loader::new(driver.kernel(), nominal.states().len()),
+            loader: Loader::new(runner.kernel(), nominal.states().len()),
             nominal,
-            perturbed: driver.frame(),
+            perturbed: runner.frame(),
             scores: [(); 2].map(|()| vec![Score::new(); width.div_ceil(N)]),
             first: 0,
             count: 0,
@@ -81,20 +81,20 @@ impl<K: Kernel, const N: usize> Pairs<K, N> {
     }
 
     /// Moves both rollouts of each pair one step on.
-    fn step(&mut self, driver: &mut Driver<'_, K>, control: PairControl) {
-        driver.decide(&mut self.nominal, self.count);
+    fn step(&mut self, runner: &mut TileRunner<'_, K>, control: PairControl) {
+        runner.decide(&mut self.nominal, self.count);
         match control {
             PairControl::Replay => self.perturbed.copy_controls(&self.nominal),
-            PairControl::ClosedLoop => driver.decide(&mut self.perturbed, self.count),
+            PairControl::ClosedLoop => runner.decide(&mut self.perturbed, self.count),
         }
-        driver.step(&mut self.nominal, self.count);
-        driver.step(&mut self.perturbed, self.count);
+        runner.step(&mut self.nominal, self.count);
+        runner.step(&mut self.perturbed, self.count);
     }
 
     /// Adds the states of step `t` to the scores, and their distances to the farthest.
     fn judge(
         &mut self,
-        driver: &Driver<'_, K>,
+        runner: &TileRunner<'_, K>,
         task: &DeviationTask<'_>,
         t: usize,
         farthest: &mut Farthest,
@@ -102,15 +102,15 @@ impl<K: Kernel, const N: usize> Pairs<K, N> {
         let losses = [Loss::at(task.tightening, t), Loss::NONE];
         let frames = [&mut self.nominal, &mut self.perturbed];
         for ((frame, scores), loss) in frames.into_iter().zip(&mut self.scores).zip(losses) {
-            driver.at_step(frame, t);
+            runner.at_step(frame, t);
             let scores = scores.iter_mut().map(|score| (score, loss));
-            driver.judge(frame, self.count, task.spec.gamma, scores);
+            runner.judge(frame, self.count, task.spec.gamma, scores);
         }
         for at in (0..self.count).step_by(N) {
             let live = N.min(self.count - at);
             let first = self.first + at as u64;
             let (x, y) = (&self.nominal, &self.perturbed);
-            driver.kernel().call(Gap::<N> { x, y, at, live, first, farthest });
+            runner.kernel().call(Gap::<N> { x, y, at, live, first, farthest });
         }
     }
 

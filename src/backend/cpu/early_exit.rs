@@ -5,7 +5,7 @@ use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::load::Loader;
 use super::reach_avoid::{ReachAvoid, measures};
-use super::tile::{Driver, Loss, Score};
+use super::tile::{Loss, Score, TileRunner};
 use crate::real::per_lane;
 use crate::rollout::{NON_FINITE, Query, ReachAvoidTask};
 use crate::tile::Frame;
@@ -14,10 +14,10 @@ impl Unit for ReachAvoid<'_> {
     type Output = ();
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) {
-        let driver = Driver::new(self.plant, kernel, self.width);
+        let runner = TileRunner::new(self.plant, kernel, self.width);
         match self.task.query {
-            Query::Measure => measures::<K, N>(self, driver),
-            Query::Sign => signs::<K, N>(self, driver),
+            Query::Measure => measures::<K, N>(self, runner),
+            Query::Sign => signs::<K, N>(self, runner),
         }
     }
 }
@@ -26,13 +26,16 @@ impl Unit for ReachAvoid<'_> {
 ///
 /// Each lane has a clock of its own, so the tile stays full until no start is left, and then
 /// shrinks. A trajectory does not see which lane it is in.
-pub(super) fn signs<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver: Driver<'_, K>) {
-    let mut queue = Queue::<K, N>::new(&unit, &driver);
-    let mut frame = driver.frame();
+pub(super) fn signs<K: Kernel, const N: usize>(
+    unit: ReachAvoid<'_>,
+    mut runner: TileRunner<'_, K>,
+) {
+    let mut queue = Queue::<K, N>::new(&unit, &runner);
+    let mut frame = runner.frame();
     let mut groups = vec![Group::<N>::new(); unit.width.div_ceil(N)];
     let mut live = 0;
     loop {
-        while live < unit.width && queue.fill(&driver, unit.out) {
+        while live < unit.width && queue.fill(&runner, unit.out) {
             queue.waiting -= 1;
             frame.copy_lane(live, &queue.frame, queue.waiting);
             groups[live / N].copy_lane(live % N, &queue.group, queue.waiting);
@@ -41,28 +44,28 @@ pub(super) fn signs<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver:
         if live == 0 {
             return;
         }
-        driver.decide(&mut frame, live);
-        driver.step(&mut frame, live);
+        runner.decide(&mut frame, live);
+        runner.step(&mut frame, live);
         groups.iter_mut().for_each(|group| group.tick(unit.task.spec.horizon));
-        judge(&driver, &mut frame, &mut groups, live, unit.task);
+        judge(&runner, &mut frame, &mut groups, live, unit.task);
         live = retire(&mut frame, &mut groups, live, unit.out);
     }
 }
 
 /// Adds the states of a tile to its groups.
 fn judge<K: Kernel, const N: usize>(
-    driver: &Driver<'_, K>,
+    runner: &TileRunner<'_, K>,
     frame: &mut Frame,
     groups: &mut [Group<N>],
     live: usize,
     task: &ReachAvoidTask<'_>,
 ) {
-    driver.at_steps(frame, groups.iter().flat_map(|group| group.step));
+    runner.at_steps(frame, groups.iter().flat_map(|group| group.step));
     let scores = groups.iter_mut().map(|group| {
         let loss = Loss::at_each(task.tightening, &group.step);
         (&mut group.score, loss)
     });
-    driver.judge(frame, live, task.spec.gamma, scores);
+    runner.judge(frame, live, task.spec.gamma, scores);
     groups.iter_mut().take(live.div_ceil(N)).for_each(|group| group.decide(task.spec.horizon));
 }
 
@@ -162,14 +165,14 @@ struct Queue<'a, K, const N: usize> {
 }
 
 impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
-    fn new(unit: &ReachAvoid<'a>, driver: &Driver<'_, K>) -> Self {
-        let frame = driver.frame_of(N);
+    fn new(unit: &ReachAvoid<'a>, runner: &TileRunner<'_, K>) -> Self {
+        let frame = runner.frame_of(N);
         Self {
             task: unit.task,
             first: unit.first,
             count: unit.out.len(),
             loaded: 0,
-            loader: Loader::new(driver.kernel(), frame.states().len()),
+            loader: Loader::new(runner.kernel(), frame.states().len()),
             frame,
             group: Group::new(),
             waiting: 0,
@@ -177,7 +180,7 @@ impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
     }
 
     /// Loads starts until one waits; false if none is left.
-    fn fill(&mut self, driver: &Driver<'_, K>, out: &mut [f32]) -> bool {
+    fn fill(&mut self, runner: &TileRunner<'_, K>, out: &mut [f32]) -> bool {
         while self.waiting == 0 {
             if self.loaded == self.count {
                 return false;
@@ -188,7 +191,7 @@ impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
             self.group = Group::new();
             self.group.place = per_lane!(N, i => (self.loaded + i) as u32);
             let group = std::slice::from_mut(&mut self.group);
-            judge(driver, &mut self.frame, group, live, self.task);
+            judge(runner, &mut self.frame, group, live, self.task);
             self.loaded += live;
             self.waiting = retire(&mut self.frame, group, live, out);
         }

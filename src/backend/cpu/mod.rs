@@ -36,7 +36,7 @@ pub(super) use self::prepared::Prepared;
 use self::reach_avoid::ReachAvoid;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
-use self::tile::Driven;
+use self::tile::TilePlant;
 use super::{Action, Event, MeasureSink, PairSink};
 use crate::error::{Error, Fault, Result};
 use crate::files::{CONFIG_BYTES, read_text};
@@ -131,7 +131,7 @@ impl Cpu {
     /// Measures of starts under any plant.
     fn measures(
         &self,
-        plant: Driven<'_>,
+        plant: TilePlant<'_>,
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
@@ -152,7 +152,7 @@ impl Cpu {
     /// Pairs under any plant.
     fn pairs(
         &self,
-        plant: Driven<'_>,
+        plant: TilePlant<'_>,
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {

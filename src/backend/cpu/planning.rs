@@ -38,8 +38,7 @@ impl Cpu {
         let pushed = planning.disturbance.as_ref().map_or(0, |asked| asked.entries.len());
         let pushes = value.end..value.end + pushed;
         layout.own = pushes.end - total;
-        // Compiled stages are of one system and one cost together.
-        let compiled = cost.native.as_ref().filter(|_| model.native.is_some());
+        let compiled = cost.compiled(model);
         let stages: Arc<dyn NativeStages> = match compiled {
             Some(compiled) => Arc::clone(compiled),
             None => {

@@ -6,7 +6,7 @@ use super::Cpu;
 use super::chained::Pack;
 use super::interpreted::{Held, Inputs, InterpretedFormula, InterpretedSystem};
 use super::mlp::Packed;
-use super::tile::{Around, Drive, Driven};
+use super::tile::{Around, TileLaw, TilePlant};
 use crate::backend::{MeasureSink, PairSink};
 use crate::error::Result;
 use crate::formula::Graph;
@@ -55,8 +55,9 @@ impl Cpu {
         let layout = Layout { states: model.states.len(), controls: model.controls.len(), own: 0 };
         let values = model.values();
         let pack = &|network: &Mlp| self.packed(network);
+        let compiled = controller.compiled(&values);
         let mut needs = Needs { model, values, layout, clock: Clock::Ignored, pack };
-        let law = match (&controller.law, controller.native()) {
+        let law = match (&controller.law, compiled) {
             (Law::Formula(_), Some(compiled)) => PreparedLaw::Formula(Arc::clone(compiled)),
             (Law::Formula(graph), None) => {
                 let inputs = needs.inputs();
@@ -76,7 +77,7 @@ impl Cpu {
 impl Needs<'_> {
     /// Dynamics and margins: as compiled where they are, else as tapes.
     fn system(&mut self) -> Arc<dyn NativeSystem> {
-        if let Some(compiled) = &self.model.native {
+        if let Some(compiled) = self.model.compiled() {
             return Arc::clone(compiled);
         }
         let system = InterpretedSystem::new(self.model, &self.values, self.pack);
@@ -164,17 +165,17 @@ impl Prepared {
     }
 
     /// The plant with the instructions of `cpu`.
-    fn driven(&self, cpu: &Cpu) -> Driven<'_> {
-        let drive = match &self.law {
-            PreparedLaw::Formula(formula) => Drive::Formula(&**formula),
+    fn driven(&self, cpu: &Cpu) -> TilePlant<'_> {
+        let law = match &self.law {
+            PreparedLaw::Formula(formula) => TileLaw::Formula(&**formula),
             PreparedLaw::Network { network, observe, act } => {
                 let [observe, act] = [observe, act].map(|beside| beside.as_ref().map(around));
-                Drive::Network { network, observe, act }
+                TileLaw::Network { network, observe, act }
             }
         };
-        Driven {
+        TilePlant {
             system: &*self.system,
-            drive,
+            law,
             layout: self.layout,
             clock: self.clock,
             with: cpu.instructions,

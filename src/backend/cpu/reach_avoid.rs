@@ -2,13 +2,13 @@
 
 use super::kernel::Kernel;
 use super::load::Loader;
-use super::tile::{Driven, Driver, Loss, Score};
+use super::tile::{Loss, Score, TilePlant, TileRunner};
 use crate::rollout::ReachAvoidTask;
 
 /// Consecutive starts for one thread; twin: `shaders/reach_avoid.wgsl`.
 pub(super) struct ReachAvoid<'a> {
     /// The plant.
-    pub(super) plant: Driven<'a>,
+    pub(super) plant: TilePlant<'a>,
     /// The task.
     pub(super) task: &'a ReachAvoidTask<'a>,
     /// Most trajectories in lockstep.
@@ -20,10 +20,13 @@ pub(super) struct ReachAvoid<'a> {
 }
 
 /// The measures, by tiles of trajectories that start and end together.
-pub(super) fn measures<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driver: Driver<'_, K>) {
+pub(super) fn measures<K: Kernel, const N: usize>(
+    unit: ReachAvoid<'_>,
+    mut runner: TileRunner<'_, K>,
+) {
     let (task, width) = (unit.task, unit.width);
-    let mut frame = driver.frame();
-    let mut loader = Loader::<K, N>::new(driver.kernel(), frame.states().len());
+    let mut frame = runner.frame();
+    let mut loader = Loader::<K, N>::new(runner.kernel(), frame.states().len());
     let mut scores = vec![Score::<N>::new(); width.div_ceil(N)];
     for (tile, out) in unit.out.chunks_mut(width).enumerate() {
         let count = out.len();
@@ -31,13 +34,13 @@ pub(super) fn measures<K: Kernel, const N: usize>(unit: ReachAvoid<'_>, mut driv
         loader.starts(&task.starts, unit.first + (tile * width) as u64, count, &mut frame);
         for t in 0..=task.spec.horizon as usize {
             if t > 0 {
-                driver.decide(&mut frame, count);
-                driver.step(&mut frame, count);
+                runner.decide(&mut frame, count);
+                runner.step(&mut frame, count);
             }
-            driver.at_step(&mut frame, t);
+            runner.at_step(&mut frame, t);
             let loss = Loss::at(task.tightening, t);
             let scores = scores.iter_mut().map(|score| (score, loss));
-            driver.judge(&mut frame, count, task.spec.gamma, scores);
+            runner.judge(&mut frame, count, task.spec.gamma, scores);
         }
         for (out, score) in out.chunks_mut(N).zip(&scores) {
             out.copy_from_slice(&score.measure().0[..out.len()]);

@@ -19,11 +19,11 @@ pub(super) fn is_finite(value: f32) -> bool {
 
 /// A plant and who drives it.
 #[derive(Clone, Copy)]
-pub(super) struct Driven<'a> {
+pub(super) struct TilePlant<'a> {
     /// Dynamics and margins.
     pub(super) system: &'a dyn NativeSystem,
     /// The controls.
-    pub(super) drive: Drive<'a>,
+    pub(super) law: TileLaw<'a>,
     /// Rows of a frame.
     pub(super) layout: Layout,
     /// Whether formulas read the row of steps.
@@ -32,12 +32,12 @@ pub(super) struct Driven<'a> {
     pub(super) with: Instructions,
 }
 
-impl Driven<'_> {
+impl TilePlant<'_> {
     /// Widest layer of all networks that take part; `None` if none does.
     pub(super) fn widest(&self) -> Option<usize> {
-        let law = match self.drive {
-            Drive::Formula(formula) => formula.widest(),
-            Drive::Network { network, observe, act } => {
+        let law = match self.law {
+            TileLaw::Formula(formula) => formula.widest(),
+            TileLaw::Network { network, observe, act } => {
                 let around = [observe, act].into_iter().flatten();
                 let around = around.filter_map(|around| around.formula.widest());
                 around.chain([network.widest()]).max()
@@ -49,7 +49,7 @@ impl Driven<'_> {
 
 /// Where the controls come from.
 #[derive(Clone, Copy)]
-pub(super) enum Drive<'a> {
+pub(super) enum TileLaw<'a> {
     /// A formula of the states.
     Formula(&'a dyn NativeFormula),
     /// A network, packed for the kernel, and what stands around it.
@@ -72,7 +72,7 @@ pub(super) struct Around<'a> {
     pub(super) rows: [usize; 2],
 }
 
-impl<'a> Drive<'a> {
+impl<'a> TileLaw<'a> {
     /// The network, if there is one.
     pub(super) fn network(self) -> Option<&'a Packed> {
         match self {
@@ -83,17 +83,17 @@ impl<'a> Drive<'a> {
 }
 
 /// A plant with what it needs to drive tiles.
-pub(super) struct Driver<'a, K> {
-    plant: Driven<'a>,
+pub(super) struct TileRunner<'a, K> {
+    plant: TilePlant<'a>,
     network: Option<Evaluator<'a, K>>,
     kernel: K,
     lanes: usize,
 }
 
-impl<'a, K: Kernel> Driver<'a, K> {
+impl<'a, K: Kernel> TileRunner<'a, K> {
     /// For tiles of up to `lanes` trajectories.
-    pub(super) fn new(plant: Driven<'a>, kernel: K, lanes: usize) -> Self {
-        let network = plant.drive.network();
+    pub(super) fn new(plant: TilePlant<'a>, kernel: K, lanes: usize) -> Self {
+        let network = plant.law.network();
         let network = network.map(|network| Evaluator::new(network, kernel, lanes));
         Self { plant, network, kernel, lanes }
     }
@@ -111,9 +111,9 @@ impl<'a, K: Kernel> Driver<'a, K> {
     /// Evaluates the policy at the first `lanes` states.
     pub(super) fn decide(&mut self, frame: &mut Frame, lanes: usize) {
         let with = self.plant.with;
-        match (self.plant.drive, &mut self.network) {
-            (Drive::Formula(formula), _) => formula.evaluate(with, frame, lanes),
-            (Drive::Network { observe, act, .. }, Some(network)) => {
+        match (self.plant.law, &mut self.network) {
+            (TileLaw::Formula(formula), _) => formula.evaluate(with, frame, lanes),
+            (TileLaw::Network { observe, act, .. }, Some(network)) => {
                 let mut rows = [frame.states(), frame.controls()];
                 if let Some(Around { formula, rows: [first, end] }) = observe {
                     formula.evaluate(with, frame, lanes);
@@ -127,7 +127,7 @@ impl<'a, K: Kernel> Driver<'a, K> {
                     formula.evaluate(with, frame, lanes);
                 }
             }
-            (Drive::Network { .. }, None) => unreachable!("a network has its evaluator"),
+            (TileLaw::Network { .. }, None) => unreachable!("a network has its evaluator"),
         }
     }
 

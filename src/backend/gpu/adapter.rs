@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use super::device::{Adapter, Choice, Device};
 use super::fault::Injection;
+use super::fusing::NetworkKernels;
 use super::limits::{self, DeviceLimits};
 use super::opened::{Opened, Setup};
-use super::plan::NetworkKernels;
 use super::source::Sources;
 use super::state::State;
 use super::timing::KernelTime;

@@ -4,6 +4,12 @@ use std::cell::Cell;
 
 use super::compose::WORKGROUP;
 
+/// Iterations that one invocation may spend, all its loops summed.
+///
+/// Mesa's lavapipe stops every invocation after 65,535 iterations without an error, its results
+/// wrong; no other limit is known to be lower.
+pub(super) const MAX_TRIPS: u64 = 60_000;
+
 /// Columns are a multiple of this, so that workgroups are whole.
 pub(super) const COLUMN_UNIT: u64 = WORKGROUP as u64;
 /// Most columns of a chunk under a formula: enough threads for any GPU.
@@ -15,7 +21,7 @@ pub(super) const FORMULA_COLUMNS: u64 = 1 << 18;
 /// integrated GPU reaches, and on a large one still many times what a submission costs.
 pub(super) const WORK_FLOPS: u64 = 1 << 34;
 
-/// What a plan may ask of an adapter; halved where the adapter fails at it.
+/// What a chunk may ask of an adapter; halved where the adapter fails at it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Limit {
     /// Columns of a chunk.
@@ -45,7 +51,7 @@ impl Limit {
 
 /// An attempt at the rest of a call on an adapter.
 pub(super) struct Attempt {
-    /// What the plan may ask of the adapter.
+    /// What a chunk may ask of the adapter.
     pub(super) limit: Limit,
     /// Columns of a chunk, once they are planned.
     pub(super) columns: Cell<u64>,

@@ -1,4 +1,4 @@
-//! What formulas that call networks cost, as far as it decides the plan.
+//! What formulas that call networks cost, as far as it decides the chunks.
 
 use super::compose::{AskShape, ChainSizes, ChainText, input_quads, output_quads, parameter_quads};
 use super::network::network_flops;
@@ -7,7 +7,7 @@ use crate::policy::Mlp;
 /// Bytes of a vector of 4 numbers.
 const VECTOR_BYTES: u64 = 16;
 
-/// What a chain costs, as far as it decides the plan.
+/// What a chain costs, as far as it decides the chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct ChainLoad {
     /// Bytes that each of its buffers holds per trajectory.

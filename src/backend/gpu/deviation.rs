@@ -3,11 +3,11 @@
 use super::attempt::Attempt;
 use super::batch::Batch;
 use super::chain::ChainStep;
+use super::chunking::{Chunking, Work};
 use super::compose::{Kernel, Slot};
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
 use super::params::Params;
-use super::plan::{Plan, Work};
 use super::workspace::{Buffers, Kernels, MEASURES_AT, Workspace};
 use crate::backend::PairSink;
 use crate::error::Result;
@@ -28,10 +28,10 @@ pub(super) fn deviation(
     let (starts, spec, tightening) = (&task.pairs.nominal, &task.spec, task.tightening);
     let request = Request { work: Work::Pairs, starts, spec, tightening, count };
     let mut job = Job::new(adapter, subject, request)?;
-    let params = pair_params(task, job.plan.stride);
+    let params = pair_params(task, job.chunking.stride);
     let mut first = task.range.start;
     while first < task.range.end {
-        let columns = (task.range.end - first).min(u64::from(job.plan.stride)) as u32;
+        let columns = (task.range.end - first).min(u64::from(job.chunking.stride)) as u32;
         job.space.inputs.set_starts(starts, first, columns);
         let Rolled { measures, found } = roll(&mut job, params.at(first, columns))?;
         for (farthest, [bits, column]) in farthest.iter_mut().zip(found) {
@@ -73,15 +73,15 @@ struct Rolled {
 fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
     let measures = 8 * u64::from(params.columns);
     let farthest = 8 * (u64::from(params.horizon) + 1);
-    let Job { flight, plan, space, .. } = job;
+    let Job { flight, chunking, space, .. } = job;
     let Workspace { inputs, readback, buffers, kernels, .. } = space;
     let kernels = &kernels[0];
     let mut batch = Batch::default();
     batch.push_columns(Kernel::Sample, &kernels.sample, &params);
     let mut step = 0;
     while step <= params.horizon {
-        let count = plan.segment.min(params.horizon + 1 - step);
-        segment(&mut batch, (kernels, &*buffers), *plan, (params, step, count));
+        let count = chunking.segment.min(params.horizon + 1 - step);
+        segment(&mut batch, (kernels, &*buffers), *chunking, (params, step, count));
         step += count;
         inputs.write(&flight.device, &batch);
         let copy = |encoder: &mut _| {
@@ -107,20 +107,20 @@ fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
 fn segment<'a>(
     batch: &mut Batch<'a>,
     (kernels, buffers): (&'a Kernels, &Buffers),
-    plan: Plan,
+    chunking: Chunking,
     (params, first, count): (Params, u32, u32),
 ) {
     let params = Params { segment_start: first, ..params };
     let mut step = first;
     while step < first + count {
-        let steps = plan.steps.min(first + count - step);
-        let (row, horizon) = (plan.row, params.horizon);
-        let acting = if params.closed_loop == 0 { plan.stride } else { row };
+        let steps = chunking.steps.min(first + count - step);
+        let (row, horizon) = (chunking.row, params.horizon);
+        let acting = if params.closed_loop == 0 { chunking.stride } else { row };
         kernels.chain(batch, ChainStep { step, horizon, columns: row, row, acting });
         if step < params.horizon {
             // Perturbed states stand `stride` columns after the nominal ones.
-            let columns = if params.closed_loop == 0 { params.columns } else { plan.row };
-            kernels.drive(batch, buffers, (columns, plan.row), step);
+            let columns = if params.closed_loop == 0 { params.columns } else { chunking.row };
+            kernels.drive(batch, buffers, (columns, chunking.row), step);
         }
         batch.push_columns(Kernel::Deviation, &kernels.rollout, &params.over(step, steps));
         step += steps;

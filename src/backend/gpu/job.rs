@@ -1,11 +1,11 @@
-//! A call that rolls a plant out: its plan, its submissions, its workspace.
+//! A call that rolls a plant out: its chunking, its submissions, its workspace.
 
 use std::sync::Arc;
 
 use super::attempt::Attempt;
+use super::chunking::{Chunking, Work};
 use super::flight::Flight;
 use super::opened::Opened;
-use super::plan::{Plan, Work};
 use super::program::Program;
 use super::source::Source;
 use super::workspace::{Shape, Workspace};
@@ -33,7 +33,7 @@ pub(super) struct Request<'a> {
 /// A call that rolls a plant out.
 pub(super) struct Job<'a> {
     pub(super) flight: Flight<'a>,
-    pub(super) plan: Plan,
+    pub(super) chunking: Chunking,
     pub(super) space: Workspace,
     program: Arc<Program>,
 }
@@ -52,14 +52,14 @@ impl<'a> Job<'a> {
         // Before the first buffer is made: what fails from here on is this call's.
         let flight = opened.flight();
         let program = opened.program(&flight, subject.source)?;
-        let plan = program.plan(&flight.device, attempt, (work, count))?;
+        let chunking = program.chunking(&flight.device, attempt, (work, count))?;
         let listed = matches!(starts, Starts::Listed(_));
-        let shape = Shape { work, listed, horizon: spec.horizon, plan };
+        let shape = Shape { work, listed, horizon: spec.horizon, chunking };
         let mut space = program.take(&flight, shape)?;
         space.inputs.set_values(subject.values);
         space.inputs.set_schedule(spec, tightening);
         space.inputs.set_region(starts);
-        Ok(Self { flight, plan, space, program })
+        Ok(Self { flight, chunking, space, program })
     }
 
     /// Keeps the workspace: the call has gone well.

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::attempt::MAX_TRIPS;
 use super::batch::Batch;
 use super::buffer::Buffer;
 use super::call::Call;
@@ -9,7 +10,6 @@ use super::compose::{Kernel, Slot, WORKGROUP, limit_kernel};
 use super::kernel::Bound;
 use super::opened::Opened;
 use super::params::Params;
-use super::plan::MAX_TRIPS;
 use crate::error::{Fault, Result};
 
 /// Multiplications and additions of one round of `shaders/peak.wgsl`: 16 chains of 4 links of 2.

@@ -7,7 +7,7 @@ use super::attempt::Attempt;
 use super::batch::Batch;
 use super::compose::{Kernel, PARTIAL_HEADER, Slot};
 use super::flight::Flight;
-use super::mppi_plan::{DISPATCHES, MppiPlan};
+use super::mppi_chunking::{DISPATCHES, MppiChunking};
 use super::mppi_source::PlanSource;
 use super::mppi_workspace::{PlanShape, PlanWorkspace, groups, words};
 use super::opened::Opened;
@@ -31,10 +31,10 @@ pub(super) fn tally(
     // Few shapes for a number of problems that falls one by one.
     let problems = task.problems.len().next_power_of_two();
     let size = source.size(problems, samples.end - samples.start);
-    let plan = MppiPlan::new(&opened.device.adapter, attempt.limit, &size)?;
-    attempt.columns.set(u64::from(plan.stride));
-    let mut space = program.take(&flight, PlanShape { plan, costs: task.costs })?;
-    for problems in task.problems.chunks(plan.problems as usize) {
+    let chunking = MppiChunking::new(&opened.device.adapter, attempt.limit, &size)?;
+    attempt.columns.set(u64::from(chunking.stride));
+    let mut space = program.take(&flight, PlanShape { chunking, costs: task.costs })?;
+    for problems in task.problems.chunks(chunking.problems as usize) {
         let chunk = Chunk { flight: &flight, source, task, problems };
         sink(chunk.tally(&mut space, samples.clone())?);
     }
@@ -62,7 +62,7 @@ impl Chunk<'_> {
     fn tally(&self, space: &mut PlanWorkspace, samples: Range<u32>) -> Result<Vec<PlanTally>> {
         space.inputs.set(self.problems, self.source.planning.spec.horizon());
         let mut tallies = vec![PlanTally::default(); self.problems.len()];
-        let most = space.shape.plan.samples;
+        let most = space.shape.chunking.samples;
         for first in samples.clone().step_by(most as usize) {
             let samples = first..samples.end.min(first + most);
             self.run(space, samples.clone())?;
@@ -73,17 +73,17 @@ impl Chunk<'_> {
 
     /// Rolls out the samples `samples` and weighs them.
     fn run(&self, space: &mut PlanWorkspace, samples: Range<u32>) -> Result<()> {
-        let (plan, spec) = (space.shape.plan, &self.source.planning.spec);
+        let (chunking, spec) = (space.shape.chunking, &self.source.planning.spec);
         let settings = spec.settings();
         let params = Params {
             first_low: samples.start,
-            columns: self.problems.len() as u32 * plan.width,
-            stride: plan.stride,
+            columns: self.problems.len() as u32 * chunking.width,
+            stride: chunking.stride,
             horizon: settings.horizon,
             iteration: self.task.iteration,
             samples: samples.end - samples.start,
-            width: plan.width,
-            rounds: plan.rounds,
+            width: chunking.width,
+            rounds: chunking.rounds,
             temperature: settings.temperature,
             ..Params::default()
         };
@@ -91,7 +91,7 @@ impl Chunk<'_> {
         let mut batch = Timed::default();
         batch.dispatches.push_columns(Kernel::MppiStart, &kernels.start, &params);
         let mut room = |batch: &mut Timed<'_>, steps: u32| -> Result<()> {
-            let full = batch.steps > 0 && batch.steps + steps > plan.timely_steps;
+            let full = batch.steps > 0 && batch.steps + steps > chunking.timely_steps;
             if full || batch.dispatches.len() >= DISPATCHES {
                 inputs.0.write(&self.flight.device, &batch.dispatches);
                 self.flight.submit(&batch.dispatches, |_| {}, |_| {})?;
@@ -100,8 +100,8 @@ impl Chunk<'_> {
             batch.steps += steps;
             Ok(())
         };
-        for step in (0..settings.horizon).step_by(plan.rollout_steps as usize) {
-            let steps = plan.rollout_steps.min(settings.horizon - step);
+        for step in (0..settings.horizon).step_by(chunking.rollout_steps as usize) {
+            let steps = chunking.rollout_steps.min(settings.horizon - step);
             room(&mut batch, steps)?;
             for (layers, bound) in buffers.layers.iter().zip(&kernels.layers) {
                 if let Some(layers) = layers {
@@ -112,14 +112,14 @@ impl Chunk<'_> {
             let params = params.over(step, steps);
             batch.dispatches.push_columns(Kernel::MppiRollout, &kernels.rollout, &params);
         }
-        for step in (0..settings.horizon).step_by(plan.update_steps as usize) {
-            let steps = plan.update_steps.min(settings.horizon - step);
+        for step in (0..settings.horizon).step_by(chunking.update_steps as usize) {
+            let steps = chunking.update_steps.min(settings.horizon - step);
             room(&mut batch, steps)?;
-            let groups = self.problems.len() as u32 * groups(&plan);
+            let groups = self.problems.len() as u32 * groups(&chunking);
             batch.dispatches.push(&kernels.update, &params.over(step, steps), [groups, 1]);
         }
         inputs.0.write(&self.flight.device, &batch.dispatches);
-        let [partials, totals] = self.result_bytes(&plan, shape.costs);
+        let [partials, totals] = self.result_bytes(&chunking, shape.costs);
         self.flight.submit(
             &batch.dispatches,
             |_| {},
@@ -133,14 +133,14 @@ impl Chunk<'_> {
     }
 
     /// Bytes of the partials and of the costs of a chunk.
-    fn result_bytes(&self, plan: &MppiPlan, costs: CostQuery) -> [u64; 2] {
+    fn result_bytes(&self, chunking: &MppiChunking, costs: CostQuery) -> [u64; 2] {
         let problems = self.problems.len() as u64;
         let partial = 4 * words(&self.source.planning.spec) as u64;
         let totals = match costs {
             CostQuery::Summary => 0,
-            CostQuery::Each => 4 * problems * u64::from(plan.width),
+            CostQuery::Each => 4 * problems * u64::from(chunking.width),
         };
-        [problems * u64::from(groups(plan)) * partial, totals]
+        [problems * u64::from(groups(chunking)) * partial, totals]
     }
 
     /// Adds what the samples `samples` came to, a block for each workgroup of the update.
@@ -150,17 +150,18 @@ impl Chunk<'_> {
         samples: Range<u32>,
         tallies: &mut [PlanTally],
     ) -> Result<()> {
-        let plan = space.shape.plan;
-        let [partials, totals] = self.result_bytes(&plan, space.shape.costs);
+        let chunking = space.shape.chunking;
+        let [partials, totals] = self.result_bytes(&chunking, space.shape.costs);
         let read = space.readback.read(self.flight, partials + totals, |bytes| {
             bytemuck::pod_collect_to_vec::<u8, u32>(bytes)
         })?;
         let (partials, costs) = read.split_at(partials as usize / size_of::<u32>());
         let words = words(&self.source.planning.spec);
-        let covered = plan.rounds * Kernel::MppiUpdate.workgroup();
+        let covered = chunking.rounds * Kernel::MppiUpdate.workgroup();
         for (number, tally) in tallies.iter_mut().enumerate() {
-            let mine = partials.chunks(groups(&plan) as usize * words).nth(number).unwrap_or(&[]);
-            let costs = costs.chunks(plan.width as usize).nth(number).unwrap_or(&[]);
+            let mine =
+                partials.chunks(groups(&chunking) as usize * words).nth(number).unwrap_or(&[]);
+            let costs = costs.chunks(chunking.width as usize).nth(number).unwrap_or(&[]);
             for (group, first) in samples.clone().step_by(covered as usize).enumerate() {
                 let count = covered.min(samples.end - first);
                 let place = (first - samples.start) as usize;

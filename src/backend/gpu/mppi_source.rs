@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::compose::MppiText;
-use super::mppi_plan::Size;
+use super::mppi_chunking::Size;
 use crate::policy::Mlp;
 use crate::rollout::{NoiseShape, Planning, SPLINE_SUPPORT};
 

@@ -4,8 +4,8 @@ use super::buffer::{Buffer, Use};
 use super::compose::{Kernel, PARTIAL_HEADER, Slot};
 use super::flight::Flight;
 use super::kernel::Bound;
+use super::mppi_chunking::MppiChunking;
 use super::mppi_compiled::PlanCompiled;
-use super::mppi_plan::MppiPlan;
 use super::network::Layers;
 use super::readback::Readback;
 use super::upload::Upload;
@@ -22,7 +22,7 @@ const PLANS: usize = 3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PlanShape {
     /// How problems and samples are cut up.
-    pub(super) plan: MppiPlan,
+    pub(super) chunking: MppiChunking,
     /// Whether the costs of samples are read.
     pub(super) costs: CostQuery,
 }
@@ -48,16 +48,17 @@ impl PlanWorkspace {
         compiled: &PlanCompiled,
         shape: PlanShape,
     ) -> Result<Self> {
-        let plan = &shape.plan;
-        let size = compiled.source.size(plan.problems as usize, plan.samples);
-        let parts = size.parts(u64::from(plan.problems)).map(|bytes| bytes as usize);
-        let dispatches = plan.dispatches(&size) as usize;
+        let chunking = &shape.chunking;
+        let size = compiled.source.size(chunking.problems as usize, chunking.samples);
+        let parts = size.parts(u64::from(chunking.problems)).map(|bytes| bytes as usize);
+        let dispatches = chunking.dispatches(&size) as usize;
         let upload = Upload::new(&flight.device, flight.pool, &parts, dispatches);
         let mut inputs = PlanInputs(upload);
         inputs.0.put(VALUES, 0, &compiled.source.values);
-        let buffers = PlanBuffers::new(flight, compiled, plan);
+        let buffers = PlanBuffers::new(flight, compiled, chunking);
         let kernels = Binder { flight, compiled, inputs: &inputs, buffers: &buffers }.kernels()?;
-        let totals = if shape.costs == CostQuery::Each { 4 * u64::from(plan.stride) } else { 0 };
+        let totals =
+            if shape.costs == CostQuery::Each { 4 * u64::from(chunking.stride) } else { 0 };
         let results = buffers.of(Slot::Partials).size() + totals;
         let readback = Readback::new(&flight.device, flight.pool, results);
         let bytes = inputs.0.size() + buffers.bytes;
@@ -116,13 +117,13 @@ pub(super) struct PlanBuffers {
 }
 
 impl PlanBuffers {
-    fn new(flight: &Flight<'_>, compiled: &PlanCompiled, plan: &MppiPlan) -> Self {
+    fn new(flight: &Flight<'_>, compiled: &PlanCompiled, chunking: &MppiChunking) -> Self {
         let source = &compiled.source;
-        let (spec, stride) = (&source.planning.spec, u64::from(plan.stride));
+        let (spec, stride) = (&source.planning.spec, u64::from(chunking.stride));
         let quads = source.planning.model.states.len().div_ceil(4) as u64;
         let colored = matches!(spec.noise().shape(), NoiseShape::Colored { .. });
         let carry = if colored { 4 * spec.controls() as u64 * stride } else { 4 };
-        let partials = u64::from(plan.problems * groups(plan)) * 4 * words(spec) as u64;
+        let partials = u64::from(chunking.problems * groups(chunking)) * 4 * words(spec) as u64;
         let sizes = [
             (Slot::State, 16 * quads * stride),
             (Slot::Totals, 4 * stride),
@@ -131,9 +132,9 @@ impl PlanBuffers {
         ];
         let take = |(slot, bytes)| (slot, flight.pool.take(&flight.device, Use::Storage, bytes));
         let slots: Vec<(Slot, Buffer)> = sizes.into_iter().map(take).collect();
-        let layers = source
-            .networks()
-            .map(|mlp| mlp.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, plan.stride)));
+        let layers = source.networks().map(|mlp| {
+            mlp.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, chunking.stride))
+        });
         let own = slots.iter().map(|(_, buffer)| buffer.size()).sum::<u64>();
         let bytes = own + layers.iter().flatten().map(Layers::size).sum::<u64>();
         Self { slots, layers, bytes }
@@ -148,8 +149,8 @@ impl PlanBuffers {
 }
 
 /// Workgroups of the update for each problem of a chunk.
-pub(super) fn groups(plan: &MppiPlan) -> u32 {
-    plan.width / (Kernel::MppiUpdate.workgroup() * plan.rounds)
+pub(super) fn groups(chunking: &MppiChunking) -> u32 {
+    chunking.width / (Kernel::MppiUpdate.workgroup() * chunking.rounds)
 }
 
 /// Numbers of a partial.

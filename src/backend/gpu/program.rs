@@ -5,11 +5,12 @@ use std::sync::Arc;
 use super::attempt::Attempt;
 use super::buffer::Pool;
 use super::chain_load::ChainLoad;
+use super::chunking::{Chunking, Size, Work};
 use super::compiled::Compiled;
 use super::device::Device;
 use super::flight::Flight;
+use super::fusing::NetworkKernels;
 use super::kernel::Pipelines;
-use super::plan::{NetworkKernels, Plan, Size, Work};
 use super::recent::Recent;
 use super::source::Source;
 use super::workspace::{Shape, Workspace};
@@ -52,12 +53,12 @@ impl Program {
     ///
     /// # Errors
     /// [`crate::Error::Device`] if not even the smallest chunk fits.
-    pub(super) fn plan(
+    pub(super) fn chunking(
         &self,
         device: &Device,
         attempt: &Attempt,
         (work, count): (Work, u64),
-    ) -> Result<Plan> {
+    ) -> Result<Chunking> {
         let network = self.source.network.as_deref();
         let text = &self.compiled.text;
         let chain = text.chain().map(ChainLoad::new);
@@ -70,9 +71,9 @@ impl Program {
             seen: network.filter(|_| text.observes()).map_or(0, |mlp| mlp.widths()[0]),
             count,
         };
-        let plan = Plan::new(&device.adapter, attempt.limit, work, &size)?;
-        attempt.columns.set(u64::from(plan.stride));
-        Ok(plan)
+        let chunking = Chunking::new(&device.adapter, attempt.limit, work, &size)?;
+        attempt.columns.set(u64::from(chunking.stride));
+        Ok(chunking)
     }
 
     /// A workspace of `shape`: a kept one, or a new one.

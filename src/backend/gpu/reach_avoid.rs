@@ -5,11 +5,11 @@ use std::ops::Range;
 use super::attempt::Attempt;
 use super::batch::Batch;
 use super::chain::ChainStep;
+use super::chunking::{Chunking, Work};
 use super::compose::{Kernel, Slot};
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
 use super::params::Params;
-use super::plan::{Plan, Work};
 use super::workspace::{Buffers, Kernels, MEASURES_AT, Workspace};
 use crate::backend::MeasureSink;
 use crate::error::Result;
@@ -35,7 +35,7 @@ pub(super) fn reach_avoid(
     };
     let (starts, spec, tightening) = (&task.starts, &task.spec, task.tightening);
     let mut job = Job::new(adapter, subject, Request { work, starts, spec, tightening, count })?;
-    let stride = job.plan.stride;
+    let stride = job.chunking.stride;
     let params = Params { stride, sign_only, ..Params::of_starts(starts, spec) };
     let mut first = task.range.start;
     while first < task.range.end {
@@ -52,14 +52,14 @@ pub(super) fn reach_avoid(
 /// Rolls out the starts of `params`, until the horizon or until all are decided: their values.
 fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
     let measures = 4 * u64::from(params.columns);
-    let Job { flight, plan, space, .. } = job;
+    let Job { flight, chunking, space, .. } = job;
     let Workspace { inputs, readback, buffers, kernels, .. } = space;
     let mut batch = Batch::default();
     batch.push_columns(Kernel::Sample, &kernels[0].sample, &params);
     let (mut step, mut set) = (0, 0);
     loop {
-        let end = params.horizon.saturating_add(1).min(step + plan.segment);
-        segment(&mut batch, (&kernels[set], &*buffers), *plan, (params, step..end));
+        let end = params.horizon.saturating_add(1).min(step + chunking.segment);
+        segment(&mut batch, (&kernels[set], &*buffers), *chunking, (params, step..end));
         step = end;
         let last = step > params.horizon;
         let compacted = kernels[set].after.as_ref().filter(|_| !last);
@@ -105,12 +105,12 @@ fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
 fn segment<'a>(
     batch: &mut Batch<'a>,
     (kernels, buffers): (&'a Kernels, &Buffers),
-    plan: Plan,
+    chunking: Chunking,
     (params, steps): (Params, Range<u32>),
 ) {
     let mut step = steps.start;
     while step < steps.end {
-        let count = plan.steps.min(steps.end - step);
+        let count = chunking.steps.min(steps.end - step);
         let Params { columns, stride: row, horizon, .. } = params;
         kernels.chain(batch, ChainStep { step, horizon, columns, row, acting: row });
         if step < params.horizon {

@@ -26,12 +26,12 @@ enum Runner<'a> {
 }
 
 /// How far a call has come, over all attempts.
-struct Progress {
+struct Delivered {
     next: Cell<u64>,
     refused: Cell<bool>,
 }
 
-impl Progress {
+impl Delivered {
     /// Gives `count` results to a sink; its error ends the call, whatever it is.
     fn deliver(&self, count: usize, sink: impl FnOnce() -> Result<()>) -> Result<()> {
         let taken = sink();
@@ -50,10 +50,10 @@ pub(super) fn reach_avoid(
     task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
 ) -> Result<()> {
-    gpu.persevere("starts", task.range.start, |runner, progress| {
-        let task = ReachAvoidTask { range: progress.next.get()..task.range.end, ..task.clone() };
+    gpu.persevere("starts", task.range.start, |runner, delivered| {
+        let task = ReachAvoidTask { range: delivered.next.get()..task.range.end, ..task.clone() };
         let sink: MeasureSink<'_> =
-            &mut |first, values| progress.deliver(values.len(), || sink(first, values));
+            &mut |first, values| delivered.deliver(values.len(), || sink(first, values));
         match runner {
             Runner::Adapter(opened, attempt) => {
                 reach_avoid::reach_avoid((opened, attempt), subject, &task, sink)
@@ -72,10 +72,10 @@ pub(super) fn deviation(
     sink: PairSink<'_>,
 ) -> Result<Vec<Farthest>> {
     let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
-    gpu.persevere("pairs", task.range.start, |runner, progress| {
-        let task = DeviationTask { range: progress.next.get()..task.range.end, ..task.clone() };
+    gpu.persevere("pairs", task.range.start, |runner, delivered| {
+        let task = DeviationTask { range: delivered.next.get()..task.range.end, ..task.clone() };
         let sink: PairSink<'_> = &mut |first, values: &[PairMeasure]| {
-            progress.deliver(values.len(), || sink(first, values))
+            delivered.deliver(values.len(), || sink(first, values))
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
@@ -99,10 +99,10 @@ pub(super) fn tally(
     (task, samples): (&MppiTask<'_>, Range<u32>),
     sink: &mut dyn FnMut(Vec<PlanTally>),
 ) -> Result<()> {
-    gpu.persevere("problems", 0, |runner, progress| {
-        let task = MppiTask { problems: &task.problems[progress.next.get() as usize..], ..*task };
+    gpu.persevere("problems", 0, |runner, delivered| {
+        let task = MppiTask { problems: &task.problems[delivered.next.get() as usize..], ..*task };
         let sink = &mut |more: Vec<PlanTally>| {
-            progress.next.set(progress.next.get() + more.len() as u64);
+            delivered.next.set(delivered.next.get() + more.len() as u64);
             sink(more);
         };
         match runner {
@@ -125,26 +125,26 @@ impl Gpu {
         &self,
         work: &str,
         first: u64,
-        mut run: impl FnMut(Runner<'_>, &Progress) -> Result<()>,
+        mut run: impl FnMut(Runner<'_>, &Delivered) -> Result<()>,
     ) -> Result<()> {
-        let progress = Progress { next: Cell::new(first), refused: Cell::new(false) };
+        let delivered = Delivered { next: Cell::new(first), refused: Cell::new(false) };
         loop {
             let (opened, limit, on_cpu) = {
                 let state = self.state();
                 (state.opened(), state.limit, state.on_cpu)
             };
             if let Some(cpu) = self.fallback.as_ref().filter(|_| on_cpu) {
-                return run(Runner::Cpu(cpu), &progress);
+                return run(Runner::Cpu(cpu), &delivered);
             }
             let attempt = Attempt::new(limit);
-            match run(Runner::Adapter(&opened, &attempt), &progress) {
-                Err(error) if !progress.refused.get() => {
+            match run(Runner::Adapter(&opened, &attempt), &delivered) {
+                Err(error) if !delivered.refused.get() => {
                     let (fault, problem) = self.survivable(error)?;
                     let columns = attempt.columns.get();
                     let Some(action) = self.go_on(fault, &opened, columns) else {
                         return Err(Error::DeviceFailed { fault, problem });
                     };
-                    let (work, index) = (work.to_owned(), progress.next.get());
+                    let (work, index) = (work.to_owned(), delivered.next.get());
                     self.note(Event { fault, problem, work, index, action });
                 }
                 ended => return ended,

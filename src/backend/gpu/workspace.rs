@@ -4,6 +4,7 @@ use super::batch::Batch;
 use super::buffer::{Buffer, Use};
 use super::chain::{BoundChain, ChainBinder, ChainBuffers, ChainStep};
 use super::chain_load::ChainLoad;
+use super::chunking::{Chunking, Work};
 use super::compiled::Compiled;
 use super::compose::{Kernel, Slot};
 use super::flight::Flight;
@@ -11,7 +12,6 @@ use super::inputs::{InputSizes, Inputs};
 use super::kernel::Bound;
 use super::network::Layers;
 use super::params::Params;
-use super::plan::{Plan, Work};
 use super::readback::Readback;
 use crate::error::Result;
 use crate::policy::Mlp;
@@ -26,7 +26,7 @@ pub(super) struct Shape {
     /// Steps.
     pub(super) horizon: u32,
     /// How the batch is cut up.
-    pub(super) plan: Plan,
+    pub(super) chunking: Chunking,
 }
 
 /// Offset of the measures in what is read back, bytes.
@@ -53,16 +53,16 @@ impl Workspace {
         shape: Shape,
     ) -> Result<Self> {
         let (device, pool) = (&flight.device, flight.pool);
-        let (quads, plan) = (compiled.text.states().div_ceil(4), shape.plan);
+        let (quads, chunking) = (compiled.text.states().div_ceil(4), shape.chunking);
         let layers = network.map_or(0, |mlp| mlp.layers().len());
         let chain = compiled.text.chain().map(ChainLoad::new);
         let chained = chain.map_or(0, |load| load.dispatches);
         let sizes = InputSizes {
             values: compiled.text.parameters().div_ceil(4),
             steps: shape.horizon as usize + 1,
-            region: if shape.listed { quads * plan.stride as usize } else { 4 * quads },
+            region: if shape.listed { quads * chunking.stride as usize } else { 4 * quads },
             // The draw, compaction or reduction, and each step with what its networks need.
-            dispatches: 2 + plan.segment as usize * (layers + chained + 2),
+            dispatches: 2 + chunking.segment as usize * (layers + chained + 2),
         };
         let inputs = Inputs::new(device, pool, sizes);
         let buffers = Buffers::new(flight, (compiled, network), shape);
@@ -70,7 +70,7 @@ impl Workspace {
         let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers };
         let kernels =
             (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
-        let results = u64::from(shape.work.sides()) * 4 * u64::from(plan.stride);
+        let results = u64::from(shape.work.sides()) * 4 * u64::from(chunking.stride);
         let farthest = 8 * (u64::from(shape.horizon) + 1);
         let readback = Readback::new(device, pool, MEASURES_AT + results + farthest);
         Ok(Self { shape, inputs, readback, buffers, kernels })
@@ -101,7 +101,7 @@ impl Buffers {
     ) -> Self {
         let storage = |bytes| flight.pool.take(&flight.device, Use::Storage, bytes);
         let sizes = sizes(shape, compiled.text.states());
-        let row = shape.plan.row;
+        let row = shape.chunking.row;
         let layered = network.filter(|_| compiled.text.fused().is_none());
         let seen = layered.filter(|_| compiled.text.observes()).map(|mlp| mlp.widths()[0]);
         let slots: Vec<_> = sizes.into_iter().map(|(slot, bytes)| (slot, storage(bytes))).collect();
@@ -140,8 +140,8 @@ impl Buffers {
 }
 
 /// Bytes of each buffer.
-fn sizes(Shape { work, horizon, plan, .. }: Shape, states: usize) -> Vec<(Slot, u64)> {
-    let (row, stride) = (u64::from(plan.row), u64::from(plan.stride));
+fn sizes(Shape { work, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Slot, u64)> {
+    let (row, stride) = (u64::from(chunking.row), u64::from(chunking.stride));
     let state = 16 * states.div_ceil(4) as u64 * row;
     let measures = 4 * stride * u64::from(work.sides());
     let mut sizes = vec![
@@ -159,7 +159,7 @@ fn sizes(Shape { work, horizon, plan, .. }: Shape, states: usize) -> Vec<(Slot, 
             (Slot::Survivors, 4),
         ]),
         Work::Pairs => sizes.extend([
-            (Slot::Distances, 4 * stride * u64::from(plan.segment)),
+            (Slot::Distances, 4 * stride * u64::from(chunking.segment)),
             (Slot::Farthest, 8 * (u64::from(horizon) + 1)),
         ]),
     }

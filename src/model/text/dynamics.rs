@@ -2,7 +2,7 @@
 
 use super::names::Scope;
 use super::section::{Section, unknown};
-use super::written::{Purpose, Words, Written, one_each};
+use super::written::{FormulaKind, Words, Written, one_each};
 use crate::error::Result;
 
 /// How the state moves on.
@@ -109,7 +109,7 @@ fn formulas(
 ) -> Result<Vec<Written>> {
     let words = Words { name: "state", formula };
     one_each(section, states.iter().copied(), words, |key, value| {
-        Written::read(section, key, value, scope, Purpose::Dynamics)
+        Written::read(section, key, value, scope, FormulaKind::Dynamics)
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::names::Scope;
 use super::section::Section;
-use super::written::{Purpose, Written};
+use super::written::{FormulaKind, Written};
 use crate::error::{Error, Result};
 use crate::formula::Scalar;
 use crate::formula::text::{Networks, Use, Values};
@@ -40,7 +40,7 @@ impl Lets {
         for (key, _) in section.entries() {
             scope.declare(&section, key, "an intermediate formula")?;
         }
-        let read = |(key, value)| Written::read(&section, key, value, scope, Purpose::Dynamics);
+        let read = |(key, value)| Written::read(&section, key, value, scope, FormulaKind::Dynamics);
         let formulas = section.entries().map(read).collect::<Result<Vec<_>>>()?;
         let mut lets = Self { formulas, order: Vec::new(), first };
         lets.sort(&section)?;

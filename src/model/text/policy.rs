@@ -6,7 +6,7 @@ use toml::Value;
 
 use super::names::Scope;
 use super::section::Section;
-use super::written::{Purpose, Words, Written, one_each};
+use super::written::{FormulaKind, Words, Written, one_each};
 use crate::error::Result;
 
 /// What makes the controls.
@@ -50,7 +50,7 @@ fn formulas(section: &Section<'_>, controls: &[&str], scope: &Scope) -> Result<V
         let problem = "belongs to a network; a formula sees the states and is the control";
         return Err(section.refuse(key, problem));
     }
-    per_control(section, "formula", controls, scope, Purpose::Policy)
+    per_control(section, "formula", controls, scope, FormulaKind::Policy)
 }
 
 fn network(
@@ -60,7 +60,7 @@ fn network(
     scope: &Scope,
 ) -> Result<NetworkPolicy> {
     let act = if section.has("act") {
-        Some(per_control(section, "act", controls, scope, Purpose::Act)?)
+        Some(per_control(section, "act", controls, scope, FormulaKind::Act)?)
     } else {
         None
     };
@@ -74,12 +74,12 @@ fn per_control(
     key: &str,
     controls: &[&str],
     scope: &Scope,
-    purpose: Purpose,
+    kind: FormulaKind,
 ) -> Result<Vec<Written>> {
     let inner = section.required(key, "a formula for each control")?;
     let words = Words { name: "control", formula: "formula for the control" };
     one_each(&inner, controls.iter().copied(), words, |key, value| {
-        Written::read(&inner, key, value, scope, purpose)
+        Written::read(&inner, key, value, scope, kind)
     })
 }
 
@@ -90,7 +90,7 @@ fn observe(section: &Section<'_>, scope: &Scope) -> Result<Option<Vec<Written>>>
         return Err(section.refuse("observe", format!("expected {expected}, found none")));
     }
     let read = |(i, value): (usize, &Value)| {
-        Written::read(section, &format!("observe[{i}]"), value, scope, Purpose::Policy)
+        Written::read(section, &format!("observe[{i}]"), value, scope, FormulaKind::Policy)
     };
     list.iter().enumerate().map(read).collect::<Result<_>>().map(Some)
 }

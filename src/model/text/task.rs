@@ -4,7 +4,7 @@ use toml::Value;
 
 use super::names::Scope;
 use super::section::{Section, unknown};
-use super::written::{Purpose, Written};
+use super::written::{FormulaKind, Written};
 use crate::error::Result;
 use crate::system::Body;
 
@@ -37,7 +37,7 @@ pub(super) fn task(section: &Section<'_>, scope: &Scope) -> Result<Task> {
                 "missing; expected a margin, a formula that is positive where it holds",
             )
         })?;
-        Written::read(section, key, value, scope, Purpose::Task)
+        Written::read(section, key, value, scope, FormulaKind::Task)
     };
     Ok(Task { target: margin("target")?, constraint: margin("constraint")? })
 }
@@ -81,7 +81,7 @@ pub(super) fn bodies(section: Option<Section<'_>>, scope: &Scope) -> Result<Vec<
 
 /// The state that a coordinate of a body is.
 fn coordinate(entry: &Section<'_>, value: &Value, scope: &Scope) -> Result<usize> {
-    let written = Written::read(entry, "at", value, scope, Purpose::Picture)?;
+    let written = Written::read(entry, "at", value, scope, FormulaKind::Picture)?;
     let state = written.formula.only_name().map(|place| place as usize);
     state.filter(|state| *state < scope.states).ok_or_else(|| {
         let problem = "a body at a formula cannot be shown yet; expected the name of a state";

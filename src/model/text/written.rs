@@ -21,7 +21,7 @@ pub struct Written {
 
 /// What a formula is for, which says what it may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Purpose {
+pub(super) enum FormulaKind {
     /// Intermediate formulas, derivatives and next values: states, controls, parameters, time.
     Dynamics,
     /// Margins: no controls.
@@ -34,7 +34,7 @@ pub(super) enum Purpose {
     Act,
 }
 
-impl Purpose {
+impl FormulaKind {
     /// What a formula may use, for an error about one that uses more.
     fn allowed(self) -> &'static str {
         match self {
@@ -55,7 +55,7 @@ impl Written {
         key: &str,
         value: &Value,
         scope: &Scope,
-        purpose: Purpose,
+        kind: FormulaKind,
     ) -> Result<Self> {
         let Value::String(text) = value else {
             let expected = "a formula as text, for instance \"2 * sin(t)\"";
@@ -65,26 +65,26 @@ impl Written {
         let refuse = |fault: &Fault| section.origin.refuse_formula(&key, text, fault);
         let formula = Formula::parse(text, &scope.names).map_err(|fault| refuse(&fault))?;
         let written = Self { key: key.clone(), text: text.clone(), formula };
-        written.check(section.origin, scope, purpose)?;
+        written.check(section.origin, scope, kind)?;
         Ok(written)
     }
 
-    /// Refuses what the purpose does not allow.
-    fn check(&self, origin: &Origin, scope: &Scope, purpose: Purpose) -> Result<()> {
-        if purpose != Purpose::Act
+    /// Refuses what the kind does not allow.
+    fn check(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
+        if kind != FormulaKind::Act
             && let Some(output) = self.formula.outputs().next()
         {
             let problem = "`out` stands in `act` of `[policy]` alone";
             return Err(self.refuse(origin, output.at, problem));
         }
-        if purpose != Purpose::Dynamics {
-            self.check_controls(origin, scope, purpose)?;
+        if kind != FormulaKind::Dynamics {
+            self.check_controls(origin, scope, kind)?;
         }
         Ok(())
     }
 
     /// Refuses controls, whether used here or by an intermediate formula.
-    fn check_controls(&self, origin: &Origin, scope: &Scope, purpose: Purpose) -> Result<()> {
+    fn check_controls(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
         for Use { number, at } in self.formula.names() {
             let Some(control) = scope.control_behind(number) else { continue };
             let (name, control) = (scope.names.at(number), scope.names.at(control));
@@ -93,7 +93,7 @@ impl Written {
             } else {
                 format!("`{name}` uses the control `{control}`")
             };
-            return Err(self.refuse(origin, at, format!("{what}; {}", purpose.allowed())));
+            return Err(self.refuse(origin, at, format!("{what}; {}", kind.allowed())));
         }
         Ok(())
     }

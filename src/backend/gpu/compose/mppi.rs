@@ -59,7 +59,7 @@ impl MppiText {
             parameters: model.parameters.len(),
             period: model.period.unwrap_or(0.0),
             contexts: cost.contexts,
-            driver: None,
+            driving: None,
         };
         let contexts = [0, cost.contexts];
         let mut functions = vec![

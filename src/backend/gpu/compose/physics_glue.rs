@@ -19,12 +19,12 @@ pub(super) struct Outline {
     /// Numbers of context that the cost of a stage takes; 0 where there is no cost.
     pub(super) contexts: usize,
     /// The network that drives, if one does.
-    pub(super) driver: Option<Driver>,
+    pub(super) driving: Option<DrivingNetwork>,
 }
 
 /// What the texts have of the network that drives.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Driver {
+pub(super) struct DrivingNetwork {
     /// Activation of hidden layers and of the last one.
     pub(super) activations: (Activation, OutputActivation),
     /// Numbers that it sees.
@@ -35,7 +35,7 @@ pub(super) struct Driver {
     pub(super) fused: Option<Fused>,
 }
 
-impl Driver {
+impl DrivingNetwork {
     /// What the texts have of `mlp`, its layers with kernels of their own.
     pub(super) fn new(mlp: &Mlp) -> Self {
         let widths = mlp.widths();
@@ -115,7 +115,7 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Role::Stage => ("staged", "x: State, u: Control, context: Context", "f32", false),
         Role::Cell => ("cell_at", "x: State", "f32", false),
     };
-    let said = outline.driver.as_ref().map_or(0, |driver| driver.outputs);
+    let said = outline.driving.as_ref().map_or(0, |driving| driving.outputs);
     // A single number is an f32 to the recorded function, and an array to the kernel.
     let array = |name: &str, length: usize| match length {
         1 => format!("{name}[0]"),
@@ -138,13 +138,13 @@ fn caller(outline: &Outline, function: &Function) -> String {
 
 /// What stands around the network where nothing is said: it sees the states, and says the controls.
 fn network_glue(outline: &Outline, has: impl Fn(Role) -> bool) -> String {
-    let Some(driver) = &outline.driver else { return String::new() };
+    let Some(driving) = &outline.driving else { return String::new() };
     let mut glue = format!(
         "alias Inputs = array<f32, {}>;\nalias Outputs = array<f32, {}>;\n",
-        driver.inputs, driver.outputs
+        driving.inputs, driving.outputs
     );
     let rolls = has(Role::Step);
-    if rolls && driver.fused.is_some() && !has(Role::Observe) {
+    if rolls && driving.fused.is_some() && !has(Role::Observe) {
         glue += "fn observed(x: State, t: u32) -> Inputs {\n    return x;\n}\n";
     }
     if rolls && !has(Role::Act) {

@@ -5,7 +5,7 @@ use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, fin
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
 use super::kernels::{Access, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
-use super::physics_glue::{Driver, Outline, physics_glue};
+use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
 use crate::formula::wgsl::{CHOICES, Product, function, function_with};
@@ -50,12 +50,12 @@ impl PlantText {
             parameters: model.parameters.len(),
             period: model.period.unwrap_or(0.0),
             contexts: 0,
-            driver: controller.network().map(Driver::new),
+            driving: controller.network().map(DrivingNetwork::new),
         };
         let chain = ChainText::new(&outline, model, controller)?;
         if chain.is_some() {
             // The network that drives is one of those that the chain calls.
-            outline.driver = None;
+            outline.driving = None;
         }
         Ok(Self { outline, physics, chain })
     }
@@ -63,8 +63,8 @@ impl PlantText {
     /// The same texts where the rollouts run the layers of a network themselves.
     #[must_use]
     pub fn fusing(mut self, fused: Option<Fused>) -> Self {
-        if let Some(driver) = &mut self.outline.driver {
-            driver.fused = fused;
+        if let Some(driving) = &mut self.outline.driving {
+            driving.fused = fused;
         }
         self
     }
@@ -86,13 +86,13 @@ impl PlantText {
 
     /// Whether a kernel of its own evaluates what the network sees.
     pub fn observes(&self) -> bool {
-        let layered = self.outline.driver.as_ref().is_some_and(|driver| driver.fused.is_none());
+        let layered = self.outline.driving.as_ref().is_some_and(|driving| driving.fused.is_none());
         layered && self.physics.function(Role::Observe).is_some()
     }
 
     /// The layers that the rollouts run themselves.
     pub fn fused(&self) -> Option<&Fused> {
-        self.outline.driver.as_ref().and_then(|driver| driver.fused.as_ref())
+        self.outline.driving.as_ref().and_then(|driving| driving.fused.as_ref())
     }
 
     /// Operations of the formulas for one step: a line of the text is one.
@@ -102,7 +102,7 @@ impl PlantText {
 
     /// What `kernel` binds.
     pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
-        let mut list = kernel.bindings(self.outline.driver.is_some());
+        let mut list = kernel.bindings(self.outline.driving.is_some());
         match (&self.chain, kernel) {
             (Some(chain), Kernel::Link(number)) => return chain.bindings(&self.outline, number),
             (Some(_), Kernel::ReachAvoid | Kernel::Deviation) => {
@@ -145,7 +145,7 @@ impl PlantText {
             Kernel::Compact => vec![folds(), COMPACT.to_owned()],
             Kernel::Reduce => vec![REDUCE.to_owned()],
             Kernel::HiddenLayer | Kernel::OutputLayer => {
-                let activations = self.outline.driver.as_ref().map(|driver| driver.activations);
+                let activations = self.outline.driving.as_ref().map(|driving| driving.activations);
                 vec![layer_text(activations, kernel == Kernel::OutputLayer)]
             }
             Kernel::Observe => vec![self.observation(), OBSERVE.to_owned()],
@@ -208,7 +208,7 @@ impl PlantText {
 
     /// What evaluates the inputs of a network.
     fn observation(&self) -> String {
-        let quads = self.outline.driver.as_ref().map_or(0, |driver| driver.inputs.div_ceil(4));
+        let quads = self.outline.driving.as_ref().map_or(0, |driving| driving.inputs.div_ceil(4));
         let mut store = String::from("fn store_seen(column: u32, seen: Inputs) {\n");
         for quad in 0..quads {
             let entries = super::glue::padded("seen", quad, self.seen());
@@ -220,7 +220,7 @@ impl PlantText {
 
     /// Numbers that the network sees.
     fn seen(&self) -> usize {
-        self.outline.driver.as_ref().map_or(0, |driver| driver.inputs)
+        self.outline.driving.as_ref().map_or(0, |driving| driving.inputs)
     }
 
     /// The recorded functions that `kernel` calls, and what calls them.
@@ -255,14 +255,14 @@ impl PlantText {
     /// `drive`: the controls at a state, by the formula, from the last layer's outputs, or by the
     /// network that the rollout runs itself.
     fn drive(&self) -> String {
-        let Some(driver) = &self.outline.driver else {
+        let Some(driving) = &self.outline.driving else {
             return "fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {\n    \
                     return control_of(x, t);\n}\n"
                 .to_owned();
         };
-        if let Some(fused) = &driver.fused {
-            let glue = activation_glue(driver.inputs, driver.outputs);
-            return fused_text(driver.activations, fused, &glue);
+        if let Some(fused) = &driving.fused {
+            let glue = activation_glue(driving.inputs, driving.outputs);
+            return fused_text(driving.activations, fused, &glue);
         }
         let slot = Slot::Control as u32;
         let mut text = format!(
@@ -270,17 +270,17 @@ impl PlantText {
              fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {{\n    \
              let stride = params.stride * (1u + params.paired);\n"
         );
-        for quad in 0..driver.outputs.div_ceil(4) {
+        for quad in 0..driving.outputs.div_ceil(4) {
             text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
         }
-        let all: Vec<String> = (0..driver.outputs).map(component).collect();
+        let all: Vec<String> = (0..driving.outputs).map(component).collect();
         text + &format!("    return acted(x, Outputs({}), t);\n}}\n", all.join(", "))
     }
 }
 
 /// The WGSL module of a hidden or the last layer of `mlp`, whoever it drives.
 pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
-    let Driver { activations, inputs, outputs, .. } = Driver::new(mlp);
+    let DrivingNetwork { activations, inputs, outputs, .. } = DrivingNetwork::new(mlp);
     let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
     [constants(inputs, outputs), PARAMS.to_owned(), CHOICES.to_owned(), text].join("\n")
 }
@@ -297,7 +297,7 @@ fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
         expected.push(("control", graph, [inputs, controls]));
     }
     if let Law::Network { observe, network, act } = &controller.law {
-        let Driver { inputs: seen, outputs: said, .. } = Driver::new(network);
+        let DrivingNetwork { inputs: seen, outputs: said, .. } = DrivingNetwork::new(network);
         check_network(
             observe.is_some() || seen == states,
             act.is_some() || said == controls,

@@ -1,18 +1,13 @@
 //! How a batch is cut up: columns per chunk, steps per dispatch, steps per submission.
 
-use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit};
+use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS};
 use super::chain_load::ChainLoad;
 use super::compose::{Fused, WORKGROUP, input_quads, output_quads, parameter_quads};
-use super::device::{Adapter, AdapterKind};
+use super::device::Adapter;
+use super::fusing::step_trips;
 use super::network::network_flops;
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
-
-/// Iterations that one invocation may spend, all its loops summed.
-///
-/// Mesa's lavapipe stops every invocation after 65,535 iterations without an error, its results
-/// wrong; no other limit is known to be lower.
-pub(super) const MAX_TRIPS: u64 = 60_000;
 
 /// Most columns of a chunk under a network, which has a thread per 8 neurons of 8 columns.
 pub(super) const NETWORK_COLUMNS: u64 = 1 << 14;
@@ -20,13 +15,10 @@ pub(super) const NETWORK_COLUMNS: u64 = 1 << 14;
 /// threads per 64 columns: enough for any GPU, and not too long a dispatch for the watchdog of a
 /// slow one.
 const FUSED_COLUMNS: u64 = 1 << 16;
-/// Widest network that rollouts run themselves: beyond, its activations leave no room for a second
-/// workgroup, and its parameters do not stay in the caches.
-const FUSED_WIDTH: usize = 128;
 /// Most device memory of one call, bytes.
 pub(super) const MEMORY_BYTES: u64 = 256 << 20;
 
-/// What is asked of the rollouts, as far as it decides the plan.
+/// What is asked of the rollouts, as far as it decides the chunking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
     /// Measures of trajectories.
@@ -39,12 +31,14 @@ pub(super) enum Work {
 
 impl Work {
     /// Steps per submission.
-    fn segment(self, driven: Driven) -> u32 {
-        match (self, driven) {
-            (Self::Measure, Driven::Formula) => 256,
-            (Self::Measure, Driven::Layered) => 64,
-            (Self::Sign, Driven::Layered | Driven::Fused) => 8,
-            (Self::Sign, Driven::Formula) | (Self::Measure, Driven::Fused) | (Self::Pairs, _) => 32,
+    fn segment(self, driven_by: DrivenBy) -> u32 {
+        match (self, driven_by) {
+            (Self::Measure, DrivenBy::Formula) => 256,
+            (Self::Measure, DrivenBy::Layered) => 64,
+            (Self::Sign, DrivenBy::Layered | DrivenBy::Fused) => 8,
+            (Self::Sign, DrivenBy::Formula)
+            | (Self::Measure, DrivenBy::Fused)
+            | (Self::Pairs, _) => 32,
         }
     }
 
@@ -56,7 +50,7 @@ impl Work {
 
 /// What drives the rollouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Driven {
+enum DrivenBy {
     /// A formula.
     Formula,
     /// Networks, the one that drives or those that formulas call: dispatches between the steps.
@@ -65,7 +59,7 @@ enum Driven {
     Fused,
 }
 
-impl Driven {
+impl DrivenBy {
     fn new(size: &Size<'_>) -> Self {
         match (size.network, size.fused, size.chain) {
             (_, _, Some(_)) | (Some(_), None, None) => Self::Layered,
@@ -84,59 +78,7 @@ impl Driven {
     }
 }
 
-/// How rollouts run the network that drives them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum NetworkKernels {
-    /// Fused where that should be faster: networks of at most 128 neurons per layer, on hardware
-    /// whose workgroups have the memory. Nothing of a trajectory then leaves its workgroup before
-    /// the last step, and there is one dispatch instead of one per layer and step. A software
-    /// adapter gets layers: workgroup memory is ordinary memory there, and the larger number of
-    /// barriers costs.
-    #[default]
-    Chosen,
-    /// A dispatch per layer and step, activations in storage.
-    Layered,
-    /// The rollout kernel runs all layers of all steps, activations in workgroup memory.
-    Fused,
-}
-
-/// The layers of `network` if rollouts on `adapter` run them themselves.
-///
-/// # Errors
-/// [`Error::Device`] if that is asked for and not possible.
-pub(super) fn fused(
-    adapter: &Adapter,
-    network: Option<&Mlp>,
-    wanted: NetworkKernels,
-) -> Result<Option<Fused>> {
-    let Some(mlp) = network.filter(|_| wanted != NetworkKernels::Layered) else {
-        return Ok(None);
-    };
-    let fused = Fused::new(mlp);
-    let widest = mlp.widths().into_iter().max().unwrap_or(0);
-    let fits = widest <= FUSED_WIDTH
-        && fused.workgroup_bytes() <= u64::from(adapter.max_workgroup_bytes)
-        && fused.lanes() <= adapter.max_workgroup_threads
-        && step_trips(&fused, Work::Pairs) <= MAX_TRIPS;
-    match wanted {
-        NetworkKernels::Fused if !fits => Err(Error::Device(format!(
-            "a network of {widest} neurons per layer does not fuse: at most {FUSED_WIDTH}, and \
-             {} bytes of workgroup memory, of which {} has {}; run it in layers",
-            fused.workgroup_bytes(),
-            adapter.name,
-            adapter.max_workgroup_bytes
-        ))),
-        NetworkKernels::Chosen if adapter.kind == AdapterKind::Software => Ok(None),
-        _ => Ok(fits.then_some(fused)),
-    }
-}
-
-/// Loop iterations of a thread for one step that runs the network itself.
-fn step_trips(fused: &Fused, work: Work) -> u64 {
-    1 + u64::from(work.sides()) * fused.trips()
-}
-
-/// A batch, as far as it decides the plan.
+/// A batch, as far as it decides the chunking.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size<'a> {
     /// States of the system.
@@ -166,7 +108,7 @@ impl Size<'_> {
 
 /// How a batch is cut up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Plan {
+pub(super) struct Chunking {
     /// Columns of a chunk: trajectories or pairs.
     pub(super) stride: u32,
     /// Trajectories in each row of the state: `stride`, or twice that for pairs.
@@ -178,8 +120,8 @@ pub(super) struct Plan {
     pub(super) steps: u32,
 }
 
-impl Plan {
-    /// The plan for a batch on `adapter` within `limit`.
+impl Chunking {
+    /// The chunking for a batch on `adapter` within `limit`.
     ///
     /// # Errors
     /// [`Error::Device`] if not even the smallest chunk fits.
@@ -190,9 +132,9 @@ impl Plan {
         size: &Size<'_>,
     ) -> Result<Self> {
         let Size { states, network, fused, seen, count, chain, .. } = *size;
-        let driven = Driven::new(size);
-        let segment = work.segment(driven);
-        let layered = network.filter(|_| driven == Driven::Layered);
+        let driven_by = DrivenBy::new(size);
+        let segment = work.segment(driven_by);
+        let layered = network.filter(|_| driven_by == DrivenBy::Layered);
         let mut parts = column_bytes(work, (states, seen), layered, segment);
         let called = chain.map_or([0; 5], |load| load.bytes);
         parts.extend(called.map(|bytes| bytes * u64::from(work.sides())));
@@ -202,7 +144,7 @@ impl Plan {
         // A step of the smallest chunk is what there is at least.
         let step_flops = u64::from(work.sides()) * size.step_flops();
         let timely = limit.pieces(step_flops).max(COLUMN_UNIT);
-        let wanted = count.max(1).next_multiple_of(COLUMN_UNIT).min(driven.columns());
+        let wanted = count.max(1).next_multiple_of(COLUMN_UNIT).min(driven_by.columns());
         let most = fitting.min(timely).min(limit.columns);
         let stride = wanted.min(most / COLUMN_UNIT * COLUMN_UNIT);
         let parameters = 16 * network.map_or(0, parameter_quads) as u64;
@@ -211,9 +153,9 @@ impl Plan {
             return Err(too_large(adapter, largest * COLUMN_UNIT, parameters, binding));
         }
         let segment = u64::from(segment).min(limit.pieces(stride * step_flops)) as u32;
-        let steps = match (driven, fused) {
-            (Driven::Layered, _) => 1,
-            (_, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work)) as u32),
+        let steps = match (driven_by, fused) {
+            (DrivenBy::Layered, _) => 1,
+            (_, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work.sides())) as u32),
             (_, None) => segment,
         };
         let trips = longest_trips(states, layered, stride, u64::from(steps));
@@ -252,7 +194,7 @@ fn column_bytes(
     parts
 }
 
-/// Most loop iterations of one invocation of any kernel of the plan, `network` in layers.
+/// Most loop iterations of one invocation of any kernel of the chunking, `network` in layers.
 fn longest_trips(states: usize, network: Option<&Mlp>, stride: u64, steps: u64) -> u64 {
     let states = states as u64;
     // Philox takes 10 iterations per 4 words; a start and its perturbation run over the states
@@ -299,8 +241,8 @@ mod tests {
         Size { states, flops: 200, network, fused, chain: None, seen: 0, count }
     }
 
-    fn planned(adapter: &Adapter, work: Work, size: &Size<'_>) -> Result<Plan> {
-        Plan::new(adapter, Limit::default(), work, size)
+    fn planned(adapter: &Adapter, work: Work, size: &Size<'_>) -> Result<Chunking> {
+        Chunking::new(adapter, Limit::default(), work, size)
     }
 
     #[test]
@@ -313,19 +255,19 @@ mod tests {
                     // Parameters of the wide network take a megabyte of their own.
                     let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
                     let size = size(12, (network, fused.as_ref()), count);
-                    let plan = planned(&Adapter::made_up(binding), work, &size);
-                    let plan = plan.expect("a plan within the limits");
+                    let chunking = planned(&Adapter::made_up(binding), work, &size);
+                    let chunking = chunking.expect("a chunking within the limits");
                     let layered = network.filter(|_| fused.is_none());
-                    let bytes = column_bytes(work, (12, 0), layered, plan.segment);
-                    let stride = u64::from(plan.stride);
+                    let bytes = column_bytes(work, (12, 0), layered, chunking.segment);
+                    let stride = u64::from(chunking.stride);
                     assert_eq!(stride % COLUMN_UNIT, 0);
                     assert!(bytes.iter().all(|bytes| bytes * stride <= binding));
                     assert!(bytes.iter().sum::<u64>() * stride <= MEMORY_BYTES);
-                    let step = fused.as_ref().map_or(1, |fused| step_trips(fused, work));
-                    assert!(u64::from(plan.steps) * step <= MAX_TRIPS);
-                    assert_eq!(plan.steps == 1, layered.is_some());
-                    let flops = stride * u64::from(work.sides() * plan.segment);
-                    assert!(flops * size.step_flops() <= WORK_FLOPS, "{plan:?}");
+                    let step = fused.as_ref().map_or(1, |fused| step_trips(fused, work.sides()));
+                    assert!(u64::from(chunking.steps) * step <= MAX_TRIPS);
+                    assert_eq!(chunking.steps == 1, layered.is_some());
+                    let flops = stride * u64::from(work.sides() * chunking.segment);
+                    assert!(flops * size.step_flops() <= WORK_FLOPS, "{chunking:?}");
                 }
             }
         }
@@ -334,8 +276,8 @@ mod tests {
     #[test]
     fn small_batches_get_small_chunks() {
         let size = size(12, (None, None), 468);
-        let plan = planned(&Adapter::made_up(1 << 27), Work::Measure, &size);
-        assert_eq!(plan.expect("a plan").stride, 512);
+        let chunking = planned(&Adapter::made_up(1 << 27), Work::Measure, &size);
+        assert_eq!(chunking.expect("a chunking").stride, 512);
     }
 
     #[test]
@@ -358,9 +300,13 @@ mod tests {
             [(1 << 20, (1 << 14, 64)), (1 << 15, (1 << 14, 2)), (100, (64, 1))]
         {
             let limit = Limit { flops: pieces * step, ..Limit::default() };
-            let plan = Plan::new(&Adapter::made_up(1 << 27), limit, Work::Measure, &size);
-            let plan = plan.expect("a plan");
-            assert_eq!((plan.stride, plan.segment), expected, "{pieces} trajectories and steps");
+            let chunking = Chunking::new(&Adapter::made_up(1 << 27), limit, Work::Measure, &size);
+            let chunking = chunking.expect("a chunking");
+            assert_eq!(
+                (chunking.stride, chunking.segment),
+                expected,
+                "{pieces} trajectories and steps"
+            );
         }
     }
 
@@ -372,37 +318,15 @@ mod tests {
             assert!(half.columns <= columns / 2 && half.flops == limit.flops / 2);
             assert_eq!(half.columns % COLUMN_UNIT, 0);
             (limit, columns) = (half, half.columns);
-            let plan = Plan::new(
+            let chunking = Chunking::new(
                 &Adapter::made_up(1 << 27),
                 limit,
                 Work::Pairs,
                 &size(12, (None, None), u64::MAX / 2),
             );
-            assert_eq!(u64::from(plan.expect("a plan").stride), columns);
+            assert_eq!(u64::from(chunking.expect("a chunking").stride), columns);
         }
         assert_eq!(columns, COLUMN_UNIT);
-    }
-
-    /// Whether a network of these widths is fused on hardware with `bytes` of workgroup memory.
-    fn fuses(widths: &[usize], bytes: u32, kind: AdapterKind, wanted: NetworkKernels) -> bool {
-        let adapter = Adapter { kind, max_workgroup_bytes: bytes, ..Adapter::made_up(1 << 27) };
-        let fused = fused(&adapter, Some(&network(widths)), wanted);
-        fused.is_ok_and(|fused| fused.is_some())
-    }
-
-    #[test]
-    fn networks_fuse_where_they_fit() {
-        use AdapterKind::{Discrete, Software};
-        use NetworkKernels::{Chosen, Layered};
-        let (least, usual) = (16 << 10, 32 << 10);
-        assert!(fuses(&[12, 64, 64, 64, 3], least, Discrete, Chosen));
-        assert!(!fuses(&[12, 128, 128, 3], least, Discrete, Chosen), "16 KiB hold 64 neurons");
-        assert!(fuses(&[12, 128, 128, 3], usual, Discrete, Chosen));
-        assert!(!fuses(&[12, 129, 3], 1 << 20, Discrete, Chosen), "too wide");
-        assert!(!fuses(&[12, 129, 3], 1 << 20, Discrete, NetworkKernels::Fused), "too wide");
-        assert!(!fuses(&[12, 64, 3], usual, Software, Chosen));
-        assert!(fuses(&[12, 64, 3], usual, Software, NetworkKernels::Fused));
-        assert!(!fuses(&[12, 64, 3], usual, Discrete, Layered));
     }
 
     #[test]
@@ -412,9 +336,9 @@ mod tests {
         let adapter = Adapter::made_up(1 << 27);
         let size = size(12, (Some(&deep), Some(&fused)), 1000);
         let limit = Limit { flops: u64::MAX, ..Limit::default() };
-        let plan = Plan::new(&adapter, limit, Work::Measure, &size);
+        let chunking = Chunking::new(&adapter, limit, Work::Measure, &size);
         // 3 vectors of inputs, then 60 times 32, and the 61 layers themselves.
         let trips = 1 + 3 + 60 * 32 + 61;
-        assert_eq!(u64::from(plan.expect("a plan").steps), MAX_TRIPS / trips);
+        assert_eq!(u64::from(chunking.expect("a chunking").steps), MAX_TRIPS / trips);
     }
 }

@@ -1,13 +1,13 @@
 //! How MPPI problems are cut up: samples and problems per chunk, rounds of a workgroup, steps per
 //! dispatch.
 
-use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit};
+use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS};
+use super::chunking::{MEMORY_BYTES, NETWORK_COLUMNS};
 use super::compose::{
     PARTIAL_HEADER, WORKGROUP, input_quads, output_quads, parameter_quads, tile_steps,
 };
 use super::device::Adapter;
 use super::network::network_flops;
-use super::plan::{MAX_TRIPS, MEMORY_BYTES, NETWORK_COLUMNS};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 
@@ -26,7 +26,7 @@ const OTHER_BYTES: u64 = 1 << 19;
 /// Knots of a spline that a dispatch draws before its first step.
 const WINDOW: u64 = 4;
 
-/// A batch of problems, as far as it decides the plan.
+/// A batch of problems, as far as it decides the chunks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size<'a> {
     /// Number of states.
@@ -78,7 +78,7 @@ impl Size<'_> {
 
 /// How the batch is cut up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct MppiPlan {
+pub(super) struct MppiChunking {
     /// Problems of a chunk.
     pub(super) problems: u32,
     /// Samples of each problem in a chunk.
@@ -97,8 +97,8 @@ pub(super) struct MppiPlan {
     pub(super) timely_steps: u32,
 }
 
-impl MppiPlan {
-    /// The plan for a batch on `adapter` within `limit`.
+impl MppiChunking {
+    /// How to cut a batch on `adapter` within `limit`.
     ///
     /// # Errors
     /// [`Error::Device`] if not even the smallest chunk fits, or a kernel needs more loop
@@ -144,7 +144,7 @@ impl MppiPlan {
     }
 }
 
-impl MppiPlan {
+impl MppiChunking {
     /// Most dispatches of a submission.
     pub(super) fn dispatches(&self, size: &Size<'_>) -> u64 {
         let rollouts = u64::from(size.horizon.div_ceil(self.rollout_steps));
@@ -288,8 +288,8 @@ mod tests {
         }
     }
 
-    fn planned(adapter: &Adapter, size: &Size<'_>) -> Result<MppiPlan> {
-        MppiPlan::new(adapter, Limit::default(), size)
+    fn planned(adapter: &Adapter, size: &Size<'_>) -> Result<MppiChunking> {
+        MppiChunking::new(adapter, Limit::default(), size)
     }
 
     /// Blocks of Philox that `steps` draws of `controls` numbers touch, from the worst place on.
@@ -325,9 +325,9 @@ mod tests {
             for horizon in [1, 20, 512] {
                 for (controls, problems) in [(1, 1), (3, 1), (3, 500), (12, 100_000)] {
                     let size = size(controls, horizon, samples, problems);
-                    let plan =
-                        planned(&Adapter::made_up(1 << 27), &size).expect("a plan that fits");
-                    check(&size, &plan, 1 << 27);
+                    let chunking =
+                        planned(&Adapter::made_up(1 << 27), &size).expect("a chunking that fits");
+                    check(&size, &chunking, 1 << 27);
                 }
             }
         }
@@ -337,42 +337,45 @@ mod tests {
     fn an_upload_holds_its_problems_and_fits_a_buffer() {
         // A race's problem takes 16 + 48 + 20 * (12 + 32) bytes.
         let size = size(3, 20, 64, 100_000);
-        let plan = planned(&Adapter::made_up(1 << 22), &size).expect("a plan that fits");
-        let parts: u64 = size.parts(u64::from(plan.problems)).iter().sum();
-        assert!((1000..=(1 << 22) / 944).contains(&plan.problems), "{plan:?}");
-        assert!(parts + 256 * plan.dispatches(&size) <= 1 << 22, "{plan:?}");
+        let chunking = planned(&Adapter::made_up(1 << 22), &size).expect("a chunking that fits");
+        let parts: u64 = size.parts(u64::from(chunking.problems)).iter().sum();
+        assert!((1000..=(1 << 22) / 944).contains(&chunking.problems), "{chunking:?}");
+        assert!(parts + 256 * chunking.dispatches(&size) <= 1 << 22, "{chunking:?}");
     }
 
-    fn check(size: &Size<'_>, plan: &MppiPlan, binding: u64) {
-        let stride = u64::from(plan.stride);
-        assert_eq!(plan.width % (WORKGROUP * plan.rounds), 0, "{plan:?}");
-        assert!(plan.width >= plan.samples && plan.problems * plan.width <= plan.stride);
-        assert!(plan.samples == size.samples || plan.problems == 1, "{plan:?}");
+    fn check(size: &Size<'_>, chunking: &MppiChunking, binding: u64) {
+        let stride = u64::from(chunking.stride);
+        assert_eq!(chunking.width % (WORKGROUP * chunking.rounds), 0, "{chunking:?}");
+        assert!(
+            chunking.width >= chunking.samples
+                && chunking.problems * chunking.width <= chunking.stride
+        );
+        assert!(chunking.samples == size.samples || chunking.problems == 1, "{chunking:?}");
         assert_eq!(stride % COLUMN_UNIT, 0);
         let columns = column_bytes(size).into_iter().map(|bytes| bytes * stride);
-        let problems = problem_bytes(size) * u64::from(plan.problems);
-        assert!(columns.clone().all(|bytes| bytes <= binding), "{plan:?}");
-        assert!(columns.sum::<u64>() + problems <= MEMORY_BYTES, "{plan:?}");
-        assert!(noise_trips(size, u64::from(plan.rollout_steps)) <= MAX_TRIPS);
-        let update = update_trips(size, plan.rounds, u64::from(plan.update_steps));
-        assert!(update <= MAX_TRIPS, "{plan:?}");
+        let problems = problem_bytes(size) * u64::from(chunking.problems);
+        assert!(columns.clone().all(|bytes| bytes <= binding), "{chunking:?}");
+        assert!(columns.sum::<u64>() + problems <= MEMORY_BYTES, "{chunking:?}");
+        assert!(noise_trips(size, u64::from(chunking.rollout_steps)) <= MAX_TRIPS);
+        let update = update_trips(size, chunking.rounds, u64::from(chunking.update_steps));
+        assert!(update <= MAX_TRIPS, "{chunking:?}");
     }
 
     #[test]
     fn long_plans_are_split_over_dispatches() {
-        let long = planned(&Adapter::made_up(1 << 27), &size(24, 512, 64, 1)).expect("a plan");
+        let long = planned(&Adapter::made_up(1 << 27), &size(24, 512, 64, 1)).expect("a chunking");
         assert!((1..512).contains(&long.update_steps), "{long:?}");
-        let race = planned(&Adapter::made_up(1 << 27), &size(3, 20, 500, 500)).expect("a plan");
+        let race = planned(&Adapter::made_up(1 << 27), &size(3, 20, 500, 500)).expect("a chunking");
         assert_eq!((race.rollout_steps, race.update_steps), (20, 20));
     }
 
-    /// A plan must not depend on the problems beside it, nor its bits on how partials are cut.
+    /// A chunking must not depend on the problems beside it, nor its bits on how partials are cut.
     #[test]
     fn rounds_depend_on_the_samples_alone() {
         for (samples, rounds) in [(500, 1), (65_536, 1), (200_000, 3), (1_000_000, 4)] {
             for problems in [1, 500] {
-                let plan = planned(&Adapter::made_up(1 << 27), &size(3, 20, samples, problems));
-                assert_eq!(plan.expect("a plan").rounds, rounds, "{samples} x {problems}");
+                let chunking = planned(&Adapter::made_up(1 << 27), &size(3, 20, samples, problems));
+                assert_eq!(chunking.expect("a chunking").rounds, rounds, "{samples} x {problems}");
             }
         }
     }

@@ -220,7 +220,7 @@ impl Graph {
 /// keeps: the same nodes whatever becomes of the functions.
 macro_rules! operators {
     ($number:ident) => {
-        $crate::formula::record::operators! { $number: Add add, Sub sub, Mul mul, Div div }
+        $crate::formula::recorder::operators! { $number: Add add, Sub sub, Mul mul, Div div }
 
         impl std::ops::Neg for $number {
             type Output = Self;
