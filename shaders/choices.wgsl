@@ -36,3 +36,8 @@ fn sign_of(x: f32) -> f32 {
     let rest = select(x, -1.0, x < 0.0);
     return unless_nan(select(rest, 1.0, 0.0 < x), size_of(x));
 }
+
+// `x`, or NaN where it is `lost`.
+fn marked(x: f32, lost: bool) -> f32 {
+    return bitcast<f32>(select(bitcast<u32>(x), 0x7fc00000u, lost));
+}

@@ -1,6 +1,6 @@
 //! The physics of a plant as WGSL text: what shaders are built from and certificates hash.
 
-use crate::formula::wgsl::function;
+use crate::formula::wgsl::careful_function;
 use crate::formula::{Graph, Node};
 use crate::model::{Controller, Law, Model, Plant};
 
@@ -168,7 +168,7 @@ impl Function {
             taken += length as u32;
         }
         let moved = moved(graph, &place, taken);
-        let text = function(role.name(), &arguments, &moved);
+        let text = careful_function(role.name(), &arguments, &moved);
         Self { role, text, takes, outputs: graph.outputs.len() }
     }
 }

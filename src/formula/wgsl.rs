@@ -1,7 +1,10 @@
 //! Prints a recorded graph as a WGSL function.
 
+mod lost;
+
 use std::sync::Arc;
 
+use self::lost::Flags;
 use super::{Call, Graph, Node};
 
 /// The functions that printed formulas call: choices that hand a NaN on.
@@ -46,6 +49,26 @@ pub fn function_with(
     graph: &Graph,
     product: Product<'_>,
 ) -> String {
+    printed((name, arguments), &graph.expanded(), product, None)
+}
+
+/// Like [`function`], with every NaN kept, whatever a driver makes of `a - a` or `0 * a`: flags follow
+/// those that the formula gives birth to, and the result is marked by them.
+///
+/// # Panics
+/// As [`function`] does.
+pub fn careful_function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
+    let graph = graph.expanded();
+    printed((name, arguments), &graph, Product::Plain, Flags::of(&graph.nodes))
+}
+
+/// The function of an expanded graph, with flags where there are any.
+fn printed(
+    (name, arguments): (&str, &[(&str, usize)]),
+    graph: &Graph,
+    product: Product<'_>,
+    mut flags: Option<Flags<'_>>,
+) -> String {
     let inputs: Vec<String> = arguments
         .iter()
         .flat_map(|&(name, length)| {
@@ -57,7 +80,6 @@ pub fn function_with(
         arguments.iter().map(|(name, length)| format!("{name}: {}", float_type(*length))).collect();
     let result = float_type(graph.outputs.len());
     let mut text = format!("fn {name}({}) -> {result} {{\n", parameters.join(", "));
-    let graph = graph.expanded();
     let digests = digests(&graph.calls);
     for (i, node) in graph.nodes.iter().enumerate() {
         text += &match *node {
@@ -66,10 +88,19 @@ pub fn function_with(
                 let call = call as usize;
                 said(i, (&graph.calls[call], &digests[call]), output)
             }
+            Node::SelectLt(a, b, yes, no) => {
+                let less = flags.as_ref().map_or(format!("v{a} < v{b}"), |flags| flags.less(a, b));
+                format!("    let v{i} = select(v{no}, v{yes}, {less});\n")
+            }
             node => format!("    let v{i} = {};\n", operation(node, &inputs, product)),
         };
+        text += &flags.as_mut().map_or(String::new(), Flags::next);
     }
-    let outputs: Vec<String> = graph.outputs.iter().map(|i| format!("v{i}")).collect();
+    let output = |i: &u32| match flags.as_ref().and_then(|flags| flags.name(*i)) {
+        Some(flag) => format!("marked(v{i}, {flag})"),
+        None => format!("v{i}"),
+    };
+    let outputs: Vec<String> = graph.outputs.iter().map(output).collect();
     let outputs = outputs.join(", ");
     let value = if graph.outputs.len() == 1 { outputs } else { format!("{result}({outputs})") };
     text + &format!("    return {value};\n}}\n")
@@ -100,7 +131,6 @@ fn operation(node: Node, inputs: &[String], product: Product<'_>) -> String {
         Node::Max(a, b) => format!("greater(v{a}, v{b})"),
         Node::Clamp(a, low, high) => format!("held(v{a}, v{low}, v{high})"),
         Node::IfLt(a, b, yes, no) => format!("choose(v{a}, v{b}, v{yes}, v{no})"),
-        Node::SelectLt(a, b, yes, no) => format!("select(v{no}, v{yes}, v{a} < v{b})"),
         other => unreachable!("an expanded graph has no {other:?}"),
     }
 }

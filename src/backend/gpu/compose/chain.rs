@@ -7,7 +7,7 @@ use super::glue::load_glue;
 use super::kernels::{Access, Kernel, Slot};
 use super::physics_glue::{Outline, parameter_glue, seconds_glue};
 use crate::error::{Error, Result};
-use crate::formula::wgsl::function;
+use crate::formula::wgsl::careful_function;
 use crate::formula::{Ask, Chain, Expr, Graph, Link, Place, Scalar, record};
 use crate::model::{Controller, Law, Model};
 use crate::policy::Mlp;
@@ -283,7 +283,7 @@ impl Printer<'_> {
         let acting: Vec<String> = (MARGINS..MARGINS + controls)
             .map(|number| format!("kept[{number}u * row + acting]"))
             .collect();
-        let mut text = function("formulas", &taken, &link.graph);
+        let mut text = careful_function("formulas", &taken, &link.graph);
         text += "fn evaluate(column: u32, x: State, t: u32) {\n    let row = params.stride;\n";
         // Where a pair replays, both of it act as the nominal one does.
         text += "    let acting = column % params.width;\n";

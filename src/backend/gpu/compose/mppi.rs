@@ -6,7 +6,7 @@ use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
 use super::physics_glue::{Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Role};
-use crate::formula::wgsl::{CHOICES, function};
+use crate::formula::wgsl::{CHOICES, careful_function, function};
 use crate::formula::{Expr, Graph, record};
 use crate::model::StageCost;
 use crate::real::Real;
@@ -374,6 +374,6 @@ fn both(
 ) -> String {
     let inputs: Vec<(&str, usize)> =
         arguments.iter().map(|(name, _, length)| (*name, *length)).collect();
-    let text = function(recorded, &inputs, graph);
+    let text = careful_function(recorded, &inputs, graph);
     [text, call(name, recorded, arguments, result)].concat()
 }
