@@ -2,10 +2,7 @@
 
 use crate::formula::wgsl::function;
 use crate::formula::{Graph, Node};
-use crate::model::{Controller, Law, Model};
-use crate::policy::Policy;
-use crate::rollout::Plant;
-use crate::system::System;
+use crate::model::{Controller, Law, Model, Plant};
 
 /// The recorded step, target margin, constraint margin and what there is of control, observation
 /// and action, as WGSL functions `plant_step`, `plant_target`, `plant_constraint`,
@@ -17,21 +14,15 @@ use crate::system::System;
 ///
 /// ```
 /// use reachcast::backend::physics;
-/// use reachcast::rollout::Plant;
+/// use reachcast::model::Plant;
 /// use reachcast::system::{BangBang, DoubleIntegrator};
-/// let system = DoubleIntegrator::default();
-/// let policy = BangBang { acceleration: 1.0 };
-/// let text = physics(Plant { system: &system, policy: &policy });
+/// let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
+/// let text = physics(&plant);
 /// assert!(text.starts_with("fn plant_step(x: array<f32, 2>, u: f32"));
 /// assert!(text.contains("fn plant_control(x: array<f32, 2>"));
 /// ```
-pub fn physics<S, P, const NX: usize, const NU: usize>(plant: Plant<'_, S, P>) -> String
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
-    let Plant { system, policy } = plant;
-    Physics::new(&Model::recorded(system), &Controller::recorded(system, policy)).text()
+pub fn physics(plant: &Plant) -> String {
+    Physics::new(&plant.model, &plant.controller).text()
 }
 
 /// Which function of the physics.

@@ -11,9 +11,8 @@ use crate::model::Plant;
 use crate::policy::Mlp;
 use crate::race::system::DroneRace;
 use crate::rollout::{
-    self, Fold, MppiProblem, Planning, Purpose, Query, Region, StateList, Stream, trajectory,
+    self, Fold, MppiProblem, Planning, Purpose, Query, Region, StateList, Stream, replay,
 };
-use crate::system::System;
 
 /// Batches of rollouts: the scenarios of a certificate, and those that fill a machine.
 const BATCHES: [u64; 3] = [158, 4096, 65_536];
@@ -107,13 +106,14 @@ fn driven(data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Rollouts> {
 
 /// Mean number of steps until the sign of a measure is decided, over some of the starts.
 fn decided_steps(data: &Data, policy: &Mlp) -> Result<f64> {
-    let (system, spec) = (DroneRace::default(), data::rollout_spec()?);
-    let plant = rollout::Plant { system: &system, policy };
+    let plant = Plant::of(DroneRace::default(), policy.clone());
+    let spec = data::rollout_spec()?;
     let steps = |start: &[f32; 12]| {
         let mut fold = Fold::new();
-        let states = trajectory::<f32, _, _, 12, 3>(plant, *start, spec.horizon);
-        let open = states.iter().take_while(|x| {
-            fold.add(system.target(**x), system.constraint(**x), spec.gamma);
+        let states = replay::states::<f32>(&plant, start, spec.horizon);
+        let open = (0..).zip(&states).take_while(|(step, x)| {
+            let model = &plant.model;
+            fold.add(model.target_at(x, *step), model.constraint_at(x, *step), spec.gamma);
             fold.measure() <= 0.0 && fold.safe() > 0.0
         });
         open.count().min(spec.horizon as usize)
