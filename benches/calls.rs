@@ -1,6 +1,6 @@
 //! What the host's part of a call costs on an adapter: one step of one trajectory, so that little is
-//! left but the call itself. A plant prepared once, the same recorded at every call, and what
-//! preparing it anew would add: its texts printed and its kernels composed.
+//! left but the call itself. A plant prepared once, and what preparing it anew would add: its texts
+//! printed and its kernels composed.
 //!
 //! `cargo bench --bench calls`
 
@@ -12,9 +12,7 @@ use reachcast::bench;
 use reachcast::model::{Controller, Model, Plant};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{
-    Plant as TypedPlant, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening,
-};
+use reachcast::rollout::{Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 
 /// A network from 12 states to 3 controls.
@@ -54,15 +52,11 @@ fn calls<S, P, const NX: usize, const NU: usize>(
         query: Query::Measure,
     };
     let mut group = criterion.benchmark_group("calls");
-    let typed = TypedPlant { system: &system, policy: &policy };
     let plant = Plant::of(system.clone(), policy.clone());
     let program = backend.prepare(&plant).expect("it fits");
     let id = |what: &str| BenchmarkId::new(what, name);
     group.bench_function(id("prepared"), |bench| {
         bench.iter(|| program.reach_avoid(&task, &mut |_, _| Ok(())).expect("it runs"));
-    });
-    group.bench_function(id("recorded"), |bench| {
-        bench.iter(|| backend.reach_avoid(typed, &task, &mut |_, _| Ok(())).expect("it runs"));
     });
     group.bench_function(id("prepare_again"), |bench| {
         bench.iter(|| backend.prepare(&plant).expect("it fits"));

@@ -15,11 +15,12 @@ use reachcast::Result;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::bench::measure::{Protocol, measure};
+use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::race::DroneRace;
 use reachcast::race::bench::data::{self, Data};
 use reachcast::rollout::{
-    CostQuery, MppiTask, Planning, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
+    CostQuery, MppiTask, Planning, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
 };
 
 use scalar::Damping;
@@ -81,9 +82,12 @@ fn main() -> ExitCode {
 }
 
 /// Rollouts in lanes over rollouts in a loop.
-fn rollouts<P: Policy<12, 3>>(backend: &Backend, policy: &P, data: &Data) -> f64 {
+fn rollouts<P>(backend: &Backend, policy: &P, data: &Data) -> f64
+where
+    P: Policy<12, 3> + Clone + Send + Sync + 'static,
+{
     let (system, starts) = (DroneRace::default(), &data.starts[..ROLLOUTS]);
-    let plant = Plant { system: &system, policy };
+    let program = backend.prepare(&Plant::of(system, policy.clone())).expect("it fits");
     let spec: RolloutSpec = data::rollout_spec().expect("a valid specification");
     let task = ReachAvoidTask {
         starts: Starts::listed(starts),
@@ -93,13 +97,13 @@ fn rollouts<P: Policy<12, 3>>(backend: &Backend, policy: &P, data: &Data) -> f64
         query: Query::Measure,
     };
     let lanes = || {
-        backend.reach_avoid(plant, &task, &mut |_, measures| {
+        program.reach_avoid(&task, &mut |_, measures| {
             black_box(measures);
             Ok(())
         })
     };
     let plain = || {
-        black_box(scalar::measures(plant, black_box(starts), spec));
+        black_box(scalar::measures(&system, policy, black_box(starts), spec));
         Ok(())
     };
     ratio(plain, lanes)

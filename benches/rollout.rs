@@ -18,13 +18,13 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Choice, Gpu};
 use reachcast::bench::limits::multiply;
-use reachcast::model;
+use reachcast::model::Plant;
 use reachcast::policy::{Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::race::bench::data::{self, Data, HORIZON};
 use reachcast::rollout::{
-    DeviationTask, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts,
-    Stream, Tightening,
+    DeviationTask, PairControl, Pairs, Purpose, Query, ReachAvoidTask, RolloutSpec, Starts, Stream,
+    Tightening,
 };
 use reachcast::scenario::boundary::Boundary;
 use reachcast::scenario::settings::{Settings, SliceAxis};
@@ -48,6 +48,11 @@ fn backends() -> Vec<(&'static str, Backend)> {
     all
 }
 
+/// The race under `policy`.
+fn race<P: Policy<12, 3> + Send + Sync + 'static>(policy: P) -> Plant {
+    Plant::of(DroneRace::default(), policy)
+}
+
 /// What all benches share.
 struct Bench {
     backends: Vec<(&'static str, Backend)>,
@@ -67,15 +72,13 @@ impl Bench {
         }
     }
 
-    fn reach_avoid<P: Policy<12, 3>>(
+    fn reach_avoid(
         &self,
         group: &mut BenchmarkGroup<'_, WallTime>,
-        (name, policy): (&str, &P),
+        (name, plant): (&str, &Plant),
         count: u64,
         query: Query,
     ) {
-        let system = DroneRace::default();
-        let plant = Plant { system: &system, policy };
         let task = ReachAvoidTask {
             starts: Starts::listed(&*self.data.starts),
             range: 0..count,
@@ -84,6 +87,7 @@ impl Bench {
             query,
         };
         for (backend, device) in &self.backends {
+            let program = device.prepare(plant).expect("it fits");
             group.throughput(Throughput::Elements(count));
             group.bench_function(BenchmarkId::new(format!("{backend}/{name}"), count), |b| {
                 b.iter(|| {
@@ -91,21 +95,19 @@ impl Bench {
                         black_box(values);
                         Ok(())
                     };
-                    device.reach_avoid(plant, &task, sink).expect("the batch runs");
+                    program.reach_avoid(&task, sink).expect("the batch runs");
                 });
             });
         }
     }
 
-    fn deviation<P: Policy<12, 3>>(
+    fn deviation(
         &self,
         group: &mut BenchmarkGroup<'_, WallTime>,
-        (name, policy): (&str, &P),
+        (name, plant): (&str, &Plant),
         count: u64,
         control: PairControl,
     ) {
-        let system = DroneRace::default();
-        let plant = Plant { system: &system, policy };
         let task = DeviationTask {
             pairs: Pairs {
                 nominal: Starts::listed(&*self.data.starts),
@@ -118,6 +120,7 @@ impl Bench {
             control,
         };
         for (backend, device) in &self.backends {
+            let program = device.prepare(plant).expect("it fits");
             group.throughput(Throughput::Elements(count));
             let id = BenchmarkId::new(format!("{backend}/{name}/{control:?}"), count);
             group.bench_function(id, |b| {
@@ -126,7 +129,7 @@ impl Bench {
                         black_box(values);
                         Ok(())
                     };
-                    device.deviation(plant, &task, sink).expect("the batch runs")
+                    program.deviation(&task, sink).expect("the batch runs")
                 });
             });
         }
@@ -137,30 +140,32 @@ fn reach_avoid(criterion: &mut Criterion) {
     let bench = Bench::new();
     let mut group = criterion.benchmark_group("reach_avoid");
     for (name, policy) in &bench.data.networks {
+        let plant = race(Mlp::clone(policy));
         for count in COUNTS {
-            bench.reach_avoid(&mut group, (name, &**policy), count, Query::Measure);
+            bench.reach_avoid(&mut group, (name, &plant), count, Query::Measure);
         }
     }
-    bench.reach_avoid(&mut group, ("formula", &Damping), 65_536, Query::Measure);
+    bench.reach_avoid(&mut group, ("formula", &race(Damping)), 65_536, Query::Measure);
 }
 
 fn sign(criterion: &mut Criterion) {
     let bench = Bench::new();
-    let policy = &*bench.data.policy;
+    let plant = race(Mlp::clone(&bench.data.policy));
     let mut group = criterion.benchmark_group("sign");
     for count in [158, 65_536] {
-        bench.reach_avoid(&mut group, ("dense", policy), count, Query::Measure);
-        bench.reach_avoid(&mut group, ("sign", policy), count, Query::Sign);
+        bench.reach_avoid(&mut group, ("dense", &plant), count, Query::Measure);
+        bench.reach_avoid(&mut group, ("sign", &plant), count, Query::Sign);
     }
 }
 
 fn deviation(criterion: &mut Criterion) {
     let bench = Bench::new();
     let (name, policy) = &bench.data.networks[0];
+    let (dense, formula) = (race(Mlp::clone(policy)), race(Damping));
     let mut group = criterion.benchmark_group("deviation");
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
-        bench.deviation(&mut group, (name, &**policy), 16_384, control);
-        bench.deviation(&mut group, ("formula", &Damping), 16_384, control);
+        bench.deviation(&mut group, (name, &dense), 16_384, control);
+        bench.deviation(&mut group, ("formula", &formula), 16_384, control);
     }
 }
 
@@ -172,13 +177,11 @@ fn scalar_loop(criterion: &mut Criterion) {
     let (name, policy) = &bench.data.networks[0];
     let mut group = criterion.benchmark_group("scalar loop");
     group.throughput(Throughput::Elements(starts.len() as u64));
-    let plant = Plant { system: &system, policy: &Damping };
     group.bench_function("formula", |b| {
-        b.iter(|| black_box(scalar::measures(plant, starts, bench.spec)));
+        b.iter(|| black_box(scalar::measures(&system, &Damping, starts, bench.spec)));
     });
-    let plant = Plant { system: &system, policy: &**policy };
     group.bench_function(*name, |b| {
-        b.iter(|| black_box(scalar::measures(plant, starts, bench.spec)));
+        b.iter(|| black_box(scalar::measures(&system, &**policy, starts, bench.spec)));
     });
     group.finish();
 }
@@ -187,7 +190,7 @@ fn scalar_loop(criterion: &mut Criterion) {
 /// of 159 starts all have failures.
 fn growth_round(criterion: &mut Criterion) {
     let bench = Bench::new();
-    let plant = model::Plant::of(DroneRace::default(), Mlp::clone(&bench.data.policy));
+    let plant = race(Mlp::clone(&bench.data.policy));
     let mut settings = Settings::new(&plant.model, bench.data.starts[0], bench.spec);
     let axis = |state, low: f32, cells: u8| SliceAxis {
         state,

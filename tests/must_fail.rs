@@ -13,7 +13,6 @@ mod models;
 #[path = "oracle/mppi.rs"]
 mod oracle;
 
-use std::array::from_fn;
 use std::sync::Arc;
 
 use common::{adapter, race_policy};
@@ -22,14 +21,14 @@ use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
 use reachcast::formula::Function;
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
     Ball, CostQuery, DeviationTask, Disturbance, MppiProblem, MppiSettings, MppiSpec, MppiTask,
-    NON_FINITE, NoiseKind, PairControl, Pairs, Planning, Plant, Purpose, Query, ReachAvoidTask,
-    Region, RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, measure,
-    pair_measures,
+    NON_FINITE, NoiseKind, PairControl, Pairs, Planning, Purpose, Query, ReachAvoidTask, Region,
+    RolloutSpec, Sigma, Starts, States, Stream, Tightening, ValueTerm, replay,
 };
 use reachcast::system::{Axis, BangBang, DoubleIntegrator, System};
 
@@ -56,21 +55,18 @@ fn parity(gpu: Gpu) -> bool {
     let race = DroneRace::default();
     let (low, high) = (race.states().map(|a| a.low), race.states().map(|a| a.high));
     let region = Region::new_box(low, high).expect("box");
-    let policy = race_policy();
-    let plant = Plant { system: &race, policy: &policy };
+    let plant = Plant::of(race, race_policy());
     let ball = Region::Ball(Ball {
         center: vec![0.3, 0.0, -1.5, 0.6, 0.0, 0.0, -0.4, 0.0, -2.0, 0.3, 0.0, 0.0],
         radius: 0.4,
         varies: vec![true; 12],
     });
-    let integrator = DoubleIntegrator::default();
-    let bang = BangBang { acceleration: 1.0 };
-    let simple = Plant { system: &integrator, policy: &bang };
+    let simple = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
     let square = Region::new_box([-1.2, -1.5], [1.2, 1.5]).expect("box");
-    measures_agree(&backend, plant, region.clone())
-        && measures_agree(&backend, plant, ball)
-        && measures_agree(&backend, simple, square)
-        && pairs_agree(&backend, plant, region, PairControl::Replay)
+    measures_agree(&backend, &plant, region.clone())
+        && measures_agree(&backend, &plant, ball)
+        && measures_agree(&backend, &simple, square)
+        && pairs_agree(&backend, &plant, region, PairControl::Replay)
 }
 
 /// The same for rollouts that run the race's network themselves, pairs in feedback.
@@ -79,21 +75,13 @@ fn fused_parity(gpu: Gpu) -> bool {
     let race = DroneRace::default();
     let (low, high) = (race.states().map(|a| a.low), race.states().map(|a| a.high));
     let region = Region::new_box(low, high).expect("box");
-    let policy = race_policy();
-    let plant = Plant { system: &race, policy: &policy };
-    measures_agree(&backend, plant, region.clone())
-        && pairs_agree(&backend, plant, region, PairControl::ClosedLoop)
+    let plant = Plant::of(race, race_policy());
+    measures_agree(&backend, &plant, region.clone())
+        && pairs_agree(&backend, &plant, region, PairControl::ClosedLoop)
 }
 
-fn measures_agree<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    region: Region,
-) -> bool
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn measures_agree(backend: &Backend, plant: &Plant, region: Region) -> bool {
+    let Ok(program) = backend.prepare(plant) else { return false };
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let tightening = losses(&spec);
     let starts = Starts::Drawn { region, stream: Stream::new(3, Purpose::USER, 5) };
@@ -106,9 +94,9 @@ where
             query,
         };
         let mut agree = true;
-        let ran = backend.reach_avoid(plant, &task, &mut |first, values| {
+        let ran = program.reach_avoid(&task, &mut |first, values| {
             for (index, value) in (first..).zip(values) {
-                let truth = measure(plant, starts.start_array(index), &spec, &tightening);
+                let truth = replay::measure(plant, &starts.start(index), &spec, &tightening);
                 agree &= match query {
                     Query::Measure => (f64::from(*value) - truth).abs() <= BAND,
                     Query::Sign => truth.abs() <= BAND || (*value > 0.0) == (truth > 0.0),
@@ -120,16 +108,8 @@ where
     })
 }
 
-fn pairs_agree<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    region: Region,
-    control: PairControl,
-) -> bool
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn pairs_agree(backend: &Backend, plant: &Plant, region: Region, control: PairControl) -> bool {
+    let Ok(program) = backend.prepare(plant) else { return false };
     let spec = RolloutSpec::new(HORIZON, 0.9).expect("spec");
     let tightening = losses(&spec);
     let pairs = Pairs {
@@ -145,17 +125,21 @@ where
         control,
     };
     let mut agree = true;
-    let ran = backend.deviation(plant, &task, &mut |first, values| {
+    let ran = program.deviation(&task, &mut |first, values| {
         for (index, value) in (first..).zip(values) {
-            let pair = pairs.pair(index).map(|start| from_fn(|i| start[i]));
-            let (nominal, perturbed) = pair_measures(plant, pair, &spec, &tightening, control);
+            let [nominal, perturbed] = pairs.pair(index);
+            let pair = [&nominal[..], &perturbed];
+            let (nominal, perturbed) =
+                replay::pair_measures(plant, pair, &spec, &tightening, control);
             agree &= (f64::from(value.nominal) - nominal).abs() <= BAND
                 && (f64::from(value.perturbed) - perturbed).abs() <= BAND;
         }
         Ok(())
     });
     // The host's own kernel is the reference of the distances: it is tested against f64 apart.
-    let host = common::cpu(1).deviation(plant, &task, &mut |_, _| Ok(())).expect("host runs");
+    let cpu = common::cpu(1);
+    let host = cpu.prepare(plant).expect("it fits").deviation(&task, &mut |_, _| Ok(()));
+    let host = host.expect("host runs");
     agree
         && ran.is_ok_and(|farthest| {
             farthest.iter().zip(&host).all(|(device, host)| {
@@ -247,7 +231,8 @@ fn infinite<R: Real>(n: R) -> R {
 
 /// Whether the adapter says of infinite margins what they mean.
 fn walls_parity(gpu: Gpu) -> bool {
-    let plant = Plant { system: &Walls, policy: &Still };
+    let backend = Backend::Gpu(gpu);
+    let Ok(program) = backend.prepare(&Plant::of(Walls, Still)) else { return false };
     let starts = [[0.0, 1.0], [0.0, 2.0], [0.0, 3.0], [0.0, 4.0]];
     let spec = RolloutSpec::new(6, 1.0).expect("spec");
     let task = ReachAvoidTask {
@@ -258,7 +243,7 @@ fn walls_parity(gpu: Gpu) -> bool {
         query: Query::Measure,
     };
     let mut all = Vec::new();
-    let ran = Backend::Gpu(gpu).reach_avoid(plant, &task, &mut |_, values| {
+    let ran = program.reach_avoid(&task, &mut |_, values| {
         all.extend_from_slice(values);
         Ok(())
     });

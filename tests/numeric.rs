@@ -10,13 +10,13 @@ use common::{backends, settings};
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
 use reachcast::backend::{Backend, gpu::Choice};
 use reachcast::cost::Cost;
-use reachcast::model;
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::real::Real;
 use reachcast::report::html;
 use reachcast::rollout::{
-    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NON_FINITE, Planning, Plant, Purpose,
-    Query, ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
+    CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NON_FINITE, Planning, Purpose, Query,
+    ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::scenario::global::check_margins;
 use reachcast::scenario::record::Record;
@@ -83,6 +83,7 @@ impl System<1, 1> for Line {
 }
 
 /// Root of the state: NaN below 0.
+#[derive(Clone)]
 struct Root;
 
 impl Policy<1, 1> for Root {
@@ -95,6 +96,7 @@ impl Policy<1, 1> for Root {
 }
 
 /// No control.
+#[derive(Clone)]
 struct Idle;
 
 impl Policy<1, 1> for Idle {
@@ -135,9 +137,9 @@ fn every_way() -> Vec<Backend> {
 }
 
 /// The measures, or their signs, of the starts.
-fn measures<P: Policy<1, 1>>(
+fn measures(
     backend: &Backend,
-    (motion, policy): (Motion, &P),
+    plant: &Plant,
     (query, tightening): (Query, &Tightening),
 ) -> Vec<f32> {
     let starts = starts();
@@ -145,14 +147,12 @@ fn measures<P: Policy<1, 1>>(
     let range = 0..starts.len() as u64;
     let task = ReachAvoidTask { starts: Starts::listed(&starts), range, spec, tightening, query };
     let mut all = Vec::new();
-    let system = Line(motion);
-    let plant = Plant { system: &system, policy };
-    backend
-        .reach_avoid(plant, &task, &mut |_, values| {
-            all.extend_from_slice(values);
-            Ok(())
-        })
-        .expect("a batch that runs");
+    let program = backend.prepare(plant).expect("it fits");
+    let ran = program.reach_avoid(&task, &mut |_, values| {
+        all.extend_from_slice(values);
+        Ok(())
+    });
+    ran.expect("a batch that runs");
     all
 }
 
@@ -187,18 +187,21 @@ fn expected<P: Policy<1, 1>>(motion: Motion, policy: &P, start: f32, horizon: u3
 
 /// Holds every backend against the definition; the number of starts with the least measure that there
 /// is, that of rollouts which are not finite.
-fn check<P: Policy<1, 1>>(motion: Motion, policy: &P, horizon: u32) -> usize {
-    let tightening = none(horizon);
+fn check<P>(motion: Motion, policy: &P, horizon: u32) -> usize
+where
+    P: Policy<1, 1> + Clone + Send + Sync + 'static,
+{
+    let (tightening, plant) = (none(horizon), Plant::of(Line(motion), policy.clone()));
     let truth: Vec<f32> =
         starts().iter().map(|[x]| expected(motion, policy, *x, horizon)).collect();
     for backend in every_way() {
         let name = backend.device();
-        let found = measures(&backend, (motion, policy), (Query::Measure, &tightening));
+        let found = measures(&backend, &plant, (Query::Measure, &tightening));
         for ((start, truth), found) in starts().iter().zip(&truth).zip(&found) {
             let close = (found - truth).abs() <= 1e-5 * truth.abs().max(1.0);
             assert!(close, "{motion:?} from {start:?} on {name}: {found}, not {truth}");
         }
-        let signs = measures(&backend, (motion, policy), (Query::Sign, &tightening));
+        let signs = measures(&backend, &plant, (Query::Sign, &tightening));
         for (truth, sign) in truth.iter().zip(&signs) {
             assert_eq!(*truth > 0.0, *sign > 0.0, "{motion:?} on {name}");
         }
@@ -259,8 +262,9 @@ fn subnormal_numbers_are_zero_at_worst() {
     // Only the fourth step counts, at 1e-40 times the start.
     let mut tightening = none(4);
     tightening.target[..4].fill(10.0);
+    let plant = Plant::of(Line(Motion::Shrinking), Idle);
     for backend in backends() {
-        let found = measures(&backend, (Motion::Shrinking, &Idle), (Query::Measure, &tightening));
+        let found = measures(&backend, &plant, (Query::Measure, &tightening));
         let mut flushed = 0;
         for ([start], found) in starts().iter().zip(&found) {
             let exact = f64::from(*start) * 1e-40;
@@ -270,7 +274,6 @@ fn subnormal_numbers_are_zero_at_worst() {
         }
         println!("{}: {flushed} of {} subnormal measures are 0", backend.device(), found.len());
         // A certificate decides them in f64.
-        let plant = model::Plant::of(Line(Motion::Shrinking), Idle);
         let program = backend.prepare(&plant).expect("a program");
         let context = Context { program: &program, watch: &Unwatched };
         let spec = spec(&tightening);
@@ -328,7 +331,7 @@ fn certificates(edge: f32) -> Vec<Record> {
     settings.state = vec![0.45, 0.0];
     settings.deviation.radius = 0.02;
     settings.growth.radius = 0.9;
-    let plant = model::Plant::of(system, Still);
+    let plant = Plant::of(system, Still);
     let certify = |backend: &Backend| {
         let program = backend.prepare(&plant).expect("a program");
         certify(&program, &settings, serde_json::json!({}), &Unwatched).expect("a record")

@@ -8,13 +8,13 @@ use common::{
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::backend::{Backend, Program};
-use reachcast::model;
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
-    DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Purpose, Query,
-    ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Stream, Tightening, measure,
+    DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask,
+    Region, RolloutSpec, Starts, StateList, Stream, Tightening,
 };
 use reachcast::scenario::settings::{Joint, Settings};
 use reachcast::scenario::{Context, Unwatched, certify, deviation, global};
@@ -39,7 +39,7 @@ const RACE_DEVIATION: [(usize, f64, f64); 10] = [
 /// Half a unit of the last digit of these numbers.
 const LAST_DIGIT: f64 = 5e-5;
 
-fn program<'a>(backend: &'a Backend, plant: &model::Plant) -> Program<'a> {
+fn program<'a>(backend: &'a Backend, plant: &Plant) -> Program<'a> {
     backend.prepare(plant).expect("a program")
 }
 
@@ -61,6 +61,7 @@ fn random_policy(seed: u64) -> Mlp {
 }
 
 /// Proportional feedback of the ego toward the gate: a formula policy of the race.
+#[derive(Clone)]
 struct Steer;
 
 impl Policy<12, 3> for Steer {
@@ -76,6 +77,7 @@ impl Policy<12, 3> for Steer {
 }
 
 /// Damped feedback of the double integrator: continuous, unlike [`BangBang`].
+#[derive(Clone)]
 struct Damped;
 
 impl Policy<2, 1> for Damped {
@@ -110,9 +112,9 @@ fn race_deviation_stays_below_its_supremum_for_any_policy() {
     }
     for backend in &backends() {
         let plants = [
-            model::Plant::of(DroneRace::default(), race_policy()),
-            model::Plant::of(DroneRace::default(), random_policy(11)),
-            model::Plant::of(DroneRace::default(), Steer),
+            Plant::of(DroneRace::default(), race_policy()),
+            Plant::of(DroneRace::default(), random_policy(11)),
+            Plant::of(DroneRace::default(), Steer),
         ];
         let largest =
             (3..).zip(&plants).map(|(seed, plant)| estimate(&program(backend, plant), seed));
@@ -132,7 +134,7 @@ fn race_deviation_stays_below_its_supremum_for_any_policy() {
 #[test]
 fn race_deviation_averages_are_the_published_ones() {
     const DRAWS: usize = 400;
-    let plant = model::Plant::of(DroneRace::default(), Steer);
+    let plant = Plant::of(DroneRace::default(), Steer);
     let quantile = Normal::standard().inverse_cdf(1.0 - FALSE_ALARM / 2.0);
     for backend in &backends() {
         let program = program(backend, &plant);
@@ -257,7 +259,7 @@ fn margins_within_the_band_are_decided_in_f64() {
         Starts::Drawn { region: region.expect("box"), stream: Stream::new(5, Purpose::USER, 3) };
     let states = StateList::new(12).with((0..200).map(|index| starts.start(index)));
     let backend = cpu(2);
-    let program = program(&backend, &model::Plant::of(DroneRace::default(), race_policy()));
+    let program = program(&backend, &Plant::of(system, policy.clone()));
     let margins = |band: f64| {
         let (states, query) = (states.view(), Query::Measure);
         global::check_margins(context(&program), &spec, &tightening, states, query, band)
@@ -265,13 +267,13 @@ fn margins_within_the_band_are_decided_in_f64() {
     };
     let (plain, banded) = (margins(0.0), margins(1.0));
     let mut changed = 0;
-    let plant = Plant { system: &system, policy: &policy };
     for ((x, plain), banded) in states.arrays::<12>().into_iter().zip(plain).zip(banded) {
         if plain.abs() > 1.0 {
             assert_eq!(plain, banded);
             continue;
         }
-        let truth = measure(plant, x, &spec, &tightening) as f32;
+        let typed = scalar_states::<f64, _, _, 12, 3>((&system, &policy), x, spec.horizon);
+        let truth = scalar_measure(&system, &typed, &spec, &tightening) as f32;
         assert_eq!(banded, truth);
         changed += u32::from(banded != plain);
     }
@@ -283,7 +285,7 @@ fn margins_within_the_band_are_decided_in_f64() {
 #[test]
 fn certified_starts_are_inside_the_true_set() {
     let system = DoubleIntegrator::default();
-    let plant = model::Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
+    let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
     let form = ClosedForm::of(&system);
     let spec = RolloutSpec::new(30, 0.95).expect("spec");
     let loss = [0.0; 31];
@@ -325,7 +327,7 @@ fn certified_starts_are_inside_the_true_set() {
 #[test]
 fn certified_share_is_that_of_the_closed_form() {
     let system = DoubleIntegrator::default();
-    let plant = model::Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
+    let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
     let form = ClosedForm::of(&system);
     let mut settings = settings(&system, 30);
     settings.deviation.radius = 0.03;
@@ -372,6 +374,24 @@ fn scalar_measure<R: Real + PartialOrd, S: System<NX, NU>, const NX: usize, cons
     best
 }
 
+/// The states x_0..=x_T of a system and a policy in Rust, in a loop over `R`.
+fn scalar_states<R: Real, S, P, const NX: usize, const NU: usize>(
+    (system, policy): (&S, &P),
+    start: [f32; NX],
+    horizon: u32,
+) -> Vec<[R; NX]>
+where
+    S: System<NX, NU>,
+    P: Policy<NX, NU>,
+{
+    let mut states = vec![start.map(R::lit)];
+    for t in 0..horizon as usize {
+        let x = states[t];
+        states.push(system.step(x, policy.control(x)));
+    }
+    states
+}
+
 /// A pair side by side: measures of both and the distance at each step.
 struct ScalarPair {
     nominal: f64,
@@ -381,7 +401,7 @@ struct ScalarPair {
 
 /// One pair in a loop over `R`.
 fn scalar_pair<R: Real + PartialOrd + Into<f64>, S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
+    (system, policy): (&S, &P),
     [nominal, perturbed]: [[f32; NX]; 2],
     spec: &RolloutSpec,
     tightening: &Tightening,
@@ -391,17 +411,15 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let (mut x, mut y) = (nominal.map(R::lit), perturbed.map(R::lit));
-    let (mut first, mut second) = (Vec::new(), Vec::new());
-    for _ in 0..=spec.horizon {
-        first.push(x);
-        second.push(y);
-        let u = plant.policy.control(x);
-        y = match control {
-            PairControl::Replay => plant.system.step(y, u),
-            PairControl::ClosedLoop => plant.system.step(y, plant.policy.control(y)),
+    let first = scalar_states((system, policy), nominal, spec.horizon);
+    let mut second = vec![perturbed.map(R::lit)];
+    for t in 0..spec.horizon as usize {
+        let y = second[t];
+        let driver = match control {
+            PairControl::Replay => first[t],
+            PairControl::ClosedLoop => y,
         };
-        x = plant.system.step(x, u);
+        second.push(system.step(y, policy.control(driver)));
     }
     let distance = |(x, y): (&[R; NX], &[R; NX])| {
         let square = |i: usize| (y[i] - x[i]) * (y[i] - x[i]);
@@ -410,8 +428,8 @@ where
     };
     let none = Tightening::none(spec);
     ScalarPair {
-        nominal: scalar_measure(plant.system, &first, spec, tightening).into(),
-        perturbed: scalar_measure(plant.system, &second, spec, &none).into(),
+        nominal: scalar_measure(system, &first, spec, tightening).into(),
+        perturbed: scalar_measure(system, &second, spec, &none).into(),
         distances: first.iter().zip(&second).map(distance).collect(),
     }
 }
@@ -431,15 +449,15 @@ fn allowance(name: &str, pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
 /// Compares every path of `backend` over 500 pairs with f64 loops.
 fn compare<S, P, const NX: usize, const NU: usize>(
     backend: &Backend,
-    plant: Plant<'_, S, P>,
+    (system, policy): (&S, &P),
     settings: &Settings,
     control: PairControl,
 ) where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
+    S: System<NX, NU> + Clone + Send + Sync + 'static,
+    P: Policy<NX, NU> + Clone + Send + Sync + 'static,
 {
     const COUNT: u64 = 500;
-    let name = format!("{} {} {control:?}", plant.system.name(), plant.policy.name());
+    let name = format!("{} {} {control:?}", system.name(), policy.name());
     let spec = settings.spec;
     let radius = literal(settings.deviation.radius);
     let bound: Vec<f64> = (0..=spec.horizon).map(|t| radius * (1.0 + 0.1 * f64::from(t))).collect();
@@ -453,12 +471,13 @@ fn compare<S, P, const NX: usize, const NU: usize>(
         radius: settings.deviation.radius,
         stream: Stream::new(9, Purpose::USER, 1),
     };
+    let typed = (system, policy);
     let given = |i: u64| pairs.pair(i).map(|x| from_fn(|k| x[k]));
     let oracle: Vec<ScalarPair> = (0..COUNT)
-        .map(|i| scalar_pair::<f64, S, P, NX, NU>(plant, given(i), &spec, &tightening, control))
+        .map(|i| scalar_pair::<f64, S, P, NX, NU>(typed, given(i), &spec, &tightening, control))
         .collect();
     let single: Vec<ScalarPair> = (0..COUNT)
-        .map(|i| scalar_pair::<f32, S, P, NX, NU>(plant, given(i), &spec, &tightening, control))
+        .map(|i| scalar_pair::<f32, S, P, NX, NU>(typed, given(i), &spec, &tightening, control))
         .collect();
     let both = || oracle.iter().zip(&single);
     let nominal = both().map(|(a, b)| (a.nominal, b.nominal));
@@ -472,8 +491,10 @@ fn compare<S, P, const NX: usize, const NU: usize>(
         tightening: &tightening,
         control,
     };
-    let farthest = backend
-        .deviation(plant, &task, &mut |first, values| {
+    let plant = Plant::of(system.clone(), policy.clone());
+    let program = program(backend, &plant);
+    let farthest = program
+        .deviation(&task, &mut |first, values| {
             assert_eq!(first, measures.len() as u64);
             measures.extend_from_slice(values);
             Ok(())
@@ -486,7 +507,7 @@ fn compare<S, P, const NX: usize, const NU: usize>(
         assert!(near(found.perturbed, oracle.perturbed), "{name}, pair {i}: {found:?}");
     }
     compare_farthest(&name, &farthest, &oracle, &single);
-    compare_measures(backend, plant, &starts(), &spec, &tightening, &oracle, band);
+    compare_measures(&program, &starts(), &spec, &tightening, &oracle, band);
 }
 
 /// The farthest distance of each step, and that the pair named attains it.
@@ -511,18 +532,14 @@ fn compare_farthest(
 }
 
 /// Measure and sign of each start, with tightened margins.
-fn compare_measures<S, P, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
+fn compare_measures(
+    program: &Program<'_>,
     starts: &Starts<'_>,
     spec: &RolloutSpec,
     tightening: &Tightening,
     oracle: &[ScalarPair],
     band: f64,
-) where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) {
     let run = |query: Query| {
         let mut values = Vec::new();
         let task = ReachAvoidTask {
@@ -536,7 +553,7 @@ fn compare_measures<S, P, const NX: usize, const NU: usize>(
             values.extend_from_slice(found);
             Ok(())
         };
-        backend.reach_avoid(plant, &task, &mut sink).expect("measures");
+        program.reach_avoid(&task, &mut sink).expect("measures");
         values
     };
     let (values, signs) = (run(Query::Measure), run(Query::Sign));
@@ -572,12 +589,9 @@ fn every_f32_path_is_near_its_f64_loop() {
                 vec![-0.5, -0.2, -1.5, 0.4, -0.3, -0.2, -1.0, -0.2, -3.2, 0.1, -1.0, -0.2];
             settings_of_race.high =
                 vec![0.5, 0.2, -0.5, 0.8, 0.3, 0.2, 1.0, 0.2, -1.0, 0.4, 1.0, 0.2];
-            let plant = Plant { system: &race, policy: &network };
-            compare(backend, plant, &settings_of_race, control);
-            let plant = Plant { system: &race, policy: &Steer };
-            compare(backend, plant, &settings_of_race, control);
-            let plant = Plant { system: &integrator, policy: &Damped };
-            compare(backend, plant, &settings(&integrator, 30), control);
+            compare(backend, (&race, &network), &settings_of_race, control);
+            compare(backend, (&race, &Steer), &settings_of_race, control);
+            compare(backend, (&integrator, &Damped), &settings(&integrator, 30), control);
         }
     }
 }

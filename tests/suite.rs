@@ -18,12 +18,11 @@ use rand::{RngExt, SeedableRng};
 use reachcast::backend::Backend;
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid};
 use reachcast::formula::{Function, record};
+use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::race::{Cone, DroneRace};
 use reachcast::real::{Lanes, Real};
-use reachcast::rollout::{
-    Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening, normal_pair,
-};
+use reachcast::rollout::{Query, ReachAvoidTask, RolloutSpec, Starts, Tightening, normal_pair};
 use reachcast::system::{Axis, DiffDrive, DoubleIntegrator, System};
 
 /// Inputs of every formula: twelve states and three controls of the race; others use the first.
@@ -189,14 +188,13 @@ fn on_backend(backend: &Backend, formula: Formula, inputs: &[[f32; 16]]) -> Vec<
         tightening: &Tightening::none(&spec),
         query: Query::Measure,
     };
-    let system = Probe(formula);
-    let plant = Plant { system: &system, policy: &Mark };
+    let program = backend.prepare(&Plant::of(Probe(formula), Mark)).expect("it fits");
     let mut measures = Vec::new();
     let sink = &mut |_: u64, values: &[f32]| {
         measures.extend_from_slice(values);
         Ok(())
     };
-    backend.reach_avoid(plant, &task, sink).expect("batch runs");
+    program.reach_avoid(&task, sink).expect("batch runs");
     measures
 }
 

@@ -7,7 +7,7 @@ use std::array::from_fn;
 use reachcast::cost::Cost;
 use reachcast::policy::Policy;
 use reachcast::real::Real;
-use reachcast::rollout::{Fold, MppiProblem, Planning, Plant, RolloutSpec};
+use reachcast::rollout::{Fold, MppiProblem, Planning, RolloutSpec};
 use reachcast::system::System;
 
 /// Damping of the ego's velocities: physics without a network.
@@ -28,7 +28,8 @@ impl Policy<12, 3> for Damping {
 
 /// The measure of each start.
 pub(crate) fn measures<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
+    system: &S,
+    policy: &P,
     starts: &[[f32; NX]],
     spec: RolloutSpec,
 ) -> Vec<f32>
@@ -36,7 +37,6 @@ where
     S: System<NX, NU>,
     P: Policy<NX, NU>,
 {
-    let Plant { system, policy } = plant;
     let measure = |start: &[f32; NX]| {
         let (mut x, mut fold) = (*start, Fold::new());
         fold.add(system.target(x), system.constraint(x), spec.gamma);

@@ -91,7 +91,7 @@ impl PolicyPlan {
 mod tests {
     use super::*;
     use crate::policy::Policy;
-    use crate::rollout::{self, trajectory};
+    use crate::rollout::replay;
     use crate::system::{DoubleIntegrator, System};
 
     /// Twice what the controls allow where the position is above a line, else a third of it.
@@ -121,8 +121,7 @@ mod tests {
         let plant = Plant::of(system, Steep);
         let PolicyPlan { controls, states } = PolicyPlan::new(&plant, &start, 12, |_| {});
         assert_eq!((controls.len(), states.len()), (12, 12));
-        let plant = rollout::Plant { system: &system, policy: &Steep };
-        assert_eq!(states, trajectory::<f32, _, _, 2, 1>(plant, start, 11));
+        assert_eq!(states, replay::states::<f32>(&plant, &start, 11));
         // The system clips by itself; the plan has to be within the bounds all the same.
         assert!(controls[0] != -1.0 && controls[11] == -1.0, "{controls:?}");
         for (u, x) in controls.iter().zip(&states) {

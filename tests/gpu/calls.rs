@@ -10,7 +10,6 @@ use reachcast::model::Plant;
 use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
 use reachcast::race::bench::data;
-use reachcast::rollout::Plant as TypedPlant;
 use reachcast::rollout::{
     CostQuery, DeviationTask, MppiProblem, MppiTask, PairControl, Pairs, Planning, Query,
     ReachAvoidTask, Region, RolloutSpec, Starts, States, Stream, ValueTerm,
@@ -239,26 +238,6 @@ fn without_a_cpu_a_prepared_plant_fails() {
     let program = backend.prepare(&plant).expect("it fits");
     let failed = roll_out(&program, &starts(&plant), Query::Measure);
     assert!(matches!(failed, Err(Error::DeviceFailed { fault: Fault::Validation, .. })));
-}
-
-/// A plant that is given as Rust types is recorded at each call, but nothing more.
-#[test]
-fn types_are_recorded_and_nothing_else() {
-    let Some(gpu) = gpu() else { return };
-    let backend = Backend::Gpu(gpu);
-    let policy = random_network(&[12, 16, 3], Activation::Tanh);
-    let system = DroneRace::default();
-    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
-    let task = ReachAvoidTask {
-        starts: drawn(whole_box(&system), 84),
-        range: 0..158,
-        spec,
-        tightening: &ramp(&spec),
-        query: Query::Measure,
-    };
-    let plant = TypedPlant { system: &system, policy: &policy };
-    let call = || backend.reach_avoid(plant, &task, &mut |_, _| Ok(()));
-    assert_eq!(second(&backend, call), Traffic { texts: 1, ..ONE });
 }
 
 /// Threads that share a prepared plant have workspaces of their own.

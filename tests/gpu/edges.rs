@@ -1,11 +1,12 @@
 //! Chunk borders, long horizons and states that are not finite.
 
 use reachcast::backend::gpu::Gpu;
+use reachcast::model::Plant;
 use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query,
-    ReachAvoidTask, RolloutSpec, Starts, Stream, Tightening,
+    DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Query, ReachAvoidTask,
+    RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::scenario::purpose;
 use reachcast::system::{BangBang, DoubleIntegrator};
@@ -19,8 +20,7 @@ use crate::{
 fn chunks_join_without_a_seam() {
     let Some(gpu) = gpu() else { return };
     let system = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant { system: &system, policy: &policy };
+    let plant = Plant::of(system, BangBang { acceleration: 1.0 });
     let spec = RolloutSpec::new(5, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let mut task = ReachAvoidTask {
@@ -30,13 +30,13 @@ fn chunks_join_without_a_seam() {
         tightening: &tightening,
         query: Query::Measure,
     };
-    let (gpu, whole) = measures(gpu, plant, &task);
+    let (gpu, whole) = measures(gpu, &plant, &task);
     task.range = (1 << 18) - 500..(1 << 18) + 1000;
-    let (gpu, part) = measures(gpu, plant, &task);
+    let (gpu, part) = measures(gpu, &plant, &task);
     assert_eq!(part, whole[(1 << 18) - 500..]);
 
-    let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant { system: &system, policy: &policy };
+    let system = DroneRace::default();
+    let plant = Plant::of(system, race_policy());
     let spec = RolloutSpec::new(2, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let pairs = |range| DeviationTask {
@@ -50,9 +50,9 @@ fn chunks_join_without_a_seam() {
         tightening: &tightening,
         control: PairControl::ClosedLoop,
     };
-    let (gpu, farthest, whole) = deviation(gpu, plant, &pairs(0..(1 << 14) + 300));
-    let (gpu, before, left) = deviation(gpu, plant, &pairs(0..(1 << 14) - 100));
-    let (_, after, right) = deviation(gpu, plant, &pairs((1 << 14) - 100..(1 << 14) + 300));
+    let (gpu, farthest, whole) = deviation(gpu, &plant, &pairs(0..(1 << 14) + 300));
+    let (gpu, before, left) = deviation(gpu, &plant, &pairs(0..(1 << 14) - 100));
+    let (_, after, right) = deviation(gpu, &plant, &pairs((1 << 14) - 100..(1 << 14) + 300));
     assert_eq!(whole, [left, right].concat());
     let merged: Vec<Farthest> = before.iter().zip(after).map(|(a, b)| a.merge(b)).collect();
     assert_eq!(farthest, merged);
@@ -65,7 +65,7 @@ fn every_step_of_a_long_horizon_is_taken() {
     let horizon = 10_000;
     let spec = RolloutSpec::new(horizon, 1.0).expect("a horizon");
     let tightening = Tightening::none(&spec);
-    let plant = Plant { system: &Count, policy: &Idle };
+    let plant = Plant::of(Count, Idle);
     let task = ReachAvoidTask {
         starts: Starts::listed(&list),
         range: 0..10,
@@ -75,7 +75,7 @@ fn every_step_of_a_long_horizon_is_taken() {
     };
     // The margin is the number of steps taken, so the measure shows the final state.
     let expected: Vec<f32> = (0..10).map(|i| (i + horizon) as f32).collect();
-    let (back, found) = measures::<_, _, 2, 1>(gpu, plant, &task);
+    let (back, found) = measures(gpu, &plant, &task);
     gpu = back;
     assert_eq!(found, expected);
     let task = DeviationTask {
@@ -89,7 +89,7 @@ fn every_step_of_a_long_horizon_is_taken() {
         tightening: &tightening,
         control: PairControl::ClosedLoop,
     };
-    let (_, farthest, pairs) = deviation::<_, _, 2, 1>(gpu, plant, &task);
+    let (_, farthest, pairs) = deviation(gpu, &plant, &task);
     assert_eq!(farthest.len(), horizon as usize + 1);
     for (pair, expected) in pairs.iter().zip(&expected) {
         assert_eq!([pair.nominal, pair.perturbed], [*expected; 2]);
@@ -100,8 +100,7 @@ fn every_step_of_a_long_horizon_is_taken() {
 /// Crosses submissions: only the last state counts, whose margin is 150 above the start's, less
 /// 149.5.
 fn every_step_under_a_network(mut gpu: Gpu) {
-    let policy = random_network(&[2, 4, 1], Activation::Relu);
-    let plant = Plant { system: &Count, policy: &policy };
+    let plant = Plant::of(Count, random_network(&[2, 4, 1], Activation::Relu));
     let spec = RolloutSpec::new(150, 1.0).expect("a horizon");
     let mut target = vec![1000.0; 151];
     target[150] = 0.0;
@@ -115,7 +114,7 @@ fn every_step_under_a_network(mut gpu: Gpu) {
             tightening: &tightening,
             query,
         };
-        let (back, found) = measures(gpu, plant, &task);
+        let (back, found) = measures(gpu, &plant, &task);
         gpu = back;
         assert_eq!(found, expected);
     }
@@ -133,7 +132,8 @@ fn non_finite_states(mut gpu: Gpu) {
     let starts = [[-3.0, 2.1], [-10.0, 2.1], [-20.0, 0.5], [nan, 0.5], [1.0, f32::INFINITY]];
     let spec = RolloutSpec::new(19, 1.0).expect("a horizon");
     let tightening = Tightening::none(&spec);
-    let network = random_network(&[2, 4, 1], Activation::Tanh);
+    let formula = Plant::of(Count, Idle);
+    let driven = Plant::of(Count, random_network(&[2, 4, 1], Activation::Tanh));
     let dense = [3.0, NON_FINITE, -1.0, NON_FINITE, NON_FINITE];
     let signs = [1.0, NON_FINITE, -1.0, NON_FINITE, NON_FINITE];
     for (query, expected) in [(Query::Measure, dense), (Query::Sign, signs)] {
@@ -144,11 +144,9 @@ fn non_finite_states(mut gpu: Gpu) {
             tightening: &tightening,
             query,
         };
-        let formula = Plant { system: &Count, policy: &Idle };
-        let (back, found) = measures::<_, _, 2, 1>(gpu, formula, &task);
+        let (back, found) = measures(gpu, &formula, &task);
         assert_eq!(found, expected, "{query:?} under a formula");
-        let driven = Plant { system: &Count, policy: &network };
-        let (back, found) = measures(back, driven, &task);
+        let (back, found) = measures(back, &driven, &task);
         gpu = back;
         assert_eq!(found, expected, "{query:?} under a network");
     }
@@ -163,8 +161,7 @@ fn non_finite_states(mut gpu: Gpu) {
         tightening: &tightening,
         control: PairControl::Replay,
     };
-    let plant = Plant { system: &Count, policy: &Idle };
-    let (_, farthest, pairs) = deviation::<_, _, 2, 1>(gpu, plant, &task);
+    let (_, farthest, pairs) = deviation(gpu, &formula, &task);
     assert!(pairs[0].nominal == 3.0 && pairs[1].nominal == NON_FINITE);
     assert!(pairs[0].perturbed > 2.9 && pairs[1].perturbed == NON_FINITE);
     assert!(farthest[0].distance <= 0.0101, "{farthest:?}");

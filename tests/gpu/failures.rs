@@ -2,9 +2,10 @@
 
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Choice, Gpu, adapters};
+use reachcast::model::Plant;
 use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
-use reachcast::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec, Tightening};
+use reachcast::rollout::{Query, ReachAvoidTask, RolloutSpec, Tightening};
 use reachcast::system::{BangBang, DoubleIntegrator};
 use reachcast::{Error, Fault, Result};
 
@@ -14,8 +15,7 @@ use crate::{drawn, gpu, race_policy, ramp, random_network, reach_avoid, whole_bo
 fn an_error_of_the_sink_stops_the_batch() {
     let Some(gpu) = gpu() else { return };
     let system = DoubleIntegrator::default();
-    let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant { system: &system, policy: &policy };
+    let plant = Plant::of(system, BangBang { acceleration: 1.0 });
     let spec = RolloutSpec::new(1, 0.95).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = ReachAvoidTask {
@@ -26,7 +26,9 @@ fn an_error_of_the_sink_stops_the_batch() {
         query: Query::Measure,
     };
     let mut calls = 0;
-    let result = Backend::Gpu(gpu).reach_avoid(plant, &task, &mut |_, _| {
+    let backend = Backend::Gpu(gpu);
+    let program = backend.prepare(&plant).expect("it fits");
+    let result = program.reach_avoid(&task, &mut |_, _| {
         calls += 1;
         Err(Error::Interrupted)
     });
@@ -36,8 +38,8 @@ fn an_error_of_the_sink_stops_the_batch() {
 
 /// Measures of a small race batch with every kernel's text changed from `old` to `new`.
 fn mutated(gpu: Gpu, old: &'static str, new: &'static str) -> Result<Vec<f32>> {
-    let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant { system: &system, policy: &policy };
+    let system = DroneRace::default();
+    let plant = Plant::of(system, race_policy());
     let spec = RolloutSpec::new(10, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let task = ReachAvoidTask {
@@ -48,7 +50,7 @@ fn mutated(gpu: Gpu, old: &'static str, new: &'static str) -> Result<Vec<f32>> {
         query: Query::Measure,
     };
     let gpu = gpu.with_shader_edit(move |text| text.replace(old, new));
-    reach_avoid(gpu, plant, &task).1
+    reach_avoid(gpu, &plant, &task).1
 }
 
 #[test]
@@ -73,8 +75,8 @@ fn a_kernel_that_does_not_compile_is_a_device_failure() {
 #[test]
 fn a_network_of_the_wrong_shape_is_refused() {
     let Some(gpu) = gpu() else { return };
-    let (system, policy) = (DroneRace::default(), random_network(&[11, 8, 3], Activation::Relu));
-    let plant = Plant { system: &system, policy: &policy };
+    let system = DroneRace::default();
+    let plant = Plant::of(system, random_network(&[11, 8, 3], Activation::Relu));
     let spec = RolloutSpec::new(1, 0.95).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = ReachAvoidTask {
@@ -84,7 +86,7 @@ fn a_network_of_the_wrong_shape_is_refused() {
         tightening: &tightening,
         query: Query::Measure,
     };
-    let (_, result) = reach_avoid(gpu, plant, &task);
+    let (_, result) = reach_avoid(gpu, &plant, &task);
     let text = result.expect_err("11 inputs for 12 states").to_string();
     assert!(text.contains("11 inputs") && text.contains("12 states"), "{text}");
 }

@@ -6,12 +6,12 @@ use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::{Gpu, Injection, NetworkKernels};
 use reachcast::backend::{Action, Backend, Event};
 use reachcast::cost::Quadratic;
+use reachcast::model::Plant;
 use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
     CostQuery, DeviationTask, Farthest, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask,
-    PairControl, PairMeasure, Pairs, Planning, Plant, Purpose, Query, ReachAvoidTask, RolloutSpec,
-    Stream,
+    PairControl, PairMeasure, Pairs, Planning, Purpose, Query, ReachAvoidTask, RolloutSpec, Stream,
 };
 use reachcast::scenario::purpose;
 use reachcast::system::{DoubleIntegrator, System};
@@ -85,7 +85,8 @@ fn run(backend: &Backend, work: Work) -> (Found, Result<()>) {
 }
 
 fn starts(backend: &Backend, query: Query, found: &mut Found) -> Result<()> {
-    let (system, policy) = (DroneRace::default(), random_network(&[12, 8, 3], Activation::Relu));
+    let system = DroneRace::default();
+    let plant = Plant::of(system, random_network(&[12, 8, 3], Activation::Relu));
     let spec = RolloutSpec::new(20, 0.95).expect("a horizon");
     let task = ReachAvoidTask {
         starts: drawn(whole_box(&system), 61),
@@ -94,8 +95,7 @@ fn starts(backend: &Backend, query: Query, found: &mut Found) -> Result<()> {
         tightening: &ramp(&spec),
         query,
     };
-    let plant = Plant { system: &system, policy: &policy };
-    backend.reach_avoid(plant, &task, &mut |first, values| {
+    backend.prepare(&plant)?.reach_avoid(&task, &mut |first, values| {
         assert_eq!(first, found.values.len() as u64, "starts in order, each once");
         found.values.extend_from_slice(values);
         Ok(())
@@ -103,7 +103,8 @@ fn starts(backend: &Backend, query: Query, found: &mut Found) -> Result<()> {
 }
 
 fn pairs(backend: &Backend, found: &mut Found) -> Result<()> {
-    let (system, policy) = (DroneRace::default(), random_network(&[12, 8, 3], Activation::Relu));
+    let system = DroneRace::default();
+    let plant = Plant::of(system, random_network(&[12, 8, 3], Activation::Relu));
     let spec = RolloutSpec::new(20, 0.95).expect("a horizon");
     let task = DeviationTask {
         pairs: Pairs {
@@ -116,8 +117,7 @@ fn pairs(backend: &Backend, found: &mut Found) -> Result<()> {
         tightening: &ramp(&spec),
         control: PairControl::ClosedLoop,
     };
-    let plant = Plant { system: &system, policy: &policy };
-    found.farthest = backend.deviation(plant, &task, &mut |first, pairs| {
+    found.farthest = backend.prepare(&plant)?.deviation(&task, &mut |first, pairs| {
         assert_eq!(first, found.pairs.len() as u64, "pairs in order, each once");
         found.pairs.extend_from_slice(pairs);
         Ok(())
@@ -296,7 +296,8 @@ fn chunks_are_halved_down_to_a_smallest() {
 fn an_error_of_the_sink_is_not_survived() {
     let Some(gpu) = gpu() else { return };
     let backend = Backend::Gpu(gpu.with_fallback(cpu()));
-    let (system, policy) = (DroneRace::default(), random_network(&[12, 8, 3], Activation::Relu));
+    let system = DroneRace::default();
+    let plant = Plant::of(system, random_network(&[12, 8, 3], Activation::Relu));
     let spec = RolloutSpec::new(2, 0.95).expect("a horizon");
     let task = ReachAvoidTask {
         starts: drawn(whole_box(&system), 61),
@@ -306,11 +307,11 @@ fn an_error_of_the_sink_is_not_survived() {
         query: Query::Measure,
     };
     let mut calls = 0;
-    let result =
-        backend.reach_avoid(Plant { system: &system, policy: &policy }, &task, &mut |_, _| {
-            calls += 1;
-            Err(Error::DeviceFailed { fault: Fault::Lost, problem: "another".to_owned() })
-        });
+    let program = backend.prepare(&plant).expect("it fits");
+    let result = program.reach_avoid(&task, &mut |_, _| {
+        calls += 1;
+        Err(Error::DeviceFailed { fault: Fault::Lost, problem: "another".to_owned() })
+    });
     assert!(matches!(result, Err(Error::DeviceFailed { fault: Fault::Lost, .. })), "{result:?}");
     assert_eq!((calls, backend.events()), (1, Vec::new()));
 }
@@ -336,7 +337,8 @@ fn work_beyond_the_limits_goes_to_the_host() {
     let Some(gpu) = gpu() else { return };
     let gpu = gpu.with_networks(NetworkKernels::Fused);
     // No adapter fuses a network of this width.
-    let (system, policy) = (DroneRace::default(), random_network(&[12, 200, 3], Activation::Relu));
+    let system = DroneRace::default();
+    let plant = Plant::of(system, random_network(&[12, 200, 3], Activation::Relu));
     let spec = RolloutSpec::new(2, 0.95).expect("a horizon");
     let task = ReachAvoidTask {
         starts: drawn(whole_box(&system), 61),
@@ -345,13 +347,13 @@ fn work_beyond_the_limits_goes_to_the_host() {
         tightening: &ramp(&spec),
         query: Query::Measure,
     };
-    let plant = Plant { system: &system, policy: &policy };
-    let refused = Backend::Gpu(gpu).reach_avoid(plant, &task, &mut |_, _| Ok(()));
-    assert!(matches!(refused, Err(Error::Device(_))), "{refused:?}");
+    let refused = Backend::Gpu(gpu).prepare(&plant).err();
+    assert!(matches!(refused, Some(Error::Device(_))), "{refused:?}");
     let Some(gpu) = crate::gpu() else { return };
     let backend = Backend::Gpu(gpu.with_networks(NetworkKernels::Fused).with_fallback(cpu()));
     let mut count = 0;
-    let result = backend.reach_avoid(plant, &task, &mut |_, values| {
+    let program = backend.prepare(&plant).expect("the host may run it");
+    let result = program.reach_avoid(&task, &mut |_, values| {
         count += values.len();
         Ok(())
     });

@@ -1,10 +1,11 @@
 //! Margins that are infinite or no number: satisfied, violated, failed.
 
 use reachcast::backend::Backend;
-use reachcast::policy::{Activation, Policy};
+use reachcast::model::Plant;
+use reachcast::policy::Activation;
 use reachcast::real::Real;
 use reachcast::rollout::{
-    DeviationTask, HUGE, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask,
+    DeviationTask, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Query, ReachAvoidTask,
     RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::system::{Axis, System};
@@ -44,6 +45,7 @@ impl Late {
 }
 
 /// Counts its steps in the first state: the target margin is that less 10, the constraint margin 2.
+#[derive(Clone)]
 struct Walls {
     target: Late,
     constraint: Late,
@@ -71,7 +73,7 @@ impl System<2, 1> for Walls {
 }
 
 /// Measures and signs over states 0 to 6 of the count from 0, and of the count from -3.
-fn found<P: Policy<2, 1>>(backend: &Backend, walls: &Walls, policy: &P, query: Query) -> Vec<f32> {
+fn found(backend: &Backend, plant: &Plant, query: Query) -> Vec<f32> {
     let spec = RolloutSpec::new(6, 1.0).expect("a horizon");
     let starts = [[0.0, 0.5], [-3.0, 0.5]];
     let task = ReachAvoidTask {
@@ -82,8 +84,8 @@ fn found<P: Policy<2, 1>>(backend: &Backend, walls: &Walls, policy: &P, query: Q
         query,
     };
     let mut all = Vec::new();
-    let plant = Plant { system: walls, policy };
-    let ran = backend.reach_avoid(plant, &task, &mut |_, values| {
+    let program = backend.prepare(plant).expect("it fits");
+    let ran = program.reach_avoid(&task, &mut |_, values| {
         all.extend_from_slice(values);
         Ok(())
     });
@@ -114,13 +116,15 @@ fn infinite_margins_are_satisfied_or_violated_and_others_fail() {
         let network = random_network(&[2, 4, 1], Activation::Tanh);
         for (target, constraint, measures) in CASES {
             let walls = Walls { target, constraint };
+            let (idle, driven) =
+                (Plant::of(walls.clone(), Idle), Plant::of(walls, network.clone()));
             let sign = |g: f32| if g == NON_FINITE { g } else { g.signum() };
             for (query, expected) in [(Query::Measure, measures), (Query::Sign, measures.map(sign))]
             {
                 let case = format!("{target:?}, {constraint:?}, {query:?}");
-                assert_eq!(found(&device, &walls, &Idle, query), expected, "{case}");
-                assert_eq!(found(&device, &walls, &network, query), expected, "{case}, network");
-                assert_eq!(found(&host, &walls, &Idle, query), expected, "{case} on the CPU");
+                assert_eq!(found(&device, &idle, query), expected, "{case}");
+                assert_eq!(found(&device, &driven, query), expected, "{case}, network");
+                assert_eq!(found(&host, &idle, query), expected, "{case} on the CPU");
             }
         }
     });
@@ -132,6 +136,7 @@ fn a_measure_stays_finite() {
     each_way(|gpu| {
         let (device, host) = (Backend::Gpu(gpu), cpu(1));
         let walls = Walls { target: Late::Infinite, constraint: Late::Infinite };
+        let plant = Plant::of(walls, Idle);
         let spec = RolloutSpec::new(6, 0.5).expect("a horizon");
         let starts = [[4.0, 0.5]];
         let task = DeviationTask {
@@ -147,8 +152,8 @@ fn a_measure_stays_finite() {
         };
         for backend in [&device, &host] {
             let mut all = Vec::new();
-            let plant = Plant { system: &walls, policy: &Idle };
-            let ran = backend.deviation(plant, &task, &mut |_, pairs| {
+            let program = backend.prepare(&plant).expect("it fits");
+            let ran = program.deviation(&task, &mut |_, pairs| {
                 all.extend(pairs.iter().flat_map(|pair| [pair.nominal, pair.perturbed]));
                 Ok(())
             });

@@ -33,10 +33,11 @@ use std::path::Path;
 use reachcast::Result;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::model::Plant;
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use reachcast::rollout::{
-    DeviationTask, Farthest, PairMeasure, Plant, Purpose, ReachAvoidTask, Region, RolloutSpec,
-    Starts, Stream, Tightening,
+    DeviationTask, Farthest, PairMeasure, Purpose, ReachAvoidTask, Region, RolloutSpec, Starts,
+    Stream, Tightening,
 };
 use reachcast::system::System;
 
@@ -62,45 +63,41 @@ fn each_way(test: impl Fn(Gpu)) {
     }
 }
 
-fn reach_avoid<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    gpu: Gpu,
-    plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_>,
-) -> (Gpu, Result<Vec<f32>>) {
+fn reach_avoid(gpu: Gpu, plant: &Plant, task: &ReachAvoidTask<'_>) -> (Gpu, Result<Vec<f32>>) {
     let backend = Backend::Gpu(gpu);
     let mut all = Vec::new();
-    let result = backend.reach_avoid(plant, task, &mut |first, values| {
+    let mut sink = |first, values: &[f32]| {
         assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
-    });
+    };
+    let prepared = backend.prepare(plant);
+    let result = prepared.and_then(|program| program.reach_avoid(task, &mut sink));
     let Backend::Gpu(gpu) = backend else { unreachable!("it was made a GPU above") };
     (gpu, result.map(|()| all))
 }
 
-fn measures<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    gpu: Gpu,
-    plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_>,
-) -> (Gpu, Vec<f32>) {
+fn measures(gpu: Gpu, plant: &Plant, task: &ReachAvoidTask<'_>) -> (Gpu, Vec<f32>) {
     let (gpu, all) = reach_avoid(gpu, plant, task);
     let all = all.expect("a batch that runs");
     assert_eq!(all.len() as u64, task.range.end - task.range.start);
     (gpu, all)
 }
 
-fn deviation<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
+fn deviation(
     gpu: Gpu,
-    plant: Plant<'_, S, P>,
+    plant: &Plant,
     task: &DeviationTask<'_>,
 ) -> (Gpu, Vec<Farthest>, Vec<PairMeasure>) {
     let backend = Backend::Gpu(gpu);
     let mut all = Vec::new();
-    let farthest = backend.deviation(plant, task, &mut |first, values| {
+    let mut sink = |first, values: &[PairMeasure]| {
         assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
-    });
+    };
+    let prepared = backend.prepare(plant);
+    let farthest = prepared.and_then(|program| program.deviation(task, &mut sink));
     assert_eq!(all.len() as u64, task.range.end - task.range.start);
     let Backend::Gpu(gpu) = backend else { unreachable!("it was made a GPU above") };
     (gpu, farthest.expect("a batch that runs"), all)

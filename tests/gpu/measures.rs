@@ -1,11 +1,10 @@
 //! Measures of trajectories against f32 on the host and against the f64 oracle.
 
 use reachcast::backend::gpu::{AdapterKind, Gpu};
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Policy};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{
-    Fold, Plant, Query, ReachAvoidTask, RolloutSpec, Tightening, measure, trajectory,
-};
+use reachcast::rollout::{Fold, Query, ReachAvoidTask, Region, RolloutSpec, Tightening, replay};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 
 use crate::{band, drawn, each_way, gpu, measures, race_policy, ramp, random_network, whole_box};
@@ -16,40 +15,42 @@ fn rounds_like_the_host(gpu: &Gpu) -> bool {
 }
 
 /// The measure in f32 on the host, one state after the other.
-fn measure_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    start: [f32; NX],
-    spec: &RolloutSpec,
-    tightening: &Tightening,
-) -> f32 {
+fn measure_f32(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Tightening) -> f32 {
     let mut fold = Fold::new();
-    let states = trajectory::<f32, S, P, NX, NU>(plant, start, spec.horizon);
-    for (t, x) in states.into_iter().enumerate() {
+    let states = replay::states::<f32>(plant, start, spec.horizon);
+    for (step, x) in (0..).zip(states) {
         fold.add(
-            plant.system.target(x) - tightening.target[t],
-            plant.system.constraint(x) - tightening.constraint[t],
+            plant.model.target_at(&x, step) - tightening.target[step as usize],
+            plant.model.constraint_at(&x, step) - tightening.constraint[step as usize],
             spec.gamma,
         );
     }
     fold.measure()
 }
 
+/// The same of a system and a policy as Rust types, nothing recorded.
+fn typed_measure_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
+    (system, policy): (&S, &P),
+    mut x: [f32; NX],
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f32 {
+    let mut fold = Fold::new();
+    for (target, constraint) in tightening.target.iter().zip(&tightening.constraint) {
+        let margins = (system.target(x) - target, system.constraint(x) - constraint);
+        fold.add(margins.0, margins.1, spec.gamma);
+        x = system.step(x, policy.control(x));
+    }
+    fold.measure()
+}
+
 /// Every GPU measure lies within [`band`].
-pub(crate) fn assert_close_to_f64<
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-    const NX: usize,
-    const NU: usize,
->(
-    plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_>,
-    gpu: &[f32],
-) {
-    let starts = task.range.clone().map(|index| task.starts.start_array(index));
+pub(crate) fn assert_close_to_f64(plant: &Plant, task: &ReachAvoidTask<'_>, gpu: &[f32]) {
+    let starts = task.range.clone().map(|index| task.starts.start(index));
     let both: Vec<(f64, f32)> = starts
         .map(|start| {
-            let oracle = measure(plant, start, &task.spec, task.tightening);
-            let host = measure_f32(plant, start, &task.spec, task.tightening);
+            let oracle = replay::measure(plant, &start, &task.spec, task.tightening);
+            let host = measure_f32(plant, &start, &task.spec, task.tightening);
             (oracle, host)
         })
         .collect();
@@ -66,7 +67,7 @@ fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
     let exact = rounds_like_the_host(&gpu);
     let system = DoubleIntegrator::default();
     let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant { system: &system, policy: &policy };
+    let plant = Plant::of(system, policy);
     let spec = RolloutSpec::new(40, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let task = ReachAvoidTask {
@@ -76,8 +77,9 @@ fn formula_measures_have_the_host_bits_where_nothing_is_contracted() {
         tightening: &tightening,
         query: Query::Measure,
     };
-    let (_, found) = measures(gpu, plant, &task);
-    let host = |i| measure_f32(plant, task.starts.start_array(i), &spec, &tightening);
+    let (_, found) = measures(gpu, &plant, &task);
+    let typed = (&system, &policy);
+    let host = |i| typed_measure_f32(typed, task.starts.start_array(i), &spec, &tightening);
     let equal = (0..1000).filter(|&i| found[i as usize] == host(i)).count();
     // A contracted product can flip the bang-bang control, but only next to the switch.
     let least = if exact { 1000 } else { 900 };
@@ -90,8 +92,8 @@ fn race_measures_lie_within_a_band_around_f64() {
 }
 
 fn race_measures(gpu: Gpu) {
-    let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant { system: &system, policy: &policy };
+    let system = DroneRace::default();
+    let plant = Plant::of(system, race_policy());
     let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     let task = ReachAvoidTask {
@@ -101,8 +103,8 @@ fn race_measures(gpu: Gpu) {
         tightening: &tightening,
         query: Query::Measure,
     };
-    let (_, found) = measures(gpu, plant, &task);
-    assert_close_to_f64(plant, &task, &found);
+    let (_, found) = measures(gpu, &plant, &task);
+    assert_close_to_f64(&plant, &task, &found);
 }
 
 #[test]
@@ -118,8 +120,7 @@ fn wide_networks_of_every_activation() {
         (vec![12, 3], Activation::Relu, 10),
     ];
     for (widths, activation, count) in cases {
-        let policy = random_network(&widths, activation);
-        let plant = Plant { system: &system, policy: &policy };
+        let plant = Plant::of(system, random_network(&widths, activation));
         let task = ReachAvoidTask {
             starts: drawn(whole_box(&system), 23),
             range: 0..count,
@@ -127,34 +128,29 @@ fn wide_networks_of_every_activation() {
             tightening: &tightening,
             query: Query::Measure,
         };
-        let (back, found) = measures(gpu, plant, &task);
+        let (back, found) = measures(gpu, &plant, &task);
         gpu = back;
-        assert_close_to_f64(plant, &task, &found);
+        assert_close_to_f64(&plant, &task, &found);
     }
 }
 
 #[test]
 fn sign_query_equals_the_sign_of_the_measure() {
-    let (race, network) = (DroneRace::default(), race_policy());
-    each_way(|gpu| drop(assert_signs(gpu, &race, &network, 30, 700)));
+    let race = DroneRace::default();
+    let (plant, region) = (Plant::of(race, race_policy()), whole_box(&race));
+    each_way(|gpu| assert_signs(gpu, (&plant, &region), 30, 700));
     let Some(gpu) = gpu() else { return };
     let integrator = DoubleIntegrator::default();
-    let formula = BangBang { acceleration: 1.0 };
-    assert_signs(gpu, &integrator, &formula, 100, 3000);
+    let plant = Plant::of(integrator, BangBang { acceleration: 1.0 });
+    assert_signs(gpu, (&plant, &whole_box(&integrator)), 100, 3000);
 }
 
-fn assert_signs<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    gpu: Gpu,
-    system: &S,
-    policy: &P,
-    horizon: u32,
-    count: u64,
-) -> Gpu {
-    let plant = Plant { system, policy };
+/// Holds signs of `count` starts in `region` against the measures.
+fn assert_signs(gpu: Gpu, (plant, region): (&Plant, &Region), horizon: u32, count: u64) {
     let spec = RolloutSpec::new(horizon, 0.95).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let mut task = ReachAvoidTask {
-        starts: drawn(whole_box(system), 24),
+        starts: drawn(region.clone(), 24),
         range: 40..40 + count,
         spec,
         tightening: &tightening,
@@ -162,10 +158,9 @@ fn assert_signs<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU:
     };
     let (gpu, dense) = measures(gpu, plant, &task);
     task.query = Query::Sign;
-    let (gpu, signs) = measures(gpu, plant, &task);
+    let (_, signs) = measures(gpu, plant, &task);
     let expected: Vec<f32> = dense.iter().map(|g| if *g > 0.0 { 1.0 } else { -1.0 }).collect();
     assert_eq!(signs, expected);
     let passed = expected.iter().filter(|sign| **sign > 0.0).count();
     assert!(passed > 0 && passed < expected.len(), "{passed} of {count}: one sign only");
-    gpu
 }

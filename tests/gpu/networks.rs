@@ -2,11 +2,12 @@
 
 use reachcast::Error;
 use reachcast::backend::gpu::{Gpu, NetworkKernels};
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    DeviationTask, NON_FINITE, PairControl, Pairs, Plant, Query, ReachAvoidTask, RolloutSpec,
-    Starts, Stream, Tightening,
+    DeviationTask, NON_FINITE, PairControl, Pairs, Query, ReachAvoidTask, RolloutSpec, Starts,
+    Stream, Tightening,
 };
 use reachcast::scenario::purpose;
 
@@ -41,7 +42,6 @@ fn last_states_under_networks_of_every_width_and_depth() {
         (vec![12, 3], Activation::Relu),
     ];
     for (widths, activation) in cases {
-        let policy = random_network(&widths, activation);
         let task = ReachAvoidTask {
             starts: drawn(whole_box(&system), 31),
             range: 0..100,
@@ -49,19 +49,19 @@ fn last_states_under_networks_of_every_width_and_depth() {
             tightening: &tightening,
             query: Query::Measure,
         };
-        let plant = Plant { system: &system, policy: &policy };
-        let (back, found) = measures(gpu, plant, &task);
+        let plant = Plant::of(system, random_network(&widths, activation));
+        let (back, found) = measures(gpu, &plant, &task);
         gpu = back;
         assert!(found.iter().all(|margin| *margin > -900.0), "the last state decides");
-        assert_close_to_f64(plant, &task, &found);
+        assert_close_to_f64(&plant, &task, &found);
     }
 }
 
 #[test]
 fn batches_around_whole_workgroups() {
     let Some(mut gpu) = fusing() else { return };
-    let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant { system: &system, policy: &policy };
+    let system = DroneRace::default();
+    let plant = Plant::of(system, race_policy());
     let (spec, tightening) = last_state_only(3);
     let mut task = ReachAvoidTask {
         starts: drawn(whole_box(&system), 32),
@@ -70,12 +70,12 @@ fn batches_around_whole_workgroups() {
         tightening: &tightening,
         query: Query::Measure,
     };
-    let (back, all) = measures(gpu, plant, &task);
+    let (back, all) = measures(gpu, &plant, &task);
     gpu = back;
-    assert_close_to_f64(plant, &task, &all);
+    assert_close_to_f64(&plant, &task, &all);
     for count in [1, 63, 64, 65, 127, 255, 256, 257] {
         task.range = 7..7 + count;
-        let (back, found) = measures(gpu, plant, &task);
+        let (back, found) = measures(gpu, &plant, &task);
         gpu = back;
         assert_eq!(found, all[7..7 + count as usize], "{count} trajectories");
     }
@@ -85,8 +85,7 @@ fn batches_around_whole_workgroups() {
 fn fused_chunks_join_without_a_seam() {
     let Some(gpu) = fusing() else { return };
     let system = DroneRace::default();
-    let policy = random_network(&[12, 8, 3], Activation::Relu);
-    let plant = Plant { system: &system, policy: &policy };
+    let plant = Plant::of(system, random_network(&[12, 8, 3], Activation::Relu));
     let (spec, tightening) = last_state_only(2);
     let pairs = |range| DeviationTask {
         pairs: Pairs {
@@ -100,9 +99,9 @@ fn fused_chunks_join_without_a_seam() {
         control: PairControl::ClosedLoop,
     };
     let seam = 1 << 16;
-    let (gpu, farthest, whole) = deviation(gpu, plant, &pairs(0..seam + 300));
-    let (gpu, before, left) = deviation(gpu, plant, &pairs(0..seam - 100));
-    let (_, after, right) = deviation(gpu, plant, &pairs(seam - 100..seam + 300));
+    let (gpu, farthest, whole) = deviation(gpu, &plant, &pairs(0..seam + 300));
+    let (gpu, before, left) = deviation(gpu, &plant, &pairs(0..seam - 100));
+    let (_, after, right) = deviation(gpu, &plant, &pairs(seam - 100..seam + 300));
     assert_eq!(whole, [left, right].concat());
     let merged: Vec<_> = before.iter().zip(after).map(|(a, b)| a.merge(b)).collect();
     assert_eq!(farthest, merged);
@@ -115,7 +114,6 @@ fn a_decided_sign_stays_when_the_state_overflows() {
         let mut constraint = vec![0.0; 8];
         constraint[3] = 1e7;
         let tightening = Tightening { target: vec![0.0; 8], constraint };
-        let policy = random_network(&[2, 4, 1], Activation::Tanh);
         let mut task = ReachAvoidTask {
             starts: Starts::listed(&[[-20.0, 2.1]]),
             range: 0..1,
@@ -123,11 +121,11 @@ fn a_decided_sign_stays_when_the_state_overflows() {
             tightening: &tightening,
             query: Query::Sign,
         };
-        let plant = Plant { system: &Count, policy: &policy };
-        let (gpu, sign) = measures(gpu, plant, &task);
+        let plant = Plant::of(Count, random_network(&[2, 4, 1], Activation::Tanh));
+        let (gpu, sign) = measures(gpu, &plant, &task);
         assert_eq!(sign, [-1.0]);
         task.query = Query::Measure;
-        assert_eq!(measures(gpu, plant, &task).1, [NON_FINITE]);
+        assert_eq!(measures(gpu, &plant, &task).1, [NON_FINITE]);
     });
 }
 
@@ -143,7 +141,7 @@ fn dispatches(gpu: Gpu, policy: &Mlp) -> Vec<(&'static str, u64)> {
         query: Query::Measure,
     };
     gpu.time_kernels(true);
-    let (gpu, _) = measures(gpu, Plant { system: &system, policy }, &task);
+    let (gpu, _) = measures(gpu, &Plant::of(system, policy.clone()), &task);
     gpu.take_kernel_times().iter().map(|time| (time.kernel, time.dispatches)).collect()
 }
 
@@ -161,7 +159,8 @@ fn a_fused_rollout_has_no_dispatches_of_layers() {
 #[test]
 fn a_network_too_wide_to_fuse_is_refused() {
     let Some(gpu) = fusing() else { return };
-    let (system, policy) = (DroneRace::default(), random_network(&[12, 200, 3], Activation::Relu));
+    let system = DroneRace::default();
+    let plant = Plant::of(system, random_network(&[12, 200, 3], Activation::Relu));
     let (spec, tightening) = last_state_only(1);
     let task = ReachAvoidTask {
         starts: drawn(whole_box(&system), 35),
@@ -170,7 +169,7 @@ fn a_network_too_wide_to_fuse_is_refused() {
         tightening: &tightening,
         query: Query::Measure,
     };
-    let (_, result) = reach_avoid(gpu, Plant { system: &system, policy: &policy }, &task);
+    let (_, result) = reach_avoid(gpu, &plant, &task);
     let Err(Error::Device(problem)) = result else { panic!("{result:?}") };
     assert!(problem.contains("200") && problem.contains("128"), "{problem}");
 }

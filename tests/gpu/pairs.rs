@@ -1,17 +1,14 @@
 //! Pairs rolled out side by side against the f64 oracle.
 
-use std::array::from_fn;
-
 use reachcast::backend::gpu::Gpu;
-use reachcast::policy::Policy;
+use reachcast::model::Plant;
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
-    DeviationTask, Farthest, Fold, PairControl, PairMeasure, Pairs, Plant, Region, RolloutSpec,
-    Stream, Tightening, pair_measures,
+    DeviationTask, Farthest, Fold, PairControl, PairMeasure, Pairs, Region, RolloutSpec, Stream,
+    Tightening, replay,
 };
 use reachcast::scenario::purpose;
-use reachcast::system::System;
 
 use crate::systems::{Idle, Reveal};
 use crate::{band, deviation, drawn, each_way, gpu, race_policy, ramp, whole_box};
@@ -22,8 +19,8 @@ fn deviation_of_the_race_against_f64() {
 }
 
 fn race_deviation(mut gpu: Gpu) {
-    let (system, policy) = (DroneRace::default(), race_policy());
-    let plant = Plant { system: &system, policy: &policy };
+    let system = DroneRace::default();
+    let plant = Plant::of(system, race_policy());
     let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
     let tightening = ramp(&spec);
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
@@ -38,49 +35,35 @@ fn race_deviation(mut gpu: Gpu) {
             tightening: &tightening,
             control,
         };
-        let (back, farthest, found) = deviation(gpu, plant, &task);
+        let (back, farthest, found) = deviation(gpu, &plant, &task);
         gpu = back;
-        assert_pairs_close_to_f64(plant, &task, &found);
-        assert_farthest_close_to_f64(plant, &task, &farthest);
+        assert_pairs_close_to_f64(&plant, &task, &found);
+        assert_farthest_close_to_f64(&plant, &task, &farthest);
     }
 }
 
 /// Both measures of a pair in f32 on the host.
-fn pair_f32<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_>,
-    [mut a, mut b]: [[f32; NX]; 2],
-) -> [f32; 2] {
-    let (system, policy) = (plant.system, plant.policy);
+fn pair_f32(plant: &Plant, task: &DeviationTask<'_>, pair: u64) -> [f32; 2] {
+    let model = &plant.model;
     let mut folds = [Fold::new(), Fold::new()];
     let losses = task.tightening.target.iter().zip(&task.tightening.constraint);
-    for (target, constraint) in losses {
-        let margins = (system.target(a) - target, system.constraint(a) - constraint);
-        folds[0].add(margins.0, margins.1, task.spec.gamma);
-        folds[1].add(system.target(b), system.constraint(b), task.spec.gamma);
-        let u = policy.control(a);
-        b = match task.control {
-            PairControl::Replay => system.step(b, u),
-            PairControl::ClosedLoop => system.step(b, policy.control(b)),
-        };
-        a = system.step(a, u);
+    let states = (0..).zip(pair_states::<f32>(plant, task, pair));
+    for ((step, [a, b]), (target, constraint)) in states.zip(losses) {
+        let margins = |x: &[f32]| (model.target_at(x, step), model.constraint_at(x, step));
+        let (nominal, perturbed) = (margins(&a), margins(&b));
+        folds[0].add(nominal.0 - target, nominal.1 - constraint, task.spec.gamma);
+        folds[1].add(perturbed.0, perturbed.1, task.spec.gamma);
     }
     folds.map(|fold| fold.measure())
 }
 
-fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_>,
-    found: &[PairMeasure],
-) where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+fn assert_pairs_close_to_f64(plant: &Plant, task: &DeviationTask<'_>, found: &[PairMeasure]) {
     let pairs = task.range.clone().map(|pair| {
-        let starts = task.pairs.pair(pair).map(|x| from_fn(|i| x[i]));
+        let [nominal, perturbed] = task.pairs.pair(pair);
+        let starts = [&nominal[..], &perturbed];
         let (nominal, perturbed) =
-            pair_measures(plant, starts, &task.spec, task.tightening, task.control);
-        (pair_f32(plant, task, starts), [nominal, perturbed])
+            replay::pair_measures(plant, starts, &task.spec, task.tightening, task.control);
+        (pair_f32(plant, task, pair), [nominal, perturbed])
     });
     let pairs: Vec<([f32; 2], [f64; 2])> = pairs.collect();
     for side in 0..2 {
@@ -92,35 +75,34 @@ fn assert_pairs_close_to_f64<S, P, const NX: usize, const NU: usize>(
     }
 }
 
-/// Distances of a pair at each step.
-fn distances<R: Real, S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_>,
-    pair: u64,
-) -> Vec<R> {
-    let [mut a, mut b] = task.pairs.pair(pair).map(|x| from_fn(|i| R::lit(x[i])));
+/// Both states of a pair at each step, `[T + 1]` of `[2, states]`.
+fn pair_states<R: Real>(plant: &Plant, task: &DeviationTask<'_>, pair: u64) -> Vec<[Vec<R>; 2]> {
+    let [mut a, mut b]: [Vec<R>; 2] =
+        task.pairs.pair(pair).map(|x| x.into_iter().map(R::lit).collect());
     let mut all = Vec::new();
-    for _ in 0..=task.spec.horizon {
-        let gaps = a.iter().zip(&b).map(|(&a, &b)| b - a);
-        all.push(gaps.fold(R::lit(0.0), |sum, gap| sum + gap * gap).sqrt());
-        let u = plant.policy.control(a);
-        b = match task.control {
-            PairControl::Replay => plant.system.step(b, u),
-            PairControl::ClosedLoop => plant.system.step(b, plant.policy.control(b)),
+    for step in 0..=task.spec.horizon {
+        let u = plant.control(&a, step);
+        let v = match task.control {
+            PairControl::Replay => u.clone(),
+            PairControl::ClosedLoop => plant.control(&b, step),
         };
-        a = plant.system.step(a, u);
+        let next = [plant.model.next(&a, &u, step), plant.model.next(&b, &v, step)];
+        all.push([a, b]);
+        [a, b] = next;
     }
     all
 }
 
-fn assert_farthest_close_to_f64<S, P, const NX: usize, const NU: usize>(
-    plant: Plant<'_, S, P>,
-    task: &DeviationTask<'_>,
-    farthest: &[Farthest],
-) where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+/// Distances of a pair at each step.
+fn distances<R: Real>(plant: &Plant, task: &DeviationTask<'_>, pair: u64) -> Vec<R> {
+    let distance = |[a, b]: &[Vec<R>; 2]| {
+        let gaps = a.iter().zip(b).map(|(&a, &b)| b - a);
+        gaps.fold(R::lit(0.0), |sum, gap| sum + gap * gap).sqrt()
+    };
+    pair_states(plant, task, pair).iter().map(distance).collect()
+}
+
+fn assert_farthest_close_to_f64(plant: &Plant, task: &DeviationTask<'_>, farthest: &[Farthest]) {
     let first = task.range.start;
     let pairs = || task.range.clone();
     let all: Vec<Vec<f64>> = pairs().map(|pair| distances(plant, task, pair)).collect();
@@ -140,8 +122,7 @@ fn assert_farthest_close_to_f64<S, P, const NX: usize, const NU: usize>(
 #[test]
 fn equal_distances_go_to_the_first_pair() {
     let Some(gpu) = gpu() else { return };
-    let system = Reveal::<3>(0);
-    let plant = Plant { system: &system, policy: &Idle };
+    let plant = Plant::of(Reveal::<3>(0), Idle);
     let spec = RolloutSpec::new(40, 0.5).expect("a horizon");
     let tightening = Tightening::none(&spec);
     let task = DeviationTask {
@@ -155,7 +136,7 @@ fn equal_distances_go_to_the_first_pair() {
         tightening: &tightening,
         control: PairControl::Replay,
     };
-    let (_, farthest, _) = deviation::<_, _, 3, 1>(gpu, plant, &task);
+    let (_, farthest, _) = deviation(gpu, &plant, &task);
     assert!(farthest[0].distance > 0.09 && farthest[0].distance < 0.1001);
     let together = Farthest { distance: 0.0, pair: 77 };
     assert!(farthest[1..].iter().all(|found| *found == together), "{farthest:?}");

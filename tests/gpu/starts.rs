@@ -1,9 +1,10 @@
 //! Starts and pairs that the device draws have the bits of those that the host draws.
 
 use reachcast::backend::gpu::Gpu;
+use reachcast::model::Plant;
 use reachcast::rollout::{
-    Ball, DeviationTask, PairControl, Pairs, Plant, Query, ReachAvoidTask, Region, RolloutSpec,
-    Starts, Stream, Tightening,
+    Ball, DeviationTask, PairControl, Pairs, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
+    Stream, Tightening,
 };
 use reachcast::scenario::purpose;
 
@@ -25,9 +26,8 @@ fn revealed_starts<const NX: usize>(mut gpu: Gpu, starts: &Starts<'_>, first: u6
         query: Query::Measure,
     };
     for coordinate in 0..NX {
-        let system = Reveal::<NX>(coordinate);
-        let plant = Plant { system: &system, policy: &Idle };
-        let (back, found) = measures::<_, _, NX, 1>(gpu, plant, &task);
+        let plant = Plant::of(Reveal::<NX>(coordinate), Idle);
+        let (back, found) = measures(gpu, &plant, &task);
         gpu = back;
         let expected = task.range.clone().map(|i| starts.start(i)[coordinate]);
         assert_eq!(bits(found), bits(expected), "coordinate {coordinate} of {NX}");
@@ -73,9 +73,8 @@ fn pairs_have_the_host_bits() {
         control: PairControl::Replay,
     };
     for coordinate in 0..3 {
-        let system = Reveal::<3>(coordinate);
-        let plant = Plant { system: &system, policy: &Idle };
-        let (back, _, found) = deviation::<_, _, 3, 1>(gpu, plant, &task);
+        let plant = Plant::of(Reveal::<3>(coordinate), Idle);
+        let (back, _, found) = deviation(gpu, &plant, &task);
         gpu = back;
         let expected = (5..305).map(|i| pairs.pair(i).map(|x| x[coordinate]));
         let (nominal, perturbed): (Vec<f32>, Vec<f32>) =

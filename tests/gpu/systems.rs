@@ -5,6 +5,7 @@ use reachcast::real::Real;
 use reachcast::system::{Axis, System};
 
 /// A system whose measure is one coordinate of the start: it leaves for far below at once.
+#[derive(Clone)]
 pub(crate) struct Reveal<const NX: usize>(pub(crate) usize);
 
 /// Where [`Reveal`] goes.
@@ -33,6 +34,7 @@ impl<const NX: usize> System<NX, 1> for Reveal<NX> {
 
 /// Counts its steps in the first state; squares the second, which overflows if above 1 and is
 /// finite again one step later.
+#[derive(Clone)]
 pub(crate) struct Count;
 
 impl System<2, 1> for Count {
@@ -58,6 +60,7 @@ impl System<2, 1> for Count {
 }
 
 /// A formula for any system: the control is 0.
+#[derive(Clone)]
 pub(crate) struct Idle;
 
 impl<const NX: usize, const NU: usize> Policy<NX, NU> for Idle {

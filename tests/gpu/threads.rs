@@ -5,11 +5,12 @@ use std::thread;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::gpu::Injection;
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Plant, Query, ReachAvoidTask,
-    RolloutSpec, Stream,
+    DeviationTask, Farthest, PairControl, PairMeasure, Pairs, Query, ReachAvoidTask, RolloutSpec,
+    Stream,
 };
 use reachcast::scenario::purpose;
 use reachcast::{Fault, Result};
@@ -30,7 +31,7 @@ struct Found {
 
 fn run(backend: &Backend, policy: &Mlp, seed: u64) -> Result<Found> {
     let system = DroneRace::default();
-    let plant = Plant { system: &system, policy };
+    let program = backend.prepare(&Plant::of(system, policy.clone()))?;
     let spec = RolloutSpec::new(10, 0.95)?;
     let tightening = ramp(&spec);
     let mut found = Found::default();
@@ -42,7 +43,7 @@ fn run(backend: &Backend, policy: &Mlp, seed: u64) -> Result<Found> {
         tightening: &tightening,
         query: if seed.is_multiple_of(2) { Query::Measure } else { Query::Sign },
     };
-    backend.reach_avoid(plant, &task, &mut |first, values| {
+    program.reach_avoid(&task, &mut |first, values| {
         assert_eq!(first, found.measures.len() as u64);
         found.measures.extend_from_slice(values);
         Ok(())
@@ -55,7 +56,7 @@ fn run(backend: &Backend, policy: &Mlp, seed: u64) -> Result<Found> {
         tightening: &tightening,
         control: PairControl::ClosedLoop,
     };
-    found.farthest = backend.deviation(plant, &task, &mut |first, pairs| {
+    found.farthest = program.deviation(&task, &mut |first, pairs| {
         assert_eq!(first, found.pairs.len() as u64);
         found.pairs.extend_from_slice(pairs);
         Ok(())

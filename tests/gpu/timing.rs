@@ -1,9 +1,10 @@
 //! Times of kernels on the device, and its limits.
 
 use reachcast::backend::gpu::{Gpu, KernelTime};
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{Plant, Query, ReachAvoidTask, RolloutSpec};
+use reachcast::rollout::{Query, ReachAvoidTask, RolloutSpec};
 
 use crate::{drawn, gpu, measures, ramp, random_network, whole_box};
 
@@ -19,7 +20,7 @@ fn roll_out(gpu: Gpu, policy: &Mlp, count: u64) -> (Gpu, Vec<f32>) {
         tightening: &tightening,
         query: Query::Measure,
     };
-    measures(gpu, Plant { system: &system, policy }, &task)
+    measures(gpu, &Plant::of(system, policy.clone()), &task)
 }
 
 #[test]

@@ -4,11 +4,10 @@ use std::array::from_fn;
 
 use reachcast::backend::Backend;
 use reachcast::formula::{Function, record};
+use reachcast::model::Plant;
 use reachcast::policy::Policy;
 use reachcast::real::{Lanes, Real};
-use reachcast::rollout::{
-    NON_FINITE, Plant, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening,
-};
+use reachcast::rollout::{NON_FINITE, Query, ReachAvoidTask, RolloutSpec, Starts, Tightening};
 use reachcast::system::{Axis, System};
 
 /// Margin that ends a rollout after its first state.
@@ -170,13 +169,13 @@ fn measures(backend: &Backend, case: Case, starts: &[[f32; 5]]) -> Result<Vec<f3
         tightening: &Tightening::none(&spec),
         query: Query::Measure,
     };
-    let system = Probe(case);
     let mut measures = Vec::new();
     let sink = &mut |_: u64, values: &[f32]| {
         measures.extend_from_slice(values);
         Ok(())
     };
-    let plant = Plant { system: &system, policy: &Mark };
-    backend.reach_avoid(plant, &task, sink).map_err(|error| error.to_string())?;
+    let prepared = backend.prepare(&Plant::of(Probe(case), Mark));
+    let ran = prepared.and_then(|program| program.reach_avoid(&task, sink));
+    ran.map_err(|error| error.to_string())?;
     Ok(measures)
 }

@@ -1,8 +1,9 @@
 //! Rollouts that meet infinity or NaN.
 
 use super::fixture::*;
+use crate::model::Plant;
 use crate::rollout::{
-    DeviationTask, HUGE, NON_FINITE, PairControl, Pairs, Plant, Purpose, Query, ReachAvoidTask,
+    DeviationTask, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Query, ReachAvoidTask,
     RolloutSpec, Starts, Stream, Tightening,
 };
 
@@ -33,9 +34,8 @@ fn starts() -> Vec<[f32; 1]> {
 
 #[test]
 fn a_state_that_is_not_finite_fails_the_rest_of_its_rollout() {
-    let (starts, system) = (starts(), Burst { limit: 1e30 });
+    let (starts, plant) = (starts(), Plant::of(Burst { limit: 1e30 }, Fragile));
     let spec = RolloutSpec::new(8, 0.9).expect("a valid specification");
-    let plant = Plant { system: &system, policy: &Fragile };
     for cpu in every_cpu() {
         for query in [Query::Measure, Query::Sign] {
             let task = ReachAvoidTask {
@@ -45,7 +45,7 @@ fn a_state_that_is_not_finite_fails_the_rest_of_its_rollout() {
                 tightening: &Tightening::none(&spec),
                 query,
             };
-            let got = measures(&cpu, plant, &task);
+            let got = measures(&cpu, &plant, &task);
             for (i, got) in got.into_iter().enumerate() {
                 let (start, fate) = CASES[i % CASES.len()];
                 let right = match fate {
@@ -62,9 +62,8 @@ fn a_state_that_is_not_finite_fails_the_rest_of_its_rollout() {
 /// A violation before the burst decides the sign; the measure says that it is not finite.
 #[test]
 fn a_violation_before_the_burst_decides_the_sign() {
-    let (starts, system) = ([[2.0], [0.5]], Burst { limit: 0.25 });
+    let (starts, plant) = ([[2.0], [0.5]], Plant::of(Burst { limit: 0.25 }, Fragile));
     let spec = RolloutSpec::new(8, 0.9).expect("a valid specification");
-    let plant = Plant { system: &system, policy: &Fragile };
     let run = |query| {
         let task = ReachAvoidTask {
             starts: Starts::listed(&starts),
@@ -73,7 +72,7 @@ fn a_violation_before_the_burst_decides_the_sign() {
             tightening: &Tightening::none(&spec),
             query,
         };
-        measures(&cpu(1), plant, &task)
+        measures(&cpu(1), &plant, &task)
     };
     assert_eq!(run(Query::Measure), [NON_FINITE; 2]);
     assert_eq!(run(Query::Sign), [-1.0; 2]);
@@ -81,9 +80,8 @@ fn a_violation_before_the_burst_decides_the_sign() {
 
 #[test]
 fn a_pair_that_is_not_finite_is_the_farthest() {
-    let (starts, system) = (starts(), Burst { limit: 1e30 });
+    let (starts, plant) = (starts(), Plant::of(Burst { limit: 1e30 }, Fragile));
     let spec = RolloutSpec::new(8, 0.9).expect("a valid specification");
-    let plant = Plant { system: &system, policy: &Fragile };
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::listed(&starts),
@@ -96,7 +94,7 @@ fn a_pair_that_is_not_finite_is_the_farthest() {
         control: PairControl::Replay,
     };
     for cpu in every_cpu() {
-        let (farthest, measures) = deviation(&cpu, plant, &task);
+        let (farthest, measures) = deviation(&cpu, &plant, &task);
         assert!(farthest[0].distance <= 1.001e-3, "{:?}", farthest[0]);
         // The first start of NaN control is number 5; its state is NaN from step 1 on.
         assert_eq!((farthest[1].distance, farthest[1].pair), (HUGE, 5));

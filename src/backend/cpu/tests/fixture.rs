@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use super::super::Cpu;
+use crate::model::Plant;
 use crate::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use crate::race::system::DroneRace;
 use crate::real::Real;
 use crate::real::simd::Instructions;
 use crate::rollout::{
-    DeviationTask, Farthest, PairMeasure, Plant, Query, ReachAvoidTask, Region, RolloutSpec,
-    Starts, Stream, Tightening,
+    DeviationTask, Farthest, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
+    Stream, Tightening,
 };
 use crate::rollout::{Pairs, Purpose};
 use crate::system::{Axis, System};
@@ -77,34 +79,32 @@ pub(super) fn network(widths: &[usize], activation: Activation, output: OutputAc
 }
 
 /// The measures of `task`, which the sink must get in order.
-pub(super) fn measures<S, P, const NX: usize, const NU: usize>(
-    cpu: &Cpu,
-    plant: Plant<'_, S, P>,
-    task: &ReachAvoidTask<'_>,
-) -> Vec<f32>
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+pub(super) fn measures(cpu: &Cpu, plant: &Plant, task: &ReachAvoidTask<'_>) -> Vec<f32> {
     let mut all = Vec::new();
-    cpu.reach_avoid(plant, task, &mut |first, values| {
+    let prepared = cpu.prepare(plant).expect("it fits");
+    let ran = prepared.reach_avoid(cpu, task, &mut |first, values| {
         assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())
-    })
-    .expect("the batch runs");
+    });
+    ran.expect("the batch runs");
     assert_eq!(all.len() as u64, task.range.end - task.range.start);
     all
 }
 
-/// The measures of the starts `range` of the race under `policy`.
-pub(super) fn race<P: Policy<12, 3>>(
+/// The race under `policy`.
+pub(super) fn race_under<P: Policy<12, 3> + Send + Sync + 'static>(policy: P) -> Plant {
+    Plant::of(DroneRace::default(), policy)
+}
+
+/// The measures of the starts `range` of the race, `plant`.
+pub(super) fn race(
     cpu: &Cpu,
-    policy: &P,
+    plant: &Plant,
     range: std::ops::Range<u64>,
     query: Query,
 ) -> Vec<f32> {
-    let (system, spec) = (crate::race::system::DroneRace::default(), spec());
+    let spec = spec();
     let task = ReachAvoidTask {
         starts: race_starts(),
         range,
@@ -112,22 +112,18 @@ pub(super) fn race<P: Policy<12, 3>>(
         tightening: &tightening(&spec),
         query,
     };
-    let plant = Plant { system: &system, policy };
     measures(cpu, plant, &task)
 }
 
 /// Farthest pairs and measures of `task`, which the sink must get in order.
-pub(super) fn deviation<S, P, const NX: usize, const NU: usize>(
+pub(super) fn deviation(
     cpu: &Cpu,
-    plant: Plant<'_, S, P>,
+    plant: &Plant,
     task: &DeviationTask<'_>,
-) -> (Vec<Farthest>, Vec<PairMeasure>)
-where
-    S: System<NX, NU>,
-    P: Policy<NX, NU>,
-{
+) -> (Vec<Farthest>, Vec<PairMeasure>) {
     let mut all = Vec::new();
-    let farthest = cpu.deviation(plant, task, &mut |first, values| {
+    let prepared = cpu.prepare(plant).expect("it fits");
+    let farthest = prepared.deviation(cpu, task, &mut |first, values| {
         assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
         all.extend_from_slice(values);
         Ok(())

@@ -4,8 +4,7 @@ use super::fixture::*;
 use crate::policy::{Activation, Mlp, OutputActivation, Policy};
 use crate::race::system::DroneRace;
 use crate::rollout::{
-    DeviationTask, Farthest, Fold, PairControl, PairMeasure, Plant, Query, RolloutSpec, Tightening,
-    measure, pair_measures, trajectory,
+    DeviationTask, Farthest, Fold, PairControl, PairMeasure, Query, RolloutSpec, Tightening, replay,
 };
 use crate::system::System;
 
@@ -22,6 +21,21 @@ fn networks() -> Vec<Mlp> {
         }
     }
     networks
+}
+
+/// The states x_0..=x_T of the race in f32, step after step as the types have it.
+fn scalar_states<P: Policy<12, 3>>(
+    policy: &P,
+    start: [f32; 12],
+    spec: &RolloutSpec,
+) -> Vec<[f32; 12]> {
+    let system = DroneRace::default();
+    let mut states = vec![start];
+    for t in 0..spec.horizon as usize {
+        let x = states[t];
+        states.push(system.step(x, policy.control(x)));
+    }
+    states
 }
 
 /// Measure of states that are all finite, in f32, one trajectory at a time.
@@ -49,17 +63,17 @@ fn networks_are_as_near_to_f64_as_the_scalar_loop() {
     let tightening = tightening(&spec);
     let mut quotient = 0.0_f64;
     for policy in networks() {
-        let plant = Plant { system: &system, policy: &policy };
+        let plant = race_under(policy.clone());
         let (mut truth, mut worst_scalar) = (Vec::new(), 0.0_f64);
         for index in 0..COUNT {
             let start = race_starts().start_array(index);
-            truth.push(measure(plant, start, &spec, &tightening));
-            let states = trajectory::<f32, _, _, 12, 3>(plant, start, spec.horizon);
+            truth.push(replay::measure(&plant, &start, &spec, &tightening));
+            let states = scalar_states(&policy, start, &spec);
             let scalar = scalar_measure(&system, &states, &spec, &tightening);
             worst_scalar = worst_scalar.max((f64::from(scalar) - truth[index as usize]).abs());
         }
         for cpu in every_cpu() {
-            let got = race(&cpu, &policy, 0..COUNT, Query::Measure);
+            let got = race(&cpu, &plant, 0..COUNT, Query::Measure);
             for (index, (got, truth)) in got.iter().zip(&truth).enumerate() {
                 let error = (f64::from(*got) - truth).abs();
                 quotient = quotient.max(error / worst_scalar);
@@ -67,7 +81,7 @@ fn networks_are_as_near_to_f64_as_the_scalar_loop() {
                     error <= 2.0 * worst_scalar,
                     "{} on {}: start {index} is {got}, in f64 {truth}; a scalar loop is within \
                      {worst_scalar}",
-                    Policy::<12, 3>::name(&policy),
+                    plant.controller.name,
                     cpu.device()
                 );
             }
@@ -78,9 +92,9 @@ fn networks_are_as_near_to_f64_as_the_scalar_loop() {
 
 #[test]
 fn signs_are_those_of_the_measures() {
-    let (policy, cpu) = (race_policy(), cpu(2));
-    let measures = race(&cpu, &policy, 0..100_000, Query::Measure);
-    let signs = race(&cpu, &policy, 0..100_000, Query::Sign);
+    let (plant, cpu) = (race_under(race_policy()), cpu(2));
+    let measures = race(&cpu, &plant, 0..100_000, Query::Measure);
+    let signs = race(&cpu, &plant, 0..100_000, Query::Sign);
     let mut positive = 0;
     for (index, (measure, sign)) in measures.iter().zip(&signs).enumerate() {
         let expected = if *measure > 0.0 { 1.0 } else { -1.0 };
@@ -96,7 +110,6 @@ fn deviation_of_a_formula_is_the_scalar_loop() {
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
         let (system, spec) = (DroneRace::default(), spec());
         let (tightening, plain) = (tightening(&spec), Tightening::none(&spec));
-        let plant = Plant { system: &system, policy: &Damping };
         let task = DeviationTask {
             pairs: race_pairs(),
             range: 3..130,
@@ -108,7 +121,7 @@ fn deviation_of_a_formula_is_the_scalar_loop() {
         let mut measures = Vec::new();
         for pair in task.range.clone() {
             let starts = array_pair(&task, pair);
-            let states = scalar_pair(plant, starts, &spec, control);
+            let states = scalar_pair(starts, &spec, control);
             for (t, farthest) in farthest.iter_mut().enumerate() {
                 let gaps = states[0][t].iter().zip(&states[1][t]);
                 let square = gaps.fold(0.0, |sum, (x, y)| sum + (y - x) * (y - x));
@@ -122,25 +135,24 @@ fn deviation_of_a_formula_is_the_scalar_loop() {
                 perturbed: scalar_measure(&system, &states[1], &spec, &plain),
             });
         }
-        assert_eq!(deviation(&cpu(2), plant, &task), (farthest, measures));
+        assert_eq!(deviation(&cpu(2), &race_under(Damping), &task), (farthest, measures));
     }
 }
 
-/// The states of both rollouts of a pair, in f32.
+/// The states of both rollouts of a pair under [`Damping`], in f32.
 fn scalar_pair(
-    plant: Plant<'_, DroneRace, Damping>,
     [nominal, mut perturbed]: [[f32; 12]; 2],
     spec: &RolloutSpec,
     control: PairControl,
 ) -> [Vec<[f32; 12]>; 2] {
-    let nominal = trajectory::<f32, _, _, 12, 3>(plant, nominal, spec.horizon);
+    let nominal = scalar_states(&Damping, nominal, spec);
     let mut states = vec![perturbed];
     for x in &nominal[..spec.horizon as usize] {
         let driver = match control {
             PairControl::Replay => *x,
             PairControl::ClosedLoop => perturbed,
         };
-        perturbed = plant.system.step(perturbed, plant.policy.control(driver));
+        perturbed = DroneRace::default().step(perturbed, Damping.control(driver));
         states.push(perturbed);
     }
     [nominal, states]
@@ -150,9 +162,8 @@ fn scalar_pair(
 /// perturbed rollout differ.
 #[test]
 fn deviation_of_a_network_is_near_f64() {
-    let (system, spec, policy) = (DroneRace::default(), spec(), race_policy());
+    let (plant, spec) = (race_under(race_policy()), spec());
     let tightening = tightening(&spec);
-    let plant = Plant { system: &system, policy: &policy };
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
         let task = DeviationTask {
             pairs: race_pairs(),
@@ -161,11 +172,13 @@ fn deviation_of_a_network_is_near_f64() {
             tightening: &tightening,
             control,
         };
-        let (_, measures) = deviation(&cpu(2), plant, &task);
+        let (_, measures) = deviation(&cpu(2), &plant, &task);
         let mut worst = 0.0_f64;
         for (pair, measure) in measures.iter().enumerate() {
-            let starts = array_pair(&task, pair as u64);
-            let (nominal, perturbed) = pair_measures(plant, starts, &spec, &tightening, control);
+            let [nominal, perturbed] = task.pairs.pair(pair as u64);
+            let starts = [&nominal[..], &perturbed];
+            let (nominal, perturbed) =
+                replay::pair_measures(&plant, starts, &spec, &tightening, control);
             worst = worst.max((f64::from(measure.nominal) - nominal).abs());
             worst = worst.max((f64::from(measure.perturbed) - perturbed).abs());
         }

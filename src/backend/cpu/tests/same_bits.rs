@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
+use super::super::Prepared;
 use super::fixture::*;
 use crate::error::Error;
-use crate::policy::{Activation, OutputActivation, Policy};
-use crate::race::system::DroneRace;
+use crate::model::Plant;
+use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::rollout::{
-    DeviationTask, Farthest, PairControl, PairMeasure, Plant, Query, ReachAvoidTask, Starts,
-    Tightening,
+    DeviationTask, Farthest, PairControl, PairMeasure, Query, ReachAvoidTask, Starts, Tightening,
 };
 
 /// How the starts `0..COUNT` are split into ranges.
@@ -24,15 +24,14 @@ fn ranges(cuts: &[u64]) -> Vec<Range<u64>> {
 #[test]
 fn measures_and_signs_do_not_depend_on_threads_or_place() {
     let odd = network(&[12, 7, 100, 3], Activation::Silu, OutputActivation::Tanh);
-    let race_policy = race_policy();
-    for policy in [&odd, &race_policy] {
+    for plant in [race_under(odd), race_under(race_policy())] {
         for query in [Query::Measure, Query::Sign] {
-            let whole = bits(&race(&cpu(1), policy, 0..COUNT, query));
+            let whole = bits(&race(&cpu(1), &plant, 0..COUNT, query));
             for threads in [1, 2, 3] {
                 let cpu = cpu(threads);
                 for cuts in SPLITS {
                     let parts = ranges(cuts).into_iter();
-                    let parts = parts.flat_map(|range| race(&cpu, policy, range, query));
+                    let parts = parts.flat_map(|range| race(&cpu, &plant, range, query));
                     let parts: Vec<f32> = parts.collect();
                     assert_eq!(bits(&parts), whole, "{threads} threads, cuts {cuts:?}");
                 }
@@ -41,14 +40,13 @@ fn measures_and_signs_do_not_depend_on_threads_or_place() {
     }
 }
 
-fn race_deviation<P: Policy<12, 3>>(
+fn race_deviation(
     cpu: &super::super::Cpu,
-    policy: &P,
+    plant: &Plant,
     range: Range<u64>,
     control: PairControl,
 ) -> (Vec<Farthest>, Vec<PairMeasure>) {
-    let (system, spec) = (DroneRace::default(), spec());
-    let plant = Plant { system: &system, policy };
+    let spec = spec();
     let task =
         DeviationTask { pairs: race_pairs(), range, spec, tightening: &tightening(&spec), control };
     deviation(cpu, plant, &task)
@@ -56,9 +54,9 @@ fn race_deviation<P: Policy<12, 3>>(
 
 #[test]
 fn deviation_does_not_depend_on_threads_or_place() {
-    let policy = race_policy();
+    let plant = race_under(race_policy());
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
-        let whole = race_deviation(&cpu(1), &policy, 0..COUNT, control);
+        let whole = race_deviation(&cpu(1), &plant, 0..COUNT, control);
         assert!(whole.0.iter().all(|farthest| farthest.pair < COUNT));
         for threads in [1, 2, 3] {
             let cpu = cpu(threads);
@@ -66,7 +64,7 @@ fn deviation_does_not_depend_on_threads_or_place() {
                 let mut farthest = vec![Farthest::NONE; whole.0.len()];
                 let mut measures = Vec::new();
                 for range in ranges(cuts) {
-                    let part = race_deviation(&cpu, &policy, range, control);
+                    let part = race_deviation(&cpu, &plant, range, control);
                     for (farthest, part) in farthest.iter_mut().zip(part.0) {
                         *farthest = farthest.merge(part);
                     }
@@ -80,17 +78,17 @@ fn deviation_does_not_depend_on_threads_or_place() {
 
 #[test]
 fn physics_is_the_same_on_all_instructions() {
-    let cpus = every_cpu();
+    let (cpus, plant) = (every_cpu(), race_under(Damping));
     for query in [Query::Measure, Query::Sign] {
-        let expected = bits(&race(&cpus[0], &Damping, 0..COUNT, query));
+        let expected = bits(&race(&cpus[0], &plant, 0..COUNT, query));
         for cpu in &cpus {
-            let got = bits(&race(cpu, &Damping, 0..COUNT, query));
+            let got = bits(&race(cpu, &plant, 0..COUNT, query));
             assert_eq!(got, expected, "{}", cpu.device());
         }
     }
-    let expected = race_deviation(&cpus[0], &Damping, 0..COUNT, PairControl::ClosedLoop);
+    let expected = race_deviation(&cpus[0], &plant, 0..COUNT, PairControl::ClosedLoop);
     for cpu in &cpus {
-        let got = race_deviation(cpu, &Damping, 0..COUNT, PairControl::ClosedLoop);
+        let got = race_deviation(cpu, &plant, 0..COUNT, PairControl::ClosedLoop);
         assert_eq!(got, expected, "{}", cpu.device());
     }
 }
@@ -98,11 +96,12 @@ fn physics_is_the_same_on_all_instructions() {
 #[test]
 fn fused_kernels_agree_to_the_bit() {
     let policy = network(&[12, 100, 3, 3], Activation::Tanh, OutputActivation::Identity);
+    let plant = race_under(policy);
     let mut cpus = every_cpu();
     let baseline = cpus.pop().expect("baseline instructions are always there");
-    let expected = race(&baseline, &policy, 0..COUNT, Query::Measure);
+    let expected = race(&baseline, &plant, 0..COUNT, Query::Measure);
     for pair in cpus.windows(2) {
-        let [first, second] = [0, 1].map(|i| race(&pair[i], &policy, 0..COUNT, Query::Measure));
+        let [first, second] = [0, 1].map(|i| race(&pair[i], &plant, 0..COUNT, Query::Measure));
         assert_eq!(bits(&first), bits(&second));
         // Without fused multiply-add some bits differ, else the test compares like with like.
         assert_ne!(bits(&first), bits(&expected));
@@ -112,7 +111,7 @@ fn fused_kernels_agree_to_the_bit() {
 /// The chunks of 65,536 go to the sink on the calling thread; its error ends the batch.
 #[test]
 fn an_error_of_the_sink_ends_the_batch() {
-    let (system, spec) = (DroneRace::default(), spec());
+    let spec = spec();
     let task = ReachAvoidTask {
         starts: race_starts(),
         range: 10..200_000,
@@ -120,9 +119,10 @@ fn an_error_of_the_sink_ends_the_batch() {
         tightening: &Tightening::none(&spec),
         query: Query::Sign,
     };
-    let plant = Plant { system: &system, policy: &Damping };
+    let cpu = cpu(2);
+    let prepared = cpu.prepare(&race_under(Damping)).expect("it fits");
     let (caller, mut seen) = (std::thread::current().id(), Vec::new());
-    let outcome = cpu(2).reach_avoid(plant, &task, &mut |first, values| {
+    let outcome = prepared.reach_avoid(&cpu, &task, &mut |first, values| {
         assert_eq!(std::thread::current().id(), caller);
         seen.push((first, values.len()));
         if seen.len() == 2 { Err(Error::Interrupted) } else { Ok(()) }
@@ -134,9 +134,9 @@ fn an_error_of_the_sink_ends_the_batch() {
 #[test]
 fn wrong_tasks_are_refused() {
     assert!(super::super::Cpu::new(Some(0)).is_err());
-    let (system, spec, policy) = (DroneRace::default(), spec(), race_policy());
+    let (spec, policy, cpu) = (spec(), race_policy(), cpu(1));
     let list = [[0.0; 12]; 5];
-    let run = |end, tightening: &Tightening, policy: &crate::policy::Mlp| {
+    let run = |end, tightening: &Tightening, policy: &Mlp| {
         let task = ReachAvoidTask {
             starts: Starts::listed(&list),
             range: 0..end,
@@ -144,8 +144,9 @@ fn wrong_tasks_are_refused() {
             tightening,
             query: Query::Measure,
         };
-        let plant = Plant { system: &system, policy };
-        let outcome = cpu(1).reach_avoid(plant, &task, &mut |_, _| Ok(()));
+        let prepared = cpu.prepare(&race_under(policy.clone()));
+        let run = |prepared: Prepared| prepared.reach_avoid(&cpu, &task, &mut |_, _| Ok(()));
+        let outcome = prepared.and_then(run);
         outcome.err().map(|error| error.to_string())
     };
     let none = Tightening::none(&spec);
@@ -165,7 +166,8 @@ fn wrong_tasks_are_refused() {
 
 #[test]
 fn an_empty_range_gives_nothing() {
-    assert!(race(&cpu(2), &Damping, 5..5, Query::Sign).is_empty());
-    let (farthest, measures) = race_deviation(&cpu(2), &Damping, 5..5, PairControl::Replay);
+    let plant = race_under(Damping);
+    assert!(race(&cpu(2), &plant, 5..5, Query::Sign).is_empty());
+    let (farthest, measures) = race_deviation(&cpu(2), &plant, 5..5, PairControl::Replay);
     assert_eq!((farthest, measures), (vec![Farthest::NONE; 31], vec![]));
 }
