@@ -1,6 +1,6 @@
 //! Words for what a record stores as numbers and modes.
 
-use super::text::{interval, lower, upper};
+use super::text::{interval, lower, or_dash, upper};
 use crate::rollout::PairControl;
 use crate::scenario::record::{Claim, GrowthOutcome, Record};
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
@@ -60,12 +60,12 @@ fn deviation(record: &Record) -> Verdict<'_> {
     let claim = &record.deviation.claim;
     Verdict {
         title: "Deviation bound",
-        obtained: claim.certified_risk <= claim.epsilon,
+        obtained: claim.is_obtained(),
         headline: format!("risk ≤ {}", upper(claim.certified_risk)),
         detail: format!(
             "Chance that a start within {} drifts further than the bound; {} was asked for.",
             upper(record.deviation.radius),
-            upper(claim.epsilon)
+            or_dash(claim.epsilon.map(upper))
         ),
         claim: Some(claim),
     }
