@@ -27,10 +27,7 @@ const PARTS: usize = 7;
 /// A formula, and a network.
 fn plants() -> [Plant; 2] {
     let policy = BangBang { acceleration: 1.0 };
-    [
-        Plant::of(DoubleIntegrator::default(), policy),
-        Plant::of(DroneRace::default(), race_policy()),
-    ]
+    [Plant::of(DoubleIntegrator::default(), policy), Plant::of(DroneRace::default(), race_policy())]
 }
 
 fn spec() -> RolloutSpec {
@@ -55,11 +52,7 @@ fn cut(random: &mut StdRng) -> Vec<Range<u64>> {
 }
 
 /// The parts merged two by two at random, so that merged ones meet merged ones.
-fn merged<T>(
-    mut parts: Vec<T>,
-    random: &mut StdRng,
-    merge: impl Fn(&mut T, T) -> Result<()>,
-) -> T {
+fn merged<T>(mut parts: Vec<T>, random: &mut StdRng, merge: impl Fn(&mut T, T) -> Result<()>) -> T {
     while parts.len() > 1 {
         let one = parts.swap_remove(random.random_range(0..parts.len()));
         let other = random.random_range(0..parts.len());

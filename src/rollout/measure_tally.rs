@@ -173,8 +173,7 @@ mod tests {
             let whole = bits(tally(0..length, keep));
             for (a, b) in (0..=length).flat_map(|b| (0..=b).map(move |a| (a, b))) {
                 let parts = [0..a, a..b, b..length];
-                for [i, j, k] in
-                    [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]]
+                for [i, j, k] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]]
                 {
                     let [one, two, three] = [i, j, k].map(|i| tally(parts[i].clone(), keep));
                     let (mut left, mut right) = (one.clone(), two.clone());
@@ -263,7 +262,10 @@ mod tests {
         let gap = finish(41..48);
         assert!(gap.contains("starts 43..46 of 41..48 are missing"), "{gap}");
         let outside = finish(41..43);
-        assert!(outside.contains("has the starts 46..48") && outside.contains("41..43"), "{outside}");
+        assert!(
+            outside.contains("has the starts 46..48") && outside.contains("41..43"),
+            "{outside}"
+        );
         parts.merge(tally(3..6, Keep::Measures)).unwrap();
         assert_eq!(parts.ranges().collect::<Vec<_>>(), [41..48]);
         assert!(parts.clone().finish(41..47).is_err() && parts.clone().finish(42..48).is_err());
