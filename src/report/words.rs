@@ -1,6 +1,6 @@
 //! Words for what a record stores as numbers and modes.
 
-use super::text::{interval, lower, or_dash, upper};
+use super::text::{interval, lower, upper};
 use crate::rollout::PairControl;
 use crate::scenario::record::{Claim, GrowthOutcome, Record};
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
@@ -65,7 +65,7 @@ fn deviation(record: &Record) -> Verdict<'_> {
         detail: format!(
             "Chance that a start within {} drifts further than the bound; {} was asked for.",
             upper(record.deviation.radius),
-            or_dash(claim.epsilon.map(upper))
+            upper(claim.stated_risk())
         ),
         claim: Some(claim),
     }

@@ -39,6 +39,11 @@ pub struct Claim {
 }
 
 impl Claim {
+    /// The risk that the claim states: the one asked for, and where none was, the one obtained.
+    pub fn stated_risk(&self) -> f64 {
+        self.epsilon.unwrap_or(self.certified_risk)
+    }
+
     /// Whether the risk obtained is at most the one asked for, where one was.
     pub fn is_obtained(&self) -> bool {
         self.epsilon.is_none_or(|asked| self.certified_risk <= asked)
@@ -52,7 +57,7 @@ fn present<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> 
 
 impl Serialize for Claim {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let epsilon = Some(self.epsilon.unwrap_or(self.certified_risk));
+        let epsilon = Some(self.stated_risk());
         Self::serialize(&Self { epsilon, ..self.clone() }, to)
     }
 }
