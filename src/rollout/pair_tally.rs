@@ -204,7 +204,7 @@ mod tests {
             let problem = changed.merge(other).unwrap_err().to_string();
             assert!(problem.contains(words), "{problem}");
             assert_eq!((changed.counts(), changed.farthest()), (known.counts(), known.farthest()));
-            assert_eq!(changed.ranges().collect::<Vec<_>>(), [1..4]);
+            assert!(changed.ranges().eq(std::iter::once(1..4)));
         }
         assert_eq!(known.missing(0..6), Some(0..1));
         let gap = known.finish(1..6).unwrap_err().to_string();
