@@ -192,7 +192,11 @@ mod tests {
                     right.merge(three).unwrap();
                     let mut nested = one;
                     nested.merge(right).unwrap();
-                    assert_eq!([bits(left), bits(nested)], [(); 2].map(|()| whole.clone()));
+                    let mut sent = MeasureTally::new(keep);
+                    for range in [i, j, k].map(|i| parts[i].clone()) {
+                        sent.add(FIRST + range.start as u64, &VALUES[range]).unwrap();
+                    }
+                    assert_eq!([left, nested, sent].map(bits), [(); 3].map(|()| whole.clone()));
                 }
             }
         }
