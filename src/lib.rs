@@ -113,6 +113,12 @@
 //! # Ok::<(), reachcast::Error>(())
 //! ```
 //!
+//! # Many starts, in parts
+//!
+//! [`backend::Program::tally`] counts starts that are drawn by their index, as many as one likes, and holds none of
+//! them; [`backend::Program::tally_pairs`] does pairs. A range that is cut anywhere, run in any order, on any
+//! threads or machines alike, is merged to the same bits; its example merges two halves.
+//!
 //! # A certificate
 //!
 //! [`scenario::settings::Settings`] says what is asked for, risk and confidence included; the record that

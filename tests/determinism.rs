@@ -123,7 +123,7 @@ fn a_changed_certificate_is_caught() {
     assert!(is_caught(|record| record.provenance.seed += 1));
     assert!(is_caught(|record| record.gamma = 0.9));
     assert!(is_caught(|record| record.system.states[0].high = 9.0));
-    assert!(is_caught(|record| record.deviation.claim.epsilon = 0.01));
+    assert!(is_caught(|record| record.deviation.claim.epsilon = Some(0.01)));
     assert!(is_caught(|record| record.deviation.claim.scenarios *= 2));
     assert!(is_caught(|record| record.global.draws *= 1000));
     assert!(is_caught(|record| record.global.share_interval[0] *= 1.1));

@@ -2,7 +2,7 @@
 
 use super::Program;
 use crate::error::Result;
-use crate::rollout::{Query, ReachAvoidTask, RolloutSpec, Starts, States, Tightening};
+use crate::rollout::{Keep, Query, ReachAvoidTask, RolloutSpec, Starts, States, Tightening};
 
 impl Program<'_> {
     /// The reach-avoid measure of each of `starts`, in their order: `[starts]`. Positive where the rollout
@@ -19,18 +19,14 @@ impl Program<'_> {
         spec: &RolloutSpec,
     ) -> Result<Vec<f32>> {
         let starts = starts.into();
+        let range = 0..starts.len() as u64;
         let task = ReachAvoidTask {
             starts: Starts::Listed(starts),
-            range: 0..starts.len() as u64,
+            range: range.clone(),
             spec: *spec,
             tightening: &Tightening::none(spec),
             query: Query::Measure,
         };
-        let mut measures = Vec::with_capacity(starts.len());
-        self.reach_avoid(&task, &mut |_, values| {
-            measures.extend_from_slice(values);
-            Ok(())
-        })?;
-        Ok(measures)
+        Ok(self.tally(&task, Keep::Measures)?.finish(range)?.values)
     }
 }

@@ -13,6 +13,7 @@ mod physics;
 mod plan_program;
 mod program;
 mod sink;
+mod tallied;
 mod task;
 
 use cpu::Cpu;

@@ -15,7 +15,8 @@ use crate::error::Result;
 use crate::files::{MeasureWriter, StateReader, check_room, spare_existing};
 use crate::model::Plant;
 use crate::rollout::{
-    NON_FINITE, Query, ReachAvoidTask, RolloutSpec, Starts, StateList, States, Tightening,
+    Keep, MeasureCounts, MeasureTally, Query, ReachAvoidTask, RolloutSpec, Starts, StateList,
+    States, Tightening,
 };
 use crate::scenario::Watch;
 use crate::scenario::bound::interval;
@@ -83,7 +84,7 @@ impl Rollout<'_> {
         let progress = Progress::new(self.global);
         let begun = Instant::now();
         progress.begin("rollouts", reader.left().unwrap_or(0));
-        let (mut count, mut notes) = (Count::default(), Vec::new());
+        let (mut tally, mut notes) = (MeasureTally::new(Keep::Counts), Vec::new());
         loop {
             let starts = reader.next(CHUNK)?;
             if starts.is_empty() {
@@ -95,18 +96,19 @@ impl Rollout<'_> {
                 notes = sampling(plant, few.view(), self.spec.horizon);
             }
             measure(&program, self.spec, starts.view(), &mut |values| {
-                count.add(values);
+                tally.add(tally.counts().starts, values)?;
                 writer.add(values)?;
                 progress.advance(values.len() as u64)
             })?;
         }
         writer.publish()?;
         devices::note_events(self.global, &backend);
-        let (low, high) = interval(count.successes, count.starts, BETA);
+        let MeasureCounts { starts, successes, non_finite, .. } = *tally.counts();
+        let (low, high) = interval(successes, starts, BETA);
         Ok(Summary {
-            starts: count.starts,
-            successes: count.successes,
-            non_finite: count.non_finite,
+            starts,
+            successes,
+            non_finite,
             success_interval: [low, high],
             horizon: self.spec.horizon,
             gamma: self.spec.gamma,
@@ -135,23 +137,6 @@ fn measure(
         query: Query::Measure,
     };
     program.reach_avoid(&task, &mut |_, values| sink(values))
-}
-
-/// How the starts fared.
-#[derive(Default)]
-struct Count {
-    starts: u64,
-    successes: u64,
-    non_finite: u64,
-}
-
-impl Count {
-    fn add(&mut self, measures: &[f32]) {
-        let count = |holds: fn(&f32) -> bool| measures.iter().filter(|m| holds(m)).count() as u64;
-        self.starts += measures.len() as u64;
-        self.successes += count(|measure| *measure > 0.0);
-        self.non_finite += count(|measure| *measure <= NON_FINITE);
-    }
 }
 
 /// The summary in words.

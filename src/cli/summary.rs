@@ -7,8 +7,8 @@ use crate::scenario::record::{Claim, GrowthOutcome, Record};
 /// What the columns of the table are.
 const TABLE: &str = "\
 N scenarios were drawn, some failed; d: decision variables, the numbers that the scenarios bound;
-epsilon: risk; beta: chance that the sample misleads; simple, exact: the N that either bound asks for;
-risk: what N and the failures certify";
+epsilon: the risk asked for; beta: chance that the sample misleads; simple, exact: the N that either
+bound asks for; risk: the one obtained, which N and the failures certify";
 /// What the words below the table mean.
 const WORDS: &str = "\
 tier 0: in the target, 1: certified, 2: in the verified ball, 3: none of these; V_check: the reach-avoid
@@ -70,13 +70,14 @@ fn table(record: &Record) -> Vec<String> {
 /// The counts behind one claim.
 fn row(claim: &Claim) -> String {
     let count = |count: Option<u64>| count.map_or("-".to_owned(), |count| count.to_string());
+    let asked = claim.epsilon.map_or("-".to_owned(), |asked| format!("{asked:.5}"));
     format!(
-        "{:<12} {:>10} {:>8} {:>3} {:>8.5} {:>9.1e} {:>8} {:>8} {:>10.6}",
+        "{:<12} {:>10} {:>8} {:>3} {:>8} {:>9.1e} {:>8} {:>8} {:>10.6}",
         claim.name,
         claim.scenarios,
         claim.failures,
         claim.decision_vars,
-        claim.epsilon,
+        asked,
         claim.beta_used,
         count(claim.required_simple),
         count(claim.required_exact),

@@ -51,7 +51,7 @@ pub(crate) fn claims(record: &Record) -> String {
         &[
             row("quantity", &|claim| claim.name.clone()),
             row("certified risk", &|claim| upper(claim.certified_risk)),
-            row("risk asked for, epsilon", &|claim| number(claim.epsilon)),
+            row("risk asked for, epsilon", &|claim| number(claim.stated_risk())),
             row("one minus confidence, beta", &|claim| number(claim.beta)),
             row("beta of this draw", &|claim| number(claim.beta_used)),
             row("scenarios N", &|claim| count(claim.scenarios)),

@@ -60,12 +60,12 @@ fn deviation(record: &Record) -> Verdict<'_> {
     let claim = &record.deviation.claim;
     Verdict {
         title: "Deviation bound",
-        obtained: claim.certified_risk <= claim.epsilon,
+        obtained: claim.is_obtained(),
         headline: format!("risk ≤ {}", upper(claim.certified_risk)),
         detail: format!(
             "Chance that a start within {} drifts further than the bound; {} was asked for.",
             upper(record.deviation.radius),
-            upper(claim.epsilon)
+            upper(claim.stated_risk())
         ),
         claim: Some(claim),
     }

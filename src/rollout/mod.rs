@@ -1,9 +1,12 @@
 //! What a batch of rollouts is: starts, horizon, measure; no word about who runs it.
 
 mod fold;
+mod held;
+mod measure_tally;
 mod mppi;
 mod mppi_settings;
 mod noise;
+mod pair_tally;
 mod philox;
 mod planning;
 mod region;
@@ -15,9 +18,12 @@ mod tally;
 
 pub use crate::files::{StateList, States};
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
+pub use held::Keep;
+pub use measure_tally::{Extreme, MeasureCounts, MeasureTally, Measures};
 pub use mppi::MppiSpec;
 pub use mppi_settings::{MAX_PLAN, MAX_SAMPLES, MppiSettings, NoiseKind, Sigma};
 pub use noise::{Noise, NoiseShape, SPLINE_SUPPORT, SplineRow};
+pub use pair_tally::{PairCounts, PairResults, PairTally};
 pub use philox::philox;
 pub use planning::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiTask, Planning, ValueTerm,

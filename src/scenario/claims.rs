@@ -14,7 +14,7 @@ pub(super) fn holds(
 ) -> bool {
     deviation.non_finite == 0
         && global.accepted > 0
-        && global.claim.certified_risk <= deviation.claim.epsilon
+        && deviation.claim.epsilon.is_some_and(|asked| global.claim.certified_risk <= asked)
         && growth.outcome == GrowthOutcome::Verified
 }
 

@@ -11,17 +11,9 @@ use super::{Context, linear};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{
-    DeviationTask, Farthest, HUGE, NON_FINITE, PairControl, Pairs, Purpose, Region, RolloutSpec,
-    Starts, Stream, Tightening,
+    DeviationTask, Farthest, HUGE, Keep, PairControl, PairTally, Pairs, Purpose, Region,
+    RolloutSpec, Starts, Stream, Tightening,
 };
-
-/// What the pairs of one sample showed.
-struct Sample {
-    /// Farthest pair of each step.
-    farthest: Vec<Farthest>,
-    /// Rollouts that met a state that is not finite.
-    non_finite: u64,
-}
 
 /// Draws the pairs and bounds the deviation; method and numbers as `settings` ask.
 pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecord> {
@@ -33,18 +25,17 @@ pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecor
         Some(count) => {
             context.watch.begin("pilot pairs", count);
             let purposes = [purpose::PILOT_NOMINAL, purpose::PILOT_PERTURBATION];
-            Some(shape(&draw(context, settings, purposes, count)?.farthest, asked.radius))
+            Some(shape(draw(context, settings, purposes, count)?.farthest(), asked.radius))
         }
         None => None,
     };
     context.watch.begin("deviation pairs", asked.scenarios);
     let purposes = [purpose::DEVIATION_NOMINAL, purpose::DEVIATION_PERTURBATION];
     let sample = draw(context, settings, purposes, asked.scenarios)?;
-    let largest: Vec<f64> = sample.farthest.iter().map(|f| f64::from(f.distance)).collect();
-    let (scenario_bound, scale, support) =
-        conclude(&sample.farthest, shape.as_deref(), asked.radius);
-    let measured =
-        Measured { bound: scenario_bound, largest, scale, support, non_finite: sample.non_finite };
+    let (farthest, non_finite) = (sample.farthest(), sample.counts().non_finite);
+    let largest: Vec<f64> = farthest.iter().map(|f| f64::from(f.distance)).collect();
+    let (bound, scale, support) = conclude(farthest, shape.as_deref(), asked.radius);
+    let measured = Measured { bound, largest, scale, support, non_finite };
     record(context.model(), settings, (&program, exact), measured)
 }
 
@@ -144,7 +135,7 @@ fn draw(
     settings: &Settings,
     [nominal, perturbation]: [Purpose; 2],
     count: u64,
-) -> Result<Sample> {
+) -> Result<PairTally> {
     let stream = |purpose| Stream::new(settings.seed, purpose, 0);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let task = DeviationTask {
@@ -158,13 +149,8 @@ fn draw(
         tightening: &Tightening::none(&settings.spec),
         control: settings.deviation.control,
     };
-    let mut non_finite = 0;
-    let farthest = context.program.deviation(&task, &mut |_, pairs| {
-        let broken = pairs.iter().filter(|p| p.nominal == NON_FINITE || p.perturbed == NON_FINITE);
-        non_finite += broken.count() as u64;
-        context.watch.advance(pairs.len() as u64)
-    })?;
-    Ok(Sample { farthest, non_finite })
+    let advance = &mut |count| context.watch.advance(count);
+    context.program.tally_pairs_told(&task, Keep::Counts, advance)
 }
 
 /// The shape that a pilot sample fixes: its largest distances, the radius at step 0.
@@ -247,7 +233,7 @@ fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim>
         scenarios: asked.scenarios,
         failures: 0,
         decision_vars: program.decision_vars,
-        epsilon: asked.epsilon,
+        epsilon: Some(asked.epsilon),
         beta: asked.beta,
         beta_used: program.beta,
         required_simple: Some(simple_scenarios(

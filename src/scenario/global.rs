@@ -12,7 +12,7 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::{
-    DeviationTask, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
+    DeviationTask, Keep, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
     RolloutSpec, Starts, StateList, States, Stream, Tightening, replay,
 };
 
@@ -32,21 +32,14 @@ pub fn check_margins(
     query: Query,
     band: f64,
 ) -> Result<Vec<f32>> {
-    let mut margins = Vec::with_capacity(states.len());
     if states.is_empty() {
-        return Ok(margins);
+        return Ok(Vec::new());
     }
-    let task = ReachAvoidTask {
-        starts: Starts::Listed(states),
-        range: 0..states.len() as u64,
-        spec: *spec,
-        tightening,
-        query,
-    };
-    context.program.reach_avoid(&task, &mut |_, values| {
-        margins.extend_from_slice(values);
-        context.watch.advance(values.len() as u64)
-    })?;
+    let (starts, range) = (Starts::Listed(states), 0..states.len() as u64);
+    let task = ReachAvoidTask { starts, range: range.clone(), spec: *spec, tightening, query };
+    let advance = &mut |count| context.watch.advance(count);
+    let tally = context.program.tally_told(&task, Keep::Measures, advance)?;
+    let mut margins = tally.finish(range)?.values;
     if query == Query::Measure {
         let near = |margin: &&mut f32| f64::from(margin.abs()) <= band;
         let pairs = margins.iter_mut().zip(states.iter());
@@ -186,7 +179,7 @@ fn conclude(
         scenarios: count.accepted,
         failures: count.failures,
         decision_vars: 1,
-        epsilon: risk,
+        epsilon: None,
         beta,
         beta_used: beta,
         required_simple: None,
@@ -274,25 +267,17 @@ pub fn band(context: Context<'_>, settings: &Settings, tightening: &Tightening) 
 
 /// The largest distance of an f32 measure from f64 over the first pairs, those that are finite.
 fn f32_error(context: Context<'_>, task: &DeviationTask<'_>) -> Result<f64> {
-    let sample = DeviationTask { range: 0..ERROR_SAMPLE.min(task.range.end), ..task.clone() };
-    let (mut worst, plant) = (0.0_f64, context.plant());
-    context.program.deviation(&sample, &mut |first, pairs| {
-        let error = |(i, pair): (usize, &PairMeasure)| {
-            let (nominal, perturbed) = pair_f64(plant, task, first + i as u64);
-            let finite = |a: f64, b: f32| {
-                if b == NON_FINITE || a == f64::from(NON_FINITE) {
-                    0.0
-                } else {
-                    (a - f64::from(b)).abs()
-                }
-            };
-            finite(nominal, pair.nominal).max(finite(perturbed, pair.perturbed))
-        };
-        let errors = pairs.par_iter().enumerate().map(error);
-        worst = worst.max(errors.reduce(|| 0.0, f64::max));
-        Ok(())
-    })?;
-    Ok(worst)
+    let (range, plant) = (0..ERROR_SAMPLE.min(task.range.end), context.plant());
+    let sample = DeviationTask { range: range.clone(), ..task.clone() };
+    let pairs = context.program.tally_pairs(&sample, Keep::Measures)?.finish(range)?.values;
+    let finite = |a: f64, b: f32| {
+        if b == NON_FINITE || a == f64::from(NON_FINITE) { 0.0 } else { (a - f64::from(b)).abs() }
+    };
+    let error = |(index, pair): (usize, &PairMeasure)| {
+        let (nominal, perturbed) = pair_f64(plant, task, index as u64);
+        finite(nominal, pair.nominal).max(finite(perturbed, pair.perturbed))
+    };
+    Ok(pairs.par_iter().enumerate().map(error).reduce(|| 0.0, f64::max))
 }
 
 /// Whether the certified shares of two independent samples are compatible.

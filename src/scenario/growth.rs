@@ -281,7 +281,7 @@ fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
         scenarios: asked.scenarios,
         failures: 0,
         decision_vars: 1,
-        epsilon: asked.epsilon,
+        epsilon: Some(asked.epsilon),
         beta: asked.beta,
         beta_used,
         required_simple: Some(simple_scenarios(asked.epsilon, beta_used, 1)?),

@@ -4,6 +4,7 @@ pub mod bound;
 pub mod boundary;
 mod budget;
 mod certify;
+mod claim;
 mod claims;
 mod compare;
 mod constants;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use super::claim::Claim;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
@@ -139,40 +140,6 @@ pub struct ConstantRecord {
     pub computed: f64,
     /// Largest gradient among random points: a lower estimate.
     pub sampled: f64,
-}
-
-/// What was drawn, what failed, and what follows: the core of every claim.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Claim {
-    /// Name: `deviation`, `global` or `growth`.
-    pub name: String,
-    /// The claim in words.
-    pub statement: String,
-    /// The sampling measure in words.
-    pub measure: String,
-    /// Number of coordinates that vary.
-    pub dimension: usize,
-    /// Names of the frozen coordinates.
-    pub frozen: Vec<String>,
-    /// Scenarios N that count.
-    pub scenarios: u64,
-    /// Failures k among them.
-    pub failures: u64,
-    /// Decision variables d.
-    pub decision_vars: u32,
-    /// Risk asked for (for the conditional claim: the risk obtained).
-    pub epsilon: f64,
-    /// One minus the confidence asked for, before any split.
-    pub beta: f64,
-    /// Beta of this very draw, after the split over rounds or steps.
-    pub beta_used: f64,
-    /// Scenarios that the simple bound asks for; absent where it does not apply.
-    pub required_simple: Option<u64>,
-    /// Scenarios that the exact bound asks for; absent where it does not apply.
-    pub required_exact: Option<u64>,
-    /// Risk that N and k certify at `beta_used`.
-    pub certified_risk: f64,
 }
 
 /// The deviation bound, `docs/method.md` section 3.

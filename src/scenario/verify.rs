@@ -16,7 +16,9 @@ use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
-use crate::rollout::{Ball, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening};
+use crate::rollout::{
+    Ball, Keep, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
+};
 
 /// Fresh starts that a verified ball is tried with.
 const FRESH_STARTS: u64 = 20_000;
@@ -254,10 +256,6 @@ fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Resu
         tightening: &tightening,
         query: Query::Sign,
     };
-    let mut failures = 0;
-    context.program.reach_avoid(&task, &mut |_, values| {
-        failures += values.iter().filter(|value| **value <= 0.0).count() as u64;
-        context.watch.advance(values.len() as u64)
-    })?;
-    Ok(failures)
+    let advance = &mut |count| context.watch.advance(count);
+    Ok(context.program.tally_told(&task, Keep::Counts, advance)?.counts().failures())
 }

@@ -230,7 +230,7 @@ fn claim(name: &str, certified_risk: f64) -> Claim {
         scenarios: 159,
         failures: 0,
         decision_vars: 1,
-        epsilon: 0.1,
+        epsilon: Some(0.1),
         beta: 1e-3,
         beta_used: 2e-4,
         required_simple: Some(191),
@@ -283,7 +283,7 @@ fn global(dimension: usize) -> GlobalRecord {
     GlobalRecord {
         claim: Claim {
             dimension,
-            epsilon: 0.0119,
+            epsilon: None,
             scenarios: 1377,
             failures: 4,
             required_simple: None,
