@@ -1,6 +1,7 @@
 //! The model: a plant and its task as plain data, recorded from Rust or read from text.
 
 mod controller;
+mod fit;
 mod identity;
 mod plant;
 mod recorded;

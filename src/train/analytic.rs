@@ -59,17 +59,26 @@ pub struct Analytic<'a, S, const NX: usize, const NU: usize> {
 
 impl<'a, S: System<NX, NU>, const NX: usize, const NU: usize> Analytic<'a, S, NX, NU> {
     /// Trains `network` from the parameters that it has.
-    pub fn new(task: Task<'a, S, NX>, network: Network, settings: AnalyticSettings) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if a formula of the system has no derivatives.
+    pub fn new(
+        task: Task<'a, S, NX>,
+        network: Network,
+        settings: AnalyticSettings,
+    ) -> Result<Self> {
         let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
-        Self {
-            step: Arc::new(step_tape(task.system)),
-            measure: Arc::new(measure_tape(task.system, &task.spec, task.tightening.as_ref())),
+        let step = Arc::new(step_tape(task.system)?);
+        let measure = measure_tape(task.system, &task.spec, task.tightening.as_ref())?;
+        Ok(Self {
+            step,
+            measure: Arc::new(measure),
             adam: Adam::new(network.parameters.len()),
             network,
             held_out,
             task,
             settings,
-        }
+        })
     }
 
     /// The softened measures `[starts, 1 or 2]` of rollouts under `network`: G and `V_check`.

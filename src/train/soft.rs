@@ -1,13 +1,17 @@
 //! A system as tapes: its step, and the softened measures of a whole rollout.
 
 use super::tape::Tape;
+use crate::error::Result;
 use crate::formula::{Expr, record};
 use crate::real::Real;
 use crate::rollout::{RolloutSpec, Tightening, reach_avoid};
 use crate::system::System;
 
 /// The step: states and controls `[NX + NU]` to the next states `[NX]`.
-pub fn step_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Tape {
+///
+/// # Errors
+/// As [`Tape::hard`].
+pub fn step_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Result<Tape> {
     Tape::hard(&record(NX + NU, |inputs| {
         let x = std::array::from_fn(|i| inputs[i]);
         let u = std::array::from_fn(|i| inputs[NX + i]);
@@ -20,11 +24,14 @@ pub fn step_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S
 ///
 /// Soft are the maximum and the minimum over time and the minima that the margins end in. At
 /// temperature 0 they would be the measures that the engine computes.
+///
+/// # Errors
+/// As [`Tape::hard`].
 pub fn measure_tape<S: System<NX, NU>, const NX: usize, const NU: usize>(
     system: &S,
     spec: &RolloutSpec,
     tightening: Option<&Tightening>,
-) -> Tape {
+) -> Result<Tape> {
     let steps = spec.horizon as usize + 1;
     Tape::soft(&record(NX * steps, |inputs| {
         let margins: Vec<(Expr, Expr)> = inputs

@@ -1,5 +1,6 @@
 //! A recorded graph with a reverse sweep: values forward, derivatives backward, in any [`Real`].
 
+use crate::error::{Error, Result};
 use crate::formula::{Graph, Node};
 use crate::real::Real;
 
@@ -25,13 +26,20 @@ enum Op {
 impl Tape {
     /// The graph as it is, its functions as polynomials.
     ///
-    /// # Panics
-    /// If it calls a network: training knows systems in Rust alone, and they call none.
-    pub fn hard(graph: &Graph) -> Self {
-        assert!(graph.calls.is_empty(), "the reverse sweep has no networks inside formulas");
+    /// # Errors
+    /// [`Error::Invalid`] if it calls a network, as formulas from text may.
+    pub fn hard(graph: &Graph) -> Result<Self> {
+        if let Some(call) = graph.calls.first() {
+            let problem = format!(
+                "a network of the widths {:?} is called inside of a formula, which has no derivatives in \
+                 training; write what it computes as formulas, or let it be the policy",
+                call.network.widths()
+            );
+            return Err(Error::invalid("formula", problem));
+        }
         let graph = graph.expanded();
         let ops = folded(&graph.nodes).into_iter().map(Op::Plain).collect();
-        Self { inputs: graph.inputs, ops, outputs: graph.outputs }
+        Ok(Self { inputs: graph.inputs, ops, outputs: graph.outputs })
     }
 
     /// The graph with soft choices in place of every minimum and maximum that an output is made
@@ -40,8 +48,11 @@ impl Tape {
     ///
     /// At temperature `tau`, `min(a, b)` becomes `-tau ln(exp(-a / tau) + exp(-b / tau))`, where
     /// the temperature is that of the output: below a factor k it is `tau / k`.
-    pub fn soft(graph: &Graph) -> Self {
-        let mut tape = Self::hard(graph);
+    ///
+    /// # Errors
+    /// As [`Tape::hard`].
+    pub fn soft(graph: &Graph) -> Result<Self> {
+        let mut tape = Self::hard(graph)?;
         let mut factors: Vec<Option<f32>> = vec![None; tape.ops.len()];
         for &output in &tape.outputs {
             factors[output as usize] = Some(1.0);
@@ -51,7 +62,7 @@ impl Tape {
                 tape.soften(i, node, factor, &mut factors);
             }
         }
-        tape
+        Ok(tape)
     }
 
     /// Makes operation `i`, which stands below the constant `factor`, soft if it is a choice, and
@@ -240,8 +251,12 @@ fn folded(nodes: &[Node]) -> Vec<Node> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::Tape;
+    use crate::error::Error;
     use crate::formula::{Expr, Graph, record};
+    use crate::policy::{Activation, Layer, Mlp, OutputActivation};
     use crate::real::{Lanes, Real};
 
     /// The output of the tape, and its slopes.
@@ -264,8 +279,22 @@ mod tests {
     }
 
     #[test]
+    fn networks_in_formulas_are_refused() {
+        let layer = Layer { weight: vec![1.0, 2.0], bias: vec![0.0], inputs: 2, outputs: 1 };
+        let network = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity);
+        let network = Arc::new(network.expect("a network"));
+        let graph = record(2, |x| vec![x[0] + Expr::call(&network, x)[0]]);
+        for refused in [Tape::hard(&graph), Tape::soft(&graph)] {
+            let refused = refused.expect_err("no derivatives");
+            assert!(matches!(refused, Error::Invalid { .. }), "{refused}");
+            let refused = refused.to_string();
+            assert!(refused.contains("[2, 1]") && refused.contains("let it be the policy"));
+        }
+    }
+
+    #[test]
     fn slopes_are_central_differences() {
-        let tape = Tape::hard(&formula());
+        let tape = Tape::hard(&formula()).expect("no network");
         for x in [[0.7_f64, 0.3, 1.9], [-1.3, 0.8, 0.4], [2.2, -0.6, 1.5]] {
             let (_, found) = slopes(&tape, &x, 1.0);
             for i in 0..3 {
@@ -297,7 +326,7 @@ mod tests {
     /// The polynomials have the slopes of the functions that they stand for.
     #[test]
     fn functions_have_their_slopes() {
-        let tape = Tape::hard(&functions());
+        let tape = Tape::hard(&functions()).expect("no network");
         for x in [[0.7_f64, 0.3, 1.9], [-1.3, 0.8, 0.4], [1.2, -0.6, -1.5]] {
             let (_, found) = slopes(&tape, &x, 1.0);
             for i in 0..3 {
@@ -321,7 +350,7 @@ mod tests {
             let terms = Expr::lit(2.0) * (x[0].min(x[1]) - Expr::lit(0.5));
             vec![Expr::lit(2.0) * (Expr::lit(3.0) * terms.min(inner)).max(x[2])]
         });
-        let tape = Tape::soft(&graph);
+        let tape = Tape::soft(&graph).expect("no network");
         let (x, tau) = ([0.3_f64, 0.45, 0.8], 0.6);
         let (found, slope) = slopes(&tape, &x, 0.6);
         let terms = [12.0 * (x[0] - 0.5), 12.0 * (x[1] - 0.5), 6.0 * (x[2] - x[1])];
@@ -336,7 +365,7 @@ mod tests {
 
     #[test]
     fn lanes_agree_with_f64_and_kinks_stay_finite() {
-        let tape = Tape::soft(&formula());
+        let tape = Tape::soft(&formula()).expect("no network");
         let points = [[0.7_f32, 0.3, 1.9], [-1.3, 0.8, 0.4], [2.2, -0.6, 1.5], [0.0, 0.0, 1.0]];
         let lanes: [Lanes<4>; 3] = std::array::from_fn(|i| Lanes(points.map(|point| point[i])));
         let (_, found) = slopes(&tape, &lanes, 0.3);

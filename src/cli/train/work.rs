@@ -153,7 +153,7 @@ impl SystemWork for Training<'_> {
             held_out: settings.held_out,
             seed: config.seed,
         };
-        let mut learner = Analytic::new(task, network, settings.analytic);
+        let mut learner = Analytic::new(task, network, settings.analytic)?;
         self.train(&mut learner, settings.analytic.iterations, &program)
     }
 }
