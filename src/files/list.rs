@@ -151,7 +151,9 @@ mod tests {
         assert_eq!((states.len(), states.row(1)), (2, &numbers[3..]));
         for size in [0, 4] {
             let refused = States::new(&numbers, size).expect_err("no whole number").to_string();
-            assert!(refused.contains(&format!("6 numbers are no whole number of states of {size}")));
+            assert!(
+                refused.contains(&format!("6 numbers are no whole number of states of {size}"))
+            );
         }
         // What has no numbers is no state.
         let nothing = [States::one(&[]), States::new(&[], 0).expect("none"), (&[[]; 3]).into()];

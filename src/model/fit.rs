@@ -50,10 +50,9 @@ impl Plant {
             Law::Formula(graph) => part("policy", graph, controls).check(),
             Law::Network { observe, network, act } => {
                 let said = network.widths().last().copied().unwrap_or(0);
-                let observe = observe.iter().map(|graph| Part {
-                    outputs: None,
-                    ..part("policy.observe", graph, 0)
-                });
+                let observe = observe
+                    .iter()
+                    .map(|graph| Part { outputs: None, ..part("policy.observe", graph, 0) });
                 let act = act.iter().map(|graph| Part {
                     inputs: inputs + said,
                     ..part("policy.act", graph, controls)
@@ -89,7 +88,10 @@ mod tests {
             words.iter().for_each(|word| assert!(found.contains(word), "no `{word}` in: {found}"));
         };
         of(refusal(model.clone(), Law::Formula(sums(2, 1))), ["policy: ", "takes 2 inputs"]);
-        of(refusal(model.clone(), Law::Formula(sums(inputs, 3))), ["gives 3 numbers", "5 and 1 are"]);
+        of(
+            refusal(model.clone(), Law::Formula(sums(inputs, 3))),
+            ["gives 3 numbers", "5 and 1 are"],
+        );
         let step = Model { step: sums(inputs, 1), ..model.clone() };
         of(refusal(step, Law::Formula(sums(inputs, 1))), ["model.step", "5 and 2 are needed"]);
         let target = Model { target: sums(inputs, 2), ..model.clone() };

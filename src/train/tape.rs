@@ -255,7 +255,7 @@ mod tests {
 
     use super::Tape;
     use crate::error::Error;
-    use crate::formula::{Expr, Graph, record};
+    use crate::formula::{Expr, Graph, Scalar, record};
     use crate::policy::{Activation, Layer, Mlp, OutputActivation};
     use crate::real::{Lanes, Real};
 
