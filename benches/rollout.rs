@@ -191,7 +191,8 @@ fn scalar_loop(criterion: &mut Criterion) {
 fn growth_round(criterion: &mut Criterion) {
     let bench = Bench::new();
     let plant = race(Mlp::clone(&bench.data.policy));
-    let mut settings = Settings::new(&plant.model, bench.data.starts[0], bench.spec);
+    let settings = Settings::new(&plant.model, bench.data.starts[0], bench.spec);
+    let mut settings = settings.expect("a start of the race");
     let axis = |state, low: f32, cells: u8| SliceAxis {
         state,
         values: (0..cells).map(|i| low + 0.1 * f32::from(i)).collect(),

@@ -67,7 +67,7 @@ impl Policy<3, 1> for Steer {
 pub(crate) fn certificate(backend: &Backend) -> Result<Record> {
     let spec = RolloutSpec::new(60, 0.98)?;
     let plant = Plant::of(Dubins, Steer);
-    let mut settings = Settings::new(&plant.model, [-2.4, 0.9, 0.4], spec);
+    let mut settings = Settings::new(&plant.model, [-2.4, 0.9, 0.4], spec)?;
     settings.deviation.radius = 0.02;
     settings.global.draws = 4000;
     certify(&backend.prepare(&plant)?, &settings, "dubins".into(), &Unwatched)

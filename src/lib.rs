@@ -135,7 +135,7 @@
 //! let plant = Plant::of(DoubleIntegrator::default(), BangBang { acceleration: 1.0 });
 //! let backend = Backend::cpu()?;
 //! // Around the state at rest 0.9 m from the middle, over 40 steps.
-//! let mut settings = Settings::new(&plant.model, [0.9, 0.0], RolloutSpec::new(40, 0.99)?);
+//! let mut settings = Settings::new(&plant.model, [0.9, 0.0], RolloutSpec::new(40, 0.99)?)?;
 //! settings.global.draws = 2000;
 //! let record = certify(&backend.prepare(&plant)?, &settings, "a tour".into(), &Unwatched)?;
 //! assert!(record.global.accepted > 0);

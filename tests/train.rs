@@ -52,7 +52,7 @@ fn learner<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
     losses: Option<Tightening>,
 ) -> Analytic<'a, S, NX, NU> {
     let task = Task { tightening: losses, ..task(system, backend, &Device::cpu(), config) };
-    Analytic::new(task, network, settings(config).analytic)
+    Analytic::new(task, network, settings(config).analytic).unwrap()
 }
 
 /// `-tau ln(sum of exp(-x / tau))` in f64, from its definition.
@@ -548,7 +548,7 @@ fn one_operation_per_graph_is_one_per_node() {
         states[i].into_iter().chain(u.into_iter().map(|lane| lane.0[0])).collect()
     };
     let rows: Vec<f32> = (0..37).flat_map(row).collect();
-    let tape = Arc::new(Tape::hard(&graph));
+    let tape = Arc::new(Tape::hard(&graph).unwrap());
     let device = Device::cpu();
     let weights = device.tensor((0..14).map(|i| 1.0 + 0.1 * i as f32).collect(), [1, 14]);
     let run = |of: &dyn Fn(Tensor<2>) -> Tensor<2>| {
@@ -619,7 +619,7 @@ fn a_layer_is_burns_own_operations() {
 /// A control beyond its bounds moves nothing.
 #[test]
 fn the_clip_of_a_control_stops_its_slope() {
-    let tape = reachcast::train::soft::step_tape(&DoubleIntegrator::default());
+    let tape = reachcast::train::soft::step_tape(&DoubleIntegrator::default()).unwrap();
     for (u, slope) in [(0.5_f64, f64::from(0.1_f32)), (1.5, 0.0), (-1.5, 0.0)] {
         let (mut values, mut adjoints, mut slopes) = (Vec::new(), Vec::new(), [f64::lit(0.0); 3]);
         tape.forward(&[0.3, -0.2, u], 1.0, &mut values);

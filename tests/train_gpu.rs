@@ -199,7 +199,7 @@ fn slopes_of_the_softened_measure_are_the_cpus() {
     let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::START, 3, 100);
     let [expected, found] = devices.map(|device| {
         let task = Task { tightening: losses.clone(), ..task(&system, &backend, &device, &config) };
-        let learner = Analytic::new(task, network.clone(), settings(&config).analytic);
+        let learner = Analytic::new(task, network.clone(), settings(&config).analytic).unwrap();
         let bound = network.bind(&device);
         let measures = learner.measures(&bound, &starts, 0.4);
         (bound.gradient(&measures.clone().sum().backward()), floats(measures))
@@ -244,7 +244,8 @@ fn a_policy_through_the_dynamics_is_updated_as_on_the_cpu() {
     let config = config("double-integrator", "analytic", &["train.held_out=256"]);
     agree(|device| {
         let network = random(&system, &[32, 32], LAST);
-        Analytic::new(task(&system, &backend, device, &config), network, settings(&config).analytic)
+        let task = task(&system, &backend, device, &config);
+        Analytic::new(task, network, settings(&config).analytic).unwrap()
     });
 }
 

@@ -63,12 +63,14 @@ pub fn read_states(path: &Path, size: usize) {
 /// The formula of a configuration, or the carried network in place of any file that it names,
 /// since that name may be one of any file of this machine.
 pub fn policy(config: &Config) -> PolicySource {
-    match &config.policy.formula {
-        Some(formula) if config.policy.file.is_none() => PolicySource::Formula(formula.clone()),
-        _ => PolicySource::Network {
-            path: "race_policy.safetensors".into(),
-            bytes: NETWORK.to_vec(),
-            network: Mlp::from_bytes(NETWORK).expect("the carried policy"),
-        },
+    if config.policy.file.is_none()
+        && let Ok(formula) = config.policy_source(Path::new(""))
+    {
+        return formula;
+    }
+    PolicySource::Network {
+        path: "race_policy.safetensors".into(),
+        bytes: NETWORK.to_vec(),
+        network: Mlp::from_bytes(NETWORK).expect("the carried policy"),
     }
 }

@@ -1,9 +1,10 @@
 //! Checks of a task, once, in front of both backends.
 
 use crate::error::{Error, Result};
-use crate::rollout::{RolloutSpec, Starts, Tightening};
+use crate::rollout::{Region, RolloutSpec, Starts, Tightening};
 
-/// Refuses a range beyond its list of starts, and a tightening that has not one entry per step.
+/// Refuses a range beyond its list of starts, a region whose sides have different lengths, and a
+/// tightening that has not one entry per step.
 ///
 /// # Errors
 /// [`Error::Invalid`] with the figures.
@@ -18,6 +19,16 @@ pub(super) fn check_task(
     {
         let problem = format!("ends at {end}, but the list has {} starts", list.len());
         return Err(Error::invalid("range of starts", problem));
+    }
+    if let Starts::Drawn { region, .. } = starts {
+        let [one, other] = match region {
+            Region::Box { low, high } => [low.len(), high.len()],
+            Region::Ball(ball) => [ball.center.len(), ball.varies.len()],
+        };
+        if one != other {
+            let problem = format!("sides of {one} and {other} coordinates");
+            return Err(Error::invalid("region of starts", problem));
+        }
     }
     let steps = spec.horizon as usize + 1;
     for values in [&tightening.target, &tightening.constraint] {

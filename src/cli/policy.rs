@@ -236,7 +236,7 @@ pub(super) fn inspect(global: &Global, file: &Path, config: Option<&Path>) -> Re
     };
     let inspect = Inspect {
         file: file.display().to_string(),
-        actions: actions(&network, &frame, seed),
+        actions: actions(&network, &frame, seed)?,
         network: Inspection::of(&network),
         low: frame.low,
         high: frame.high,
@@ -262,10 +262,10 @@ fn unit_frame(network: &Mlp) -> Frame {
 }
 
 /// The range of each action over the box.
-fn actions(network: &Mlp, frame: &Frame, seed: u64) -> Vec<Action> {
+fn actions(network: &Mlp, frame: &Frame, seed: u64) -> Result<Vec<Action>> {
     let Frame { controls, low, high, .. } = frame;
     let sides = low.iter().zip(high).map(|(&low, &high)| Interval::new(low.into(), high.into()));
-    let intervals = output_intervals(network, &sides.collect::<Vec<_>>());
+    let intervals = output_intervals(network, &sides.collect::<Vec<_>>())?;
     let stream = Stream::new(seed, Purpose::USER, 0);
     let batches = (0..SAMPLES).step_by(LANES).map(|i| stream.in_box::<LANES>(low, high, i));
     let seen = output_ranges(network, batches);
@@ -274,7 +274,7 @@ fn actions(network: &Mlp, frame: &Frame, seed: u64) -> Vec<Action> {
         interval: [low, high],
         seen,
     };
-    controls.iter().zip(intervals).zip(seen).map(action).collect()
+    Ok(controls.iter().zip(intervals).zip(seen).map(action).collect())
 }
 
 /// The inspection in words; `place` names the box.

@@ -4,6 +4,7 @@ use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::rollout::{Ball, Query, StateList, States};
 use crate::scenario::boundary::on_slice;
+use crate::scenario::fit::check_sizes;
 use crate::scenario::global::{band, check_margins, slice_through};
 use crate::scenario::growth::{Growth, check_scenarios};
 use crate::scenario::growth_batch::{Request, grow_each};
@@ -94,6 +95,7 @@ impl<'a> Certifier<'a> {
         if asked.local {
             check_scenarios(&settings.growth)?;
         }
+        check_sizes(settings, &program.plant().model)?;
         let context = Context { program, watch: &Unwatched };
         let tightened = tightened(context, settings)?;
         let lost = tightened.deviation.non_finite;
@@ -124,8 +126,14 @@ impl<'a> Certifier<'a> {
     /// those that it does not certify.
     ///
     /// # Errors
-    /// Those of the backend.
+    /// [`Error::Invalid`] for a state that has not the numbers of the model, and those of the backend.
     pub fn standings(&self, cases: &mut [Case<'_>]) -> Result<Vec<Standing>> {
+        let size = self.settings.state.len();
+        if let Some(i) = cases.iter().position(|case| case.state.len() != size) {
+            let has = cases[i].state.len();
+            let problem = format!("case {i} has {has} numbers, a state has {size}");
+            return Err(Error::invalid("state", problem));
+        }
         let states = self.list().with(cases.iter().map(|case| &*case.state));
         let margins = self.margins(states.view(), Query::Measure)?;
         let standing = |(state, check_margin): (&[f32], f32)| Standing {

@@ -1,5 +1,7 @@
 //! States one after the other, `[count, size]`: borrowed, or a list of one's own.
 
+use crate::error::{Error, Result};
+
 /// States one after the other: `[count, size]`, borrowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct States<'a> {
@@ -10,24 +12,30 @@ pub struct States<'a> {
 impl<'a> States<'a> {
     /// States of `size` numbers each.
     ///
-    /// # Panics
-    /// If `size` is 0, or the numbers are no whole number of states.
-    pub fn new(numbers: &'a [f32], size: usize) -> Self {
-        assert!(size > 0 && numbers.len().is_multiple_of(size), "states of {size} numbers");
+    /// # Errors
+    /// [`Error::Invalid`] if the numbers are no whole number of states.
+    pub fn new(numbers: &'a [f32], size: usize) -> Result<Self> {
+        if numbers.len().is_multiple_of(size) {
+            return Ok(Self { size, numbers });
+        }
+        let problem = format!("{} numbers are no whole number of states of {size}", numbers.len());
+        Err(Error::invalid("states", problem))
+    }
+
+    /// The same of numbers that are known to be whole states.
+    pub(crate) fn of(numbers: &'a [f32], size: usize) -> Self {
+        debug_assert!(numbers.len().is_multiple_of(size), "states of {size} numbers");
         Self { size, numbers }
     }
 
     /// A single state.
-    ///
-    /// # Panics
-    /// If it has no number.
     pub fn one(state: &'a [f32]) -> Self {
-        Self::new(state, state.len())
+        Self { size: state.len(), numbers: state }
     }
 
-    /// How many there are.
+    /// How many there are; none where a state has no number.
     pub fn len(&self) -> usize {
-        self.numbers.len() / self.size
+        self.numbers.len().checked_div(self.size).unwrap_or(0)
     }
 
     /// Whether there are none.
@@ -52,13 +60,13 @@ impl<'a> States<'a> {
 
     /// One after the other.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &'a [f32]> + use<'a> {
-        self.numbers.chunks_exact(self.size)
+        self.numbers.chunks_exact(self.size.max(1))
     }
 }
 
 impl<'a, const NX: usize> From<&'a [[f32; NX]]> for States<'a> {
     fn from(list: &'a [[f32; NX]]) -> Self {
-        Self::new(list.as_flattened(), NX)
+        Self { size: NX, numbers: list.as_flattened() }
     }
 }
 
@@ -83,11 +91,7 @@ pub struct StateList {
 
 impl StateList {
     /// No state yet, of `size` numbers each.
-    ///
-    /// # Panics
-    /// If `size` is 0.
     pub fn new(size: usize) -> Self {
-        assert!(size > 0, "a state has at least one number");
         Self { size, numbers: Vec::new() }
     }
 
@@ -145,12 +149,34 @@ impl StateList {
 
     /// All of them.
     pub fn view(&self) -> States<'_> {
-        States::new(&self.numbers, self.size)
+        States { size: self.size, numbers: &self.numbers }
     }
 }
 
 impl<'a> From<&'a StateList> for States<'a> {
     fn from(list: &'a StateList) -> Self {
         list.view()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_are_whole_states() {
+        let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let states = States::new(&numbers, 3).expect("two states");
+        assert_eq!((states.len(), states.row(1)), (2, &numbers[3..]));
+        for size in [0, 4] {
+            let refused = States::new(&numbers, size).expect_err("no whole number").to_string();
+            assert!(
+                refused.contains(&format!("6 numbers are no whole number of states of {size}"))
+            );
+        }
+        // What has no numbers is no state.
+        let nothing = [States::one(&[]), States::new(&[], 0).expect("none"), (&[[]; 3]).into()];
+        assert!(nothing.iter().all(|none| none.len() == 0 && none.iter().len() == 0));
+        assert_eq!(StateList::new(0).with([[]; 2]).len(), 0);
     }
 }

@@ -82,7 +82,7 @@ pub enum Function {
     PrincipalCos,
     /// [`Real::exp_negative`].
     ExpNegative,
-    /// [`Real::ln_unit`].
+    /// [`Real::ln_unit`], the one of which instruction sets agree only within its range, `[2^-24, 1]`.
     LnUnit,
 }
 

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::spectral::norm_bound;
 use super::{Activation, Layer, Mlp, OutputActivation};
+use crate::error::{Error, Result};
 use crate::real::Lanes;
 use crate::real::bound::{Interval, tanh};
 
@@ -97,12 +98,17 @@ fn range(values: &[f32]) -> [f32; 2] {
 /// An interval for each output that holds its values for every input in `inputs`, by interval
 /// arithmetic: of the network in real numbers, and wide where the box or the network is.
 ///
-/// # Panics
-/// If there are not as many intervals as inputs.
-pub fn output_intervals(network: &Mlp, inputs: &[Interval]) -> Vec<Interval> {
-    assert_eq!(inputs.len(), network.widths()[0], "one interval per input");
+/// # Errors
+/// [`Error::Invalid`] if there are not as many intervals as inputs.
+pub fn output_intervals(network: &Mlp, inputs: &[Interval]) -> Result<Vec<Interval>> {
+    let (has, width) = (inputs.len(), network.widths()[0]);
+    if has != width {
+        let problem = format!("{has} intervals for the {width} inputs of the network");
+        return Err(Error::invalid("inputs", problem));
+    }
     let last = network.layers().len() - 1;
-    network.layers().iter().enumerate().fold(inputs.to_vec(), |x, (i, layer)| {
+    let layers = network.layers().iter().enumerate();
+    Ok(layers.fold(inputs.to_vec(), |x, (i, layer)| {
         let rows = layer.weight.chunks_exact(layer.inputs).zip(&layer.bias);
         let sum = |(row, &bias): (&[f32], &f32)| {
             let products = row.iter().zip(&x).map(|(&w, &x)| Interval::point(w.into()) * x);
@@ -114,7 +120,7 @@ pub fn output_intervals(network: &Mlp, inputs: &[Interval]) -> Vec<Interval> {
             (true, OutputActivation::Tanh) => sums.map(tanh).collect(),
             (true, OutputActivation::Identity) => sums.collect(),
         }
-    })
+    }))
 }
 
 /// The range of an activation.

@@ -228,7 +228,8 @@ pub trait Real:
     }
 
     /// Natural logarithm of a number in `[2^-24, 1]`, the range of a uniform draw; the bits of
-    /// [`Real::ln`].
+    /// [`Real::ln`]. Of no meaning for others, a NaN included, nor the same in every instance: see
+    /// [`Real::unit_parts`]. A model's text has [`Real::ln`] alone.
     #[inline(always)]
     fn ln_unit(self) -> Self {
         approx::ln_unit(self)
@@ -236,6 +237,9 @@ pub trait Real:
 
     /// Of a number in `[2^-24, 1]` that is `m 2^e`, the mantissa `m`, from the root of 1/2 to twice
     /// that, and the whole number `e`.
+    ///
+    /// Every draw of noise comes through here, so vectors take both from the bits in five operations,
+    /// where the formula compares ten times. Beyond the range the two differ.
     #[inline(always)]
     fn unit_parts(self) -> [Self; 2] {
         approx::unit_parts(self)

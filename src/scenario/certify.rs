@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::budget::{ledger, spendings};
+use super::fit::check_sizes;
 use super::origin::{provenance, system_record};
 use super::purpose;
 use super::record::{
@@ -37,6 +38,7 @@ pub fn certify(
     let begun = Instant::now();
     let context = Context { program, watch };
     let (plant, backend) = (program.plant(), program.backend());
+    check_sizes(settings, &plant.model)?;
     check_settings(settings)?;
     let ledger = ledger(settings)?;
     let Tightened { constants, deviation, tightening } = tightened(context, settings)?;

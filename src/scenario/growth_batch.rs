@@ -140,7 +140,7 @@ fn piece(
     };
     let drawn: Vec<Vec<f32>> = balls.par_iter().enumerate().map(draw).collect();
     let (starts, size) = (drawn.concat(), settings.state.len());
-    let starts = States::new(&starts, size);
+    let starts = States::new(&starts, size)?;
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
         starts: Starts::Listed(starts),
@@ -206,7 +206,8 @@ mod tests {
     }
 
     fn settings(model: &Model) -> Settings {
-        let mut settings = Settings::new(model, [0.0; 2], RolloutSpec::new(30, 0.95).unwrap());
+        let spec = RolloutSpec::new(30, 0.95).unwrap();
+        let mut settings = Settings::new(model, [0.0; 2], spec).unwrap();
         (settings.growth.radius, settings.growth.rounds) = (0.4, 4);
         // No multiple of the starts that are drawn side by side.
         settings.growth.scenarios = 83;

@@ -12,6 +12,7 @@ mod coordinates;
 mod derived;
 pub mod deviation;
 mod finding;
+pub(crate) mod fit;
 pub mod global;
 pub mod growth;
 pub mod growth_batch;

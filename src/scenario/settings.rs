@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
 
@@ -174,7 +174,7 @@ impl Settings {
     /// The scenarios that `rule` asks for: pairs of the deviation bound, starts of a round of growth.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for a risk or a beta that no count supports.
+    /// [`Error::Invalid`] for a risk or a beta that no count supports.
     pub fn scenario_counts(&self, rule: CountRule) -> Result<[u64; 2]> {
         let Program { decision_vars, epsilon, beta } =
             Program::new(&self.deviation, self.spec.horizon);
@@ -195,11 +195,21 @@ impl Settings {
     /// shape under replayed controls, 20,000 draws, a slice of 21 by 21 cells over the first two
     /// states, growth in all coordinates from radius 0.5 in at most 10 rounds with beta split.
     ///
-    /// # Panics
-    /// If `state` has not the states of the model.
-    pub fn new(model: &Model, state: impl Into<Vec<f32>>, spec: RolloutSpec) -> Self {
+    /// # Errors
+    /// [`Error::Invalid`] if `state` has not a number for each state of the model.
+    pub fn new(model: &Model, state: impl Into<Vec<f32>>, spec: RolloutSpec) -> Result<Self> {
         let (axes, state) = (&model.states, state.into());
-        assert_eq!(state.len(), axes.len(), "numbers of the state");
+        if state.len() != axes.len() {
+            let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+            let problem = format!(
+                "{} numbers, the model `{}` has {} states: {}",
+                state.len(),
+                model.name,
+                axes.len(),
+                names.join(", ")
+            );
+            return Err(Error::invalid("state", problem));
+        }
         let (epsilon, beta, scenarios) = (0.1, 1e-3, 159);
         let slice = (axes.len() > 1).then_some([0, 1]).map(|both| {
             both.map(|state| {
@@ -208,7 +218,7 @@ impl Settings {
                 SliceAxis { state, values: (0..SLICE_CELLS).map(value).collect() }
             })
         });
-        Self {
+        Ok(Self {
             seed: 1,
             spec,
             low: axes.iter().map(|axis| axis.low).collect(),
@@ -238,6 +248,6 @@ impl Settings {
                 boundary: BoundarySearch::Rays,
                 heading: None,
             },
-        }
+        })
     }
 }

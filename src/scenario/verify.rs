@@ -6,6 +6,7 @@ use super::bound::lower_bound;
 use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
+use super::fit::check_sizes;
 use super::origin::{hashes, provenance};
 use super::purpose;
 use super::record::{Record, SCHEMA, finite_margin};
@@ -106,7 +107,8 @@ fn check_derived(program: &Program<'_>, record: &Record, settings: &Settings) ->
 ///
 /// # Errors
 /// [`Error::Refused`] if the record is of another plant, or if a field does not follow from its
-/// settings and its own counts; those of the backend.
+/// settings and its own counts; [`Error::Invalid`] for settings or states of another model; those of
+/// the backend.
 pub fn query(
     program: &Program<'_>,
     record: &Record,
@@ -115,6 +117,7 @@ pub fn query(
 ) -> Result<Vec<QueryRow>> {
     let plant = program.plant();
     check_identity(plant, record)?;
+    check_sizes(settings, &plant.model)?;
     check_derived(program, record, settings)?;
     let spec = settings.spec;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);

@@ -113,7 +113,7 @@ impl<'a> Ddpg<'a> {
         let count = self.environments.len();
         let first = iteration * count as u64;
         let numbers = self.environments.states.clone();
-        let states = States::new(&numbers, self.task.model.states.len());
+        let states = States::of(&numbers, self.task.model.states.len());
         let acts = self.tried(first, states);
         for (i, (x, acts)) in states.iter().zip(acts.chunks_exact(self.acts())).enumerate() {
             self.replay.write(first + i as u64, &[x, acts].concat());

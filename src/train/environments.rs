@@ -38,7 +38,7 @@ impl Environments {
 
     /// The state of each.
     pub fn each(&self) -> States<'_> {
-        States::new(&self.states, self.states.len() / self.ages.len())
+        States::of(&self.states, self.states.len() / self.ages.len())
     }
 
     /// Moves all to the states `next`, step number `number`, counted from 0. Those that are at the

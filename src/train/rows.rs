@@ -26,7 +26,7 @@ pub struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// Numbers that are states of `model`, at the first step.
     pub fn new(model: &'a Model, numbers: &'a [f32]) -> Self {
-        Self { model, states: States::new(numbers, model.states.len()), steps: &[] }
+        Self { model, states: States::of(numbers, model.states.len()), steps: &[] }
     }
 
     /// The next states under `controls`, row by row like them.

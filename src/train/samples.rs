@@ -59,7 +59,7 @@ impl Source<'_> {
         let rows = Rows { model, states, steps: &[] };
         let next = rows.next(&controls);
         let spec = RolloutSpec::new(self.spec.horizon - 1, self.spec.gamma)?;
-        let mut measures = self.program.measures(States::new(&next, states.size()), &spec)?;
+        let mut measures = self.program.measures(States::of(&next, states.size()), &spec)?;
         for (measure, margins) in measures.iter_mut().zip(rows.margins()) {
             // A state that is not finite stays marked as such.
             if *measure > NON_FINITE {

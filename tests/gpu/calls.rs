@@ -124,7 +124,7 @@ fn a_call_is_one_write_one_submission_one_wait_and_one_read() {
         }
         let size = plant.model.states.len();
         let list: Vec<f32> = (0..158).flat_map(|i| drawn.start(i)).collect();
-        let listed = Starts::Listed(States::new(&list, size));
+        let listed = Starts::Listed(States::new(&list, size).unwrap());
         let measures = || roll_out(&program, &listed, Query::Measure).map(drop);
         assert_eq!(second(backend, measures), ONE, "a list of {}", plant.model.name);
     });

@@ -140,7 +140,7 @@ fn listed_starts_of_a_model_are_those_of_the_list() {
         let tightening = Tightening::none(&spec);
         let starts = drawn(region(), 74);
         let list: Vec<f32> = (0..200).flat_map(|i| starts.start(i)).collect();
-        let listed = Starts::Listed(States::new(&list, 3));
+        let listed = Starts::Listed(States::new(&list, 3).unwrap());
         let task = |starts| ReachAvoidTask {
             starts,
             range: 10..200,

@@ -143,7 +143,7 @@ impl<K: Kernel> Body for Logarithms<'_, K> {
 }
 
 /// Every number that the magnitude of a pair of normal numbers can be, and those next to where the
-/// exponent changes.
+/// exponent changes and the range begins.
 struct Magnitudes;
 
 impl Unit for Magnitudes {
@@ -155,7 +155,9 @@ impl Unit for Magnitudes {
         let next = (0..23).flat_map(|halvings| {
             (root - 8..root + 8).map(move |bits| f32::from_bits(bits - (halvings << 23)))
         });
-        let numbers: Vec<f32> = every.chain(next).collect();
+        let least = (1.0_f32 / 16_777_216.0).to_bits();
+        let first = (least..least + 16).map(f32::from_bits);
+        let numbers: Vec<f32> = every.chain(next).chain(first).collect();
         let mut found = numbers.clone();
         kernel.call(Logarithms::<K> { kernel: PhantomData, numbers: &mut found });
         for (found, number) in found.into_iter().zip(numbers) {
