@@ -15,10 +15,11 @@ use reachcast::backend::Backend;
 use reachcast::bench;
 use reachcast::config::Config;
 use reachcast::formula::{Graph, Node, record};
+use reachcast::model::{Model, Plant};
 use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
-use reachcast::rollout::{Plant, Query, ReachAvoidTask, Starts, Stream, Tightening, reach_avoid};
+use reachcast::rollout::{StateList, Stream, Tightening, reach_avoid};
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
@@ -44,15 +45,20 @@ fn order<S: System<NX, NU>, const NX: usize, const NU: usize>(system: &S) -> Vec
 }
 
 /// A learner for `system`.
-fn learner<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &'a S,
+fn learner<
+    'a,
+    S: System<NX, NU> + Clone + Send + Sync + 'static,
+    const NX: usize,
+    const NU: usize,
+>(
+    system: &S,
     backend: &'a Backend,
     config: &Config,
     network: Network,
     losses: Option<Tightening>,
-) -> Analytic<'a, S, NX, NU> {
+) -> Analytic<'a> {
     let task = Task { tightening: losses, ..task(system, backend, &Device::cpu(), config) };
-    Analytic::new(task, network, settings(config).analytic).unwrap()
+    Analytic::new(task, network, settings(config).analytic)
 }
 
 /// `-tau ln(sum of exp(-x / tau))` in f64, from its definition.
@@ -185,9 +191,10 @@ fn an_exported_network_measures_as_on_tensors() {
     let network = random(&system, &[64, 64], 1.0);
     let learner = learner(&system, &backend, &config, network.clone(), None);
     let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::HELD_OUT, 0, 500);
-    let told = floats(learner.measures(&network.bind(&Device::cpu()), &starts, 1e-7));
+    let told = floats(learner.measures(&network.bind(&Device::cpu()), starts.view(), 1e-7));
     let policy = network.export(order(&system)).unwrap();
-    let measured = measures(&backend, Plant { system: &system, policy: &policy }, &starts, &config);
+    let plant = Plant::of(system, policy);
+    let measured = measures(&backend, &plant, &starts, &config);
     let apart = told.iter().zip(&measured).map(|(told, measured)| (told - measured).abs());
     let worst = apart.fold(0.0, f32::max);
     println!("largest difference {worst:.1e}");
@@ -196,27 +203,9 @@ fn an_exported_network_measures_as_on_tensors() {
 }
 
 /// The engine's measures.
-fn measures<S: System<NX, NU>, P: Policy<NX, NU>, const NX: usize, const NU: usize>(
-    backend: &Backend,
-    plant: Plant<'_, S, P>,
-    starts: &[[f32; NX]],
-    config: &Config,
-) -> Vec<f32> {
-    let spec = config.spec().unwrap();
-    let task = ReachAvoidTask {
-        starts: Starts::listed(starts),
-        range: 0..starts.len() as u64,
-        spec,
-        tightening: &Tightening::none(&spec),
-        query: Query::Measure,
-    };
-    let mut measures = Vec::new();
-    let mut sink = |_: u64, values: &[f32]| {
-        measures.extend_from_slice(values);
-        Ok(())
-    };
-    backend.reach_avoid(plant, &task, &mut sink).unwrap();
-    measures
+fn measures(backend: &Backend, plant: &Plant, starts: &StateList, config: &Config) -> Vec<f32> {
+    let program = backend.prepare(plant).unwrap();
+    program.measures(starts, &config.spec().unwrap()).unwrap()
 }
 
 /// Stops the work after so many updates.
@@ -312,10 +301,8 @@ fn training_improves_and_ends_early() {
     };
     let backend = cpu(1);
     let bang = BangBang { acceleration: 1.0 };
-    let ceiling =
-        share(measures(&backend, Plant { system: &system, policy: &bang }, &held_out, &config));
-    let kept =
-        share(measures(&backend, Plant { system: &system, policy: &policy }, &held_out, &config));
+    let ceiling = share(measures(&backend, &Plant::of(system.clone(), bang), &held_out, &config));
+    let kept = share(measures(&backend, &Plant::of(system, policy), &held_out, &config));
     println!("from {:.3} to {best:.3} of {ceiling:.3} in {} scores", scores[0], scores.len());
     assert_eq!(kept, best);
     assert!(best > scores[0] + 0.1 && best > 0.9 * ceiling && best <= ceiling);
@@ -340,11 +327,11 @@ fn carried_networks_know_the_set_in_closed_form() {
     };
     let (policy, value) = (carried("policy"), carried("value"));
     let starts = config.mixture(&system.states()).unwrap().draw(11, purpose::HELD_OUT, 0, 20_000);
-    let plant = Plant { system: &system, policy: &policy };
-    let measured = measures(&cpu(2), plant, &starts, &config);
+    let plant = Plant::of(system, policy);
+    let measured = measures(&cpu(2), &plant, &starts, &config);
     let (mut set, mut covered, mut right) = (0, 0, 0);
     for (start, measure) in starts.iter().zip(measured) {
-        let inside = form.contains(start.map(f64::from), &loss);
+        let inside = form.contains([start[0], start[1]].map(f64::from), &loss);
         set += u32::from(inside);
         covered += u32::from(inside && measure > 0.0);
         right += u32::from((value.forward(start)[0] > 0.0) == inside);
@@ -363,12 +350,12 @@ fn samples_are_measures_in_f64() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
     // Few steps, so that the last one matters.
     let config = config("double-integrator", "analytic", &["rollout.horizon=6"]);
-    let policy = &BangBang { acceleration: 1.0 };
+    let policy = BangBang { acceleration: 1.0 };
+    let plant = Plant::of(system.clone(), policy.clone());
     let source = Source {
-        plant: Plant { system: &system, policy },
-        backend: &backend,
+        program: &backend.prepare(&plant).unwrap(),
         spec: config.spec().unwrap(),
-        mixture: config.mixture(&system.states()).unwrap(),
+        mixture: &config.mixture(&system.states()).unwrap(),
         visited: 0.5,
         seed: 5,
     };
@@ -383,8 +370,8 @@ fn samples_are_measures_in_f64() {
         }
         reach_avoid(margins, f64::from(source.spec.gamma))
     };
-    let values = source.values::<1>(purpose::START, 300).unwrap();
-    let actions = source.action_values::<1>(purpose::START, 300).unwrap();
+    let values = source.values(purpose::START, 300).unwrap();
+    let actions = source.action_values(purpose::START, 300).unwrap();
     assert_eq!((values.len(), values.columns, actions.len(), actions.columns), (300, 2, 300, 3));
     let mut outside = 0;
     for i in 0..300 {
@@ -406,19 +393,19 @@ fn samples_are_measures_in_f64() {
 fn a_value_network_learns_the_measure() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
     let config = config("double-integrator", "analytic", &["train.value.iterations=400"]);
+    let plant = Plant::of(system.clone(), BangBang { acceleration: 1.0 });
     let source = Source {
-        plant: Plant { system: &system, policy: &BangBang { acceleration: 1.0 } },
-        backend: &backend,
+        program: &backend.prepare(&plant).unwrap(),
         spec: config.spec().unwrap(),
-        mixture: config.mixture(&system.states()).unwrap(),
+        mixture: &config.mixture(&system.states()).unwrap(),
         visited: 0.3,
         seed: 5,
     };
     let lesson = Lesson {
         name: "value",
         order: order(&system),
-        samples: source.values::<1>(purpose::START, 20_000).unwrap(),
-        held_out: source.values::<1>(purpose::HELD_OUT, 2000).unwrap(),
+        samples: source.values(purpose::START, 20_000).unwrap(),
+        held_out: source.values(purpose::HELD_OUT, 2000).unwrap(),
         device: Device::cpu(),
         seed: 5,
     };
@@ -545,10 +532,10 @@ fn one_operation_per_graph_is_one_per_node() {
     let controls = Stream::new(9, purpose::CONTROL, 0);
     let row = |i: usize| -> Vec<f32> {
         let u = controls.in_box::<1>(&[-1.2; 3], &[1.2; 3], i as u64);
-        states[i].into_iter().chain(u.into_iter().map(|lane| lane.0[0])).collect()
+        states.row(i).iter().copied().chain(u.into_iter().map(|lane| lane.0[0])).collect()
     };
     let rows: Vec<f32> = (0..37).flat_map(row).collect();
-    let tape = Arc::new(Tape::hard(&graph).unwrap());
+    let tape = Arc::new(Tape::hard(&graph));
     let device = Device::cpu();
     let weights = device.tensor((0..14).map(|i| 1.0 + 0.1 * i as f32).collect(), [1, 14]);
     let run = |of: &dyn Fn(Tensor<2>) -> Tensor<2>| {
@@ -619,10 +606,10 @@ fn a_layer_is_burns_own_operations() {
 /// A control beyond its bounds moves nothing.
 #[test]
 fn the_clip_of_a_control_stops_its_slope() {
-    let tape = reachcast::train::soft::step_tape(&DoubleIntegrator::default()).unwrap();
+    let tape = reachcast::train::soft::step_tape(&Model::of(DoubleIntegrator::default()));
     for (u, slope) in [(0.5_f64, f64::from(0.1_f32)), (1.5, 0.0), (-1.5, 0.0)] {
-        let (mut values, mut adjoints, mut slopes) = (Vec::new(), Vec::new(), [f64::lit(0.0); 3]);
-        tape.forward(&[0.3, -0.2, u], 1.0, &mut values);
+        let (mut values, mut adjoints, mut slopes) = (Vec::new(), Vec::new(), [f64::lit(0.0); 4]);
+        tape.forward(&[0.3, -0.2, u, 0.0], 1.0, &mut values);
         tape.backward(&values, &[0.0, 1.0], 1.0, &mut adjoints, &mut slopes);
         assert!((slopes[2] - slope).abs() < 1e-12, "{u}: {slopes:?}");
     }

@@ -15,9 +15,10 @@ use command::{Folder, document, refused};
 use common::{adapter, cpu};
 use reachcast::backend::Backend;
 use reachcast::bench;
+use reachcast::model::Plant;
 use reachcast::policy::{Activation, OutputActivation};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{Plant, Stream};
+use reachcast::rollout::Stream;
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::ddpg::{Ddpg, Game};
@@ -199,9 +200,9 @@ fn slopes_of_the_softened_measure_are_the_cpus() {
     let starts = config.mixture(&system.states()).unwrap().draw(9, purpose::START, 3, 100);
     let [expected, found] = devices.map(|device| {
         let task = Task { tightening: losses.clone(), ..task(&system, &backend, &device, &config) };
-        let learner = Analytic::new(task, network.clone(), settings(&config).analytic).unwrap();
+        let learner = Analytic::new(task, network.clone(), settings(&config).analytic);
         let bound = network.bind(&device);
-        let measures = learner.measures(&bound, &starts, 0.4);
+        let measures = learner.measures(&bound, starts.view(), 0.4);
         (bound.gradient(&measures.clone().sum().backward()), floats(measures))
     });
     let errors = [apart(&found.0, &expected.0), apart(&found.1, &expected.1)];
@@ -245,7 +246,7 @@ fn a_policy_through_the_dynamics_is_updated_as_on_the_cpu() {
     agree(|device| {
         let network = random(&system, &[32, 32], LAST);
         let task = task(&system, &backend, device, &config);
-        Analytic::new(task, network, settings(&config).analytic).unwrap()
+        Analytic::new(task, network, settings(&config).analytic)
     });
 }
 
@@ -253,15 +254,15 @@ fn a_policy_through_the_dynamics_is_updated_as_on_the_cpu() {
 fn a_value_is_updated_as_on_the_cpu() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(1));
     let config = config("double-integrator", "analytic", &[]);
+    let plant = Plant::of(system.clone(), BangBang { acceleration: 1.0 });
     let source = Source {
-        plant: Plant { system: &system, policy: &BangBang { acceleration: 1.0 } },
-        backend: &backend,
+        program: &backend.prepare(&plant).unwrap(),
         spec: config.spec().unwrap(),
-        mixture: config.mixture(&system.states()).unwrap(),
+        mixture: &config.mixture(&system.states()).unwrap(),
         visited: 0.3,
         seed: 5,
     };
-    let samples = |purpose| source.values::<1>(purpose, 1000).unwrap();
+    let samples = |purpose| source.values(purpose, 1000).unwrap();
     agree(|device| {
         let lesson = value::Lesson {
             name: "value",
@@ -291,7 +292,7 @@ fn the_players_of_a_game_are_updated_as_on_the_cpu() {
             hidden: vec![32, 32],
         };
         let settings = settings(&config).ddpg.clone();
-        Ddpg::new(task(&system, &backend, device, &config), game, settings)
+        Ddpg::new(task(&system, &backend, device, &config), game, settings).unwrap()
     });
 }
 

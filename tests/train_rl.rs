@@ -13,23 +13,24 @@ use command::{Folder, document};
 use common::cpu;
 use reachcast::backend::Backend;
 use reachcast::config::Config;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::model::{Model, Plant};
+use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
-use reachcast::rollout::{Plant, RolloutSpec, Stream, Tightening, measure};
+use reachcast::rollout::{RolloutSpec, States, Stream, reach_avoid};
 use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::backup::Margins;
 use reachcast::train::ddpg::{Ddpg, Game};
 use reachcast::train::device::Device;
-use reachcast::train::disturbed::{Disturbed, pushed};
+use reachcast::train::disturbed::{disturbed, pushed};
 use reachcast::train::environments::Environments;
 use reachcast::train::gae::{Step, advantages};
 use reachcast::train::ppo::{Lesson, Ppo};
 use reachcast::train::purpose;
 use reachcast::train::record::{Origin, TrainRecord};
 use reachcast::train::replay::Replay;
-use reachcast::train::reward::Reward;
+use reachcast::train::reward::{Reward, Visited};
 use reachcast::train::run::{Learner, Run};
 use reachcast::train::score::{share, successes};
 use reachcast::train::settings::TrainSettings;
@@ -37,25 +38,18 @@ use reachcast::{Error, Result};
 use training::{config, intervals, settings, task};
 
 /// The players of the double integrator and their critic.
-fn players<'a>(
-    system: &'a DoubleIntegrator,
-    backend: &'a Backend,
-    config: &Config,
-) -> Ddpg<'a, DoubleIntegrator, 2, 1> {
+fn players<'a>(system: &DoubleIntegrator, backend: &'a Backend, config: &Config) -> Ddpg<'a> {
     let game = Game {
         entries: config.disturbed(&system.states()).unwrap(),
         states: intervals(system),
         hidden: settings(config).hidden.clone(),
     };
-    Ddpg::new(task(system, backend, &Device::cpu(), config), game, settings(config).ddpg.clone())
+    let task = task(system, backend, &Device::cpu(), config);
+    Ddpg::new(task, game, settings(config).ddpg.clone()).unwrap()
 }
 
 /// The policy of the double integrator on its ordinary reward.
-fn pupil<'a>(
-    system: &'a DoubleIntegrator,
-    backend: &'a Backend,
-    config: &Config,
-) -> Ppo<'a, DoubleIntegrator, 2, 1> {
+fn pupil<'a>(system: &DoubleIntegrator, backend: &'a Backend, config: &Config) -> Ppo<'a> {
     let TrainSettings { ppo, hidden, .. } = settings(config);
     let goal = config.goal(&system.states()).unwrap();
     let reward = Reward { goal, weights: ppo.reward.clone() };
@@ -112,8 +106,14 @@ fn weakened(push: f32) -> DoubleIntegrator {
 /// The measure of full acceleration toward the origin in f64.
 fn best_measure(system: &DoubleIntegrator, start: [f64; 2]) -> f64 {
     let spec = RolloutSpec::new(100, 0.95).unwrap();
-    let policy = &BangBang { acceleration: system.acceleration };
-    measure(Plant { system, policy }, start.map(|x| x as f32), &spec, &Tightening::none(&spec))
+    let policy = BangBang { acceleration: system.acceleration };
+    let mut x = start.map(|x| f64::from(x as f32));
+    let margins = (0..=spec.horizon).map(|_| {
+        let margins = (system.target(x), system.constraint(x));
+        x = system.step(x, policy.control(x));
+        margins
+    });
+    reach_avoid(margins, f64::from(spec.gamma))
 }
 
 /// Values on a grid, bilinear between its points and constant beyond them.
@@ -148,15 +148,18 @@ impl Grid {
 #[test]
 fn the_backup_iterated_on_a_grid_is_the_reach_avoid_set() {
     let system = DoubleIntegrator::default();
+    let margins =
+        |x: [f64; 2]| Margins { target: system.target(x), constraint: system.constraint(x) };
     for push in [0.0_f32, 0.03] {
         let worth = |grid: &Grid, x: [f64; 2]| {
             let under = |u: f64, d: f64| {
-                let next = pushed(system.step(x, [u]), &[(1, push)], &[d]);
-                Margins::of(&system, next).hold(grid.at(next))
+                let mut next = system.step(x, [u]);
+                pushed(&mut next, &[(1, push)], &[d]);
+                margins(next).hold(grid.at(next))
             };
             let worst = |u: f64| under(u, -1.0).min(under(u, 1.0));
             let best = worst(-1.0).max(worst(0.0)).max(worst(1.0));
-            Margins::of(&system, x).backup(0.95, best)
+            margins(x).backup(0.95, best)
         };
         let points = || {
             let [rows, columns] = Grid::POINTS;
@@ -211,9 +214,9 @@ fn both_players_come_near_the_solution_of_the_game() {
     let after = learner.scores().unwrap();
     let starts = config.mixture(&system.states()).unwrap().draw(5, purpose::HELD_OUT, 0, 2048);
     let reached = |system: &DoubleIntegrator| {
-        let policy = &BangBang { acceleration: system.acceleration };
+        let plant = Plant::of(system.clone(), BangBang { acceleration: system.acceleration });
         let spec = config.spec().unwrap();
-        let found = successes(&backend, Plant { system, policy }, spec, &starts).unwrap();
+        let found = successes(&backend, &plant, spec, starts.view()).unwrap();
         share(found.into_iter())
     };
     let [calm, worst] = [reached(&system), reached(&weakened(push))];
@@ -281,12 +284,17 @@ fn plants_start_again_when_an_episode_is_over() {
     let mut plants = Environments::new(mixture, 3, 4, 3);
     assert_eq!(plants.ages, [0.0, 1.0, 2.0]);
     let next = [[0.5, 7.0], [0.5, f32::NAN], [9.0, 0.0]];
-    assert_eq!(plants.advance(0, &next, |x| x[0] > 1.0), [false, true, true]);
-    assert_eq!((plants.ages.as_slice(), plants.each()[0]), (&[1.0, 0.0, 0.0][..], next[0]));
-    let inside = |x: &[f32; 2]| x[0].abs() <= 1.2 && x[1].abs() <= 1.5;
-    assert!(plants.each()[1..].iter().all(inside));
+    let over = |i: usize| next[i][0] > 1.0;
+    assert_eq!(plants.advance(0, States::from(&next), over), [false, true, true]);
+    assert_eq!(
+        (plants.ages.as_slice(), plants.each().row(0)),
+        (&[1.0, 0.0, 0.0][..], &next[0][..])
+    );
+    let inside = |x: &[f32]| x[0].abs() <= 1.2 && x[1].abs() <= 1.5;
+    assert!(plants.each().iter().skip(1).all(inside));
     let next = [[0.0; 2]; 3];
-    let ended: Vec<bool> = (1..4).map(|k| plants.advance(k, &next, |_| false)[0]).collect();
+    let ended: Vec<bool> =
+        (1..4).map(|k| plants.advance(k, States::from(&next), |_| false)[0]).collect();
     assert_eq!(ended, [false, false, true]);
 }
 
@@ -298,7 +306,8 @@ fn a_disturbed_system_is_pushed_after_its_step() {
     let network = Mlp::new(vec![layer.clone()], Activation::Relu, OutputActivation::Tanh).unwrap();
     let (system, entries) = (DroneRace::default(), [(7, 0.01_f32), (9, 0.02), (11, 0.03)]);
     let x: [f64; 12] = std::array::from_fn(|i| 0.1 * i as f64 - 0.4);
-    let found = Disturbed::new(&system, &network, &entries).step(x, [0.3, -2.0, 0.1]);
+    let model = disturbed(&Model::of(system.clone()), &network.into(), &entries);
+    let found = model.next(&x, &[0.3, -2.0, 0.1], 0);
     let calm = system.step(x, [0.3, -2.0, 0.1]);
     for i in 0..12 {
         let push = entries.iter().position(|(state, _)| *state == i).map_or(0.0, |j| {
@@ -353,20 +362,27 @@ fn a_step_earns_progress_and_the_target() {
     let weights = settings(&config).ppo.reward.clone();
     let (target, violation) = (weights.target as f32, weights.violation as f32);
     let reward = Reward { goal: config.goal(&system.states()).unwrap(), weights };
+    let earned = |before: [f32; 12], after: [f32; 12]| {
+        let [before, after] = [&before, &after].map(|x| {
+            let margins = Margins { target: system.target(*x), constraint: system.constraint(*x) };
+            Visited { state: x, margins }
+        });
+        reward.of(before, after)
+    };
     let at = |x: f32, y: f32, vy: f32| [x, 0.0, y, vy, 0.0, 0.0, 0.0, 0.0, -1.0, 0.4, 0.0, 0.0];
     let near = |found: f32, expected: f32| assert!((found - expected).abs() < 1e-5, "{found}");
     // Ahead on the centre line, but slower: half a metre nearer and nothing else.
-    near(reward.of(&system, at(0.0, -0.6, 0.2), at(0.0, -0.1, 0.2)), 0.5);
+    near(earned(at(0.0, -0.6, 0.2), at(0.0, -0.1, 0.2)), 0.5);
     // And now faster: in the target.
-    near(reward.of(&system, at(0.0, -0.6, 0.2), at(0.0, -0.1, 0.6)), 0.5 + target);
-    near(reward.of(&system, at(0.0, -0.6, 0.6), at(0.0, -0.1, 0.2)), 0.5 - target);
+    near(earned(at(0.0, -0.6, 0.2), at(0.0, -0.1, 0.6)), 0.5 + target);
+    near(earned(at(0.0, -0.6, 0.6), at(0.0, -0.1, 0.2)), 0.5 - target);
     // Through the gate from within the target; past it from without.
-    near(reward.of(&system, at(0.0, -0.05, 0.6), at(0.0, 0.1, 0.6)), 0.15);
-    near(reward.of(&system, at(0.0, -0.05, 0.2), at(0.0, 0.1, 0.2)), 0.15 - violation);
+    near(earned(at(0.0, -0.05, 0.6), at(0.0, 0.1, 0.6)), 0.15);
+    near(earned(at(0.0, -0.05, 0.2), at(0.0, 0.1, 0.2)), 0.15 - violation);
     // Aside of the gate, behind its plane.
     let aside = at(0.6, 0.7, 0.2);
     let nearer = 0.6_f32.hypot(0.7) - 0.6_f32.hypot(0.2);
-    near(reward.of(&system, at(0.6, -0.2, 0.2), aside), nearer - violation);
+    near(earned(at(0.6, -0.2, 0.2), aside), nearer - violation);
 }
 
 /// On the double integrator the ordinary reward leads to the target: PPO finds most of what there
@@ -383,8 +399,8 @@ fn ppo_learns_to_reach() {
     }
     let after = learner.scores().unwrap()[0];
     let starts = config.mixture(&system.states()).unwrap().draw(5, purpose::HELD_OUT, 0, 2048);
-    let best = Plant { system: &system, policy: &BangBang { acceleration: 1.0 } };
-    let found = successes(&backend, best, config.spec().unwrap(), &starts).unwrap();
+    let best = Plant::of(system, BangBang { acceleration: 1.0 });
+    let found = successes(&backend, &best, config.spec().unwrap(), starts.view()).unwrap();
     let ceiling = share(found.into_iter());
     println!("{before:.3} to {after:.3} of {ceiling:.3}");
     assert!(after > before + 0.1 && after > 0.9 * ceiling && after <= ceiling);

@@ -3,8 +3,11 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
+use std::sync::Arc;
+
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
+use reachcast::model::Model;
 use reachcast::policy::{Activation, OutputActivation};
 use reachcast::rollout::{RolloutSpec, Stream, Tightening};
 use reachcast::system::System;
@@ -47,14 +50,19 @@ pub(crate) fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
 }
 
 /// What is trained on `system`, its tensors on `device`.
-pub(crate) fn task<'a, S: System<NX, NU>, const NX: usize, const NU: usize>(
-    system: &'a S,
+pub(crate) fn task<
+    'a,
+    S: System<NX, NU> + Clone + Send + Sync + 'static,
+    const NX: usize,
+    const NU: usize,
+>(
+    system: &S,
     backend: &'a Backend,
     device: &Device,
     config: &Config,
-) -> Task<'a, S, NX> {
+) -> Task<'a> {
     Task {
-        system,
+        model: Arc::new(Model::of(system.clone())),
         backend,
         device: device.clone(),
         spec: config.spec().unwrap(),
