@@ -427,6 +427,47 @@ fn ppo_that_was_interrupted_comes_to_the_same() {
     assert!(run(&parts, 2, &Unwatched).unwrap() == whole);
 }
 
+/// A run that an earlier program was stopped in goes on: what it asks for is asked for in the same
+/// words, its scores stay, and it comes to where an undisturbed run comes.
+#[test]
+fn a_run_of_an_earlier_program_goes_on() {
+    let fixture = |name: &str| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/training");
+        std::fs::read(folder.join(name)).unwrap()
+    };
+    let folder = Folder::new();
+    let [whole, resumed] = ["whole", "resumed"].map(|name| folder.path(name));
+    let run = |out: &str| {
+        let config = "tests/fixtures/training/ppo.toml";
+        document(&["train", config, "--out", out, "--backend", "cpu"])
+    };
+    let expected = run(&whole);
+    // The folder of another processor is another experiment: all but its name is as it was.
+    let asked = std::fs::read(format!("{whole}/experiment.json")).unwrap();
+    let [mut now, mut then] = [&asked, &fixture("experiment.json")]
+        .map(|bytes| serde_json::from_slice::<serde_json::Value>(bytes).unwrap());
+    [&mut now, &mut then].map(|asked| asked["provenance"]["device"].take());
+    assert_eq!(now, then);
+    std::fs::create_dir(&resumed).unwrap();
+    std::fs::write(format!("{resumed}/experiment.json"), asked).unwrap();
+    let checkpoint = fixture("checkpoint.safetensors");
+    std::fs::write(format!("{resumed}/checkpoint.safetensors"), &checkpoint).unwrap();
+    let found = run(&resumed);
+    let curve = |record: &serde_json::Value| record["curve"].as_array().unwrap().clone();
+    let (found, expected) = (curve(&found), curve(&expected));
+    let stored = String::from_utf8_lossy(&checkpoint).matches("iteration").count() - 1;
+    assert_eq!((stored, found.len(), expected.len()), (11, 31, 31));
+    for (found, expected) in found.iter().zip(&expected) {
+        let apart = |of: [&serde_json::Value; 2]| {
+            let [a, b] = of.map(|number| number.as_f64().unwrap_or_default());
+            (a - b).abs()
+        };
+        // Another processor sums in another order.
+        assert!(apart([&found["loss"], &expected["loss"]]) < 0.02, "{found} {expected}");
+        assert!(apart([&found["scores"][0], &expected["scores"][0]]) < 0.05, "{found} {expected}");
+    }
+}
+
 /// The command writes the networks of both methods, and a second run has nothing left to do.
 #[test]
 fn the_command_writes_what_was_trained() {

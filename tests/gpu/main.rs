@@ -14,6 +14,7 @@ mod infinite;
 #[path = "../learned/mod.rs"]
 mod learned;
 mod learned_plants;
+mod lost;
 mod measures;
 #[path = "../models/mod.rs"]
 mod models;
