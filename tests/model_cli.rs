@@ -40,6 +40,8 @@ fn assert_same_numbers(text: &Value, rust: &Value) {
     for field in ["deviation", "global", "growth", "slice", "constants", "state", "picture"] {
         assert_eq!(text[field], rust[field], "{field}");
     }
+    let hash = |record: &Value| record["provenance"]["physics_sha256"].clone();
+    assert_eq!(hash(text), hash(rust), "the formulas, as they are printed");
 }
 
 /// On the CPU to the last bit. Bodies and states make no difference.

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::{Law, Model, Plant};
-use crate::formula::Graph;
 use crate::formula::wgsl::function;
+use crate::formula::{Graph, Node};
 
 impl Plant {
     /// Every formula of the plant as a function, then the values of the parameters: equal texts are
@@ -43,10 +43,23 @@ impl Plant {
             writeln!(text, "// {name} = {value:?} ({:08x})", value.to_bits())
                 .expect("a String grows");
         }
-        if let Some(period) = model.period {
+        // Where no formula reads the time, how long a step lasts is in the formulas already.
+        if let Some(period) = model.period.filter(|_| self.reads_seconds()) {
             writeln!(text, "// period = {period:?} s").expect("a String grows");
         }
         text
+    }
+
+    /// Whether a formula reads the time in seconds, the last input but one of the model's.
+    fn reads_seconds(&self) -> bool {
+        let Self { model, controller } = self;
+        let laws = match &controller.law {
+            Law::Formula(graph) => [Some(graph), None],
+            Law::Network { observe, act, .. } => [observe.as_ref(), act.as_ref()],
+        };
+        let seconds = Node::Input(model.inputs() as u32 - 2);
+        let graphs = [&model.step, &model.target, &model.constraint].into_iter();
+        graphs.chain(laws.into_iter().flatten()).any(|graph| graph.nodes.contains(&seconds))
     }
 }
 
