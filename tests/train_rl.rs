@@ -446,7 +446,9 @@ fn a_run_of_an_earlier_program_goes_on() {
     let asked = std::fs::read(format!("{whole}/experiment.json")).unwrap();
     let [mut now, mut then] = [&asked, &fixture("experiment.json")]
         .map(|bytes| serde_json::from_slice::<serde_json::Value>(bytes).unwrap());
-    [&mut now, &mut then].map(|asked| asked["provenance"]["device"].take());
+    for asked in [&mut now, &mut then] {
+        asked["provenance"]["device"].take();
+    }
     assert_eq!(now, then);
     std::fs::create_dir(&resumed).unwrap();
     std::fs::write(format!("{resumed}/experiment.json"), asked).unwrap();
