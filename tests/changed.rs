@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use common::{backends, cpu};
 use reachcast::backend::Backend;
-use reachcast::formula::record;
+use reachcast::formula::{Expr, record};
 use reachcast::model::{Controller, Law, Model, Plant};
 use reachcast::race::{DroneRace, RaceCost, RaceReference, RecoveryCost};
 use reachcast::race::{Fence, Safety, SafetyCone};
@@ -43,7 +43,7 @@ fn another_parameter_or_formula_counts() {
     let by_hand = changed(|model| model.parameters[0].value = 0.6);
     let nowhere = changed(|model| {
         model.target =
-            record(model.inputs(), |inputs| vec![Real::lit(-1.0) + Real::lit(0.0) * inputs[0]]);
+            record(model.inputs(), |inputs| vec![Expr::lit(-1.0) + Expr::lit(0.0) * inputs[0]]);
     });
     let mut drifting = plant(DoubleIntegrator::default());
     let law = record(drifting.model.inputs(), |inputs| vec![inputs[0]]);
