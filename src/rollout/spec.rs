@@ -117,6 +117,7 @@ pub struct PairMeasure {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Farthest {
     /// Euclidean distance; [`super::HUGE`] where a state is not finite.
+    #[serde(with = "crate::files::number")]
     pub distance: f32,
     /// Index of the pair.
     pub pair: u64,

@@ -138,8 +138,10 @@ pub struct Axis {
     /// SI unit.
     pub unit: String,
     /// Lower end of the default box, or lower bound of a control.
+    #[serde(with = "crate::files::number::or_minus_infinite")]
     pub low: f32,
     /// Upper end.
+    #[serde(with = "crate::files::number::or_infinite")]
     pub high: f32,
 }
 
@@ -159,6 +161,7 @@ pub struct Parameter {
     /// SI unit.
     pub unit: String,
     /// Value.
+    #[serde(with = "crate::files::number")]
     pub value: f32,
 }
 
