@@ -17,7 +17,11 @@ pub(crate) struct Origin {
 
 impl Origin {
     /// That of the tally of `problem`, which is one of those of `task`.
-    pub(crate) fn new(planning: &Arc<Planning>, task: &MppiTask<'_>, problem: &MppiProblem) -> Self {
+    pub(crate) fn new(
+        planning: &Arc<Planning>,
+        task: &MppiTask<'_>,
+        problem: &MppiProblem,
+    ) -> Self {
         let &MppiTask { iteration, costs, .. } = task;
         Self { planning: Arc::clone(planning), problem: problem.clone(), iteration, costs }
     }
@@ -87,9 +91,7 @@ fn different(one: &Planning, other: &Planning) -> Option<&'static str> {
 fn same_value(one: Option<&ValueTerm>, other: Option<&ValueTerm>) -> bool {
     let numbers = |term: &ValueTerm| [term.weight, term.threshold];
     match (one, other) {
-        (Some(one), Some(other)) => {
-            numbers(one) == numbers(other) && one.network == other.network
-        }
+        (Some(one), Some(other)) => numbers(one) == numbers(other) && one.network == other.network,
         (one, other) => one.is_none() && other.is_none(),
     }
 }

@@ -181,8 +181,7 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         stored: Figure::Number(stored),
         found: Figure::Number(found),
         // Two that are infinite have no difference.
-        holds: stored == found
-            || (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
+        holds: stored == found || (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
     };
     let count = |name: &str, stored: u64, found: u64, of: u64| Finding {
         name: name.to_owned(),
