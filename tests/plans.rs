@@ -171,6 +171,21 @@ fn parts_of_different_plans_are_refused() {
     assert!(elsewhere.unwrap_err().to_string().contains("of two programs"));
 }
 
+#[test]
+fn models_whose_step_does_not_fit_are_refused() {
+    let planning = planning(|_| {});
+    let inputs = planning.model.inputs();
+    for (inputs, outputs) in [(inputs, 1), (inputs, 13), (1, 12)] {
+        let step = record(inputs, |x| vec![x[0]; outputs]);
+        let mut model = (*planning.model).clone();
+        model.step = step;
+        let planning = Planning { model: Arc::new(model), ..planning.clone() };
+        let refused = cpu(1).prepare_plans(&planning).err().unwrap().to_string();
+        assert!(refused.contains("model.step"), "{refused}");
+        assert!(refused.contains(&format!("{inputs} inputs and gives {outputs}")), "{refused}");
+    }
+}
+
 /// A network from the states.
 fn network(outputs: usize) -> Arc<Mlp> {
     let layer = |inputs: usize, outputs: usize, seed: usize| Layer {

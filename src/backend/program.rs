@@ -23,8 +23,10 @@ impl Backend {
     /// Prepares `plant`: its formulas for this backend, its network packed.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where network and model do not fit each other, and those of the device.
+    /// [`Error::Invalid`] where formulas, network and model do not fit each other, and those of the
+    /// device.
     pub fn prepare(&self, plant: &Plant) -> Result<Program<'_>> {
+        plant.check()?;
         let prepared = match self {
             Self::Cpu(cpu) => Prepared::Cpu(cpu, cpu.prepare(plant)?),
             Self::Gpu(gpu) => Prepared::Gpu(gpu.prepare(plant)?),

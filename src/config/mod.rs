@@ -26,7 +26,6 @@ pub use section::{
 pub use value::{Constant, Coordinates, Named};
 
 pub(crate) use plant::{check_network, no_formula};
-pub(crate) use settings::positive_f32;
 
 use std::path::Path;
 

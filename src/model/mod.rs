@@ -2,6 +2,7 @@
 
 mod compiled;
 mod controller;
+mod fit;
 mod identity;
 mod plant;
 mod recorded;
