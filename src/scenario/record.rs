@@ -15,7 +15,7 @@ pub const SCHEMA: u32 = 2;
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
 
-/// A margin as a record has it: JSON knows no infinity, so the largest number stands for it.
+/// A margin as a record has it: the largest number stands for infinity, as it does in a measure.
 pub(crate) fn finite_margin(margin: f32) -> f32 {
     margin.clamp(f32::MIN, f32::MAX)
 }
@@ -27,6 +27,9 @@ pub(crate) fn decimal(value: f32) -> f64 {
 }
 
 /// A stored certificate: everything in `certificate.json`.
+///
+/// A number that JSON has no word for stands between quotes: `"inf"`, `"-inf"`, `"nan"`. Older
+/// documents have `null` for an open bound and for a margin that is NaN, which are read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
