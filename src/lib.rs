@@ -52,6 +52,8 @@
 //! # Ok::<(), reachcast::Error>(())
 //! ```
 //!
+//! Plans for a model that is given as text take a cost as data: [`model::StageCost::new`] has an example.
+//!
 //! # A plant in Rust
 //!
 //! Formulas over [`real::Real`] are written once and run as SIMD lanes at full speed, in f64, as sound

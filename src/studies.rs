@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{Config, Profile, no_formula, positive_f32, profile};
+use crate::config::{Config, Profile, no_formula, profile};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::race::system::{Cone, DroneRace};
+use crate::scenario::limits::positive_f32;
 use crate::system::{BangBang, DoubleIntegrator};
 
 pub(crate) use crate::race::bench::export::export;

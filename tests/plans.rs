@@ -119,6 +119,73 @@ fn parts_that_overlap_or_are_missing_are_refused() {
     }
 }
 
+/// Numbers of another plan look like any others: only what they are of tells them apart.
+#[test]
+fn parts_of_different_plans_are_refused() {
+    let (one, two) = (cpu(1), cpu(2));
+    let (planning, problems) = (planning(|_| {}), problems());
+    let part = |planning: &Planning, task: MppiTask<'_>, samples: Range<u32>| {
+        one.prepare_plans(planning).unwrap().tally(&task, samples).unwrap().remove(0)
+    };
+    let first = part(&planning, task(&problems), 0..256);
+    let refused = |other: PlanTally, words: &str| {
+        let mut tally = first.clone();
+        let message = tally.merge(other).unwrap_err().to_string();
+        assert!(message.contains(words), "no `{words}` in: {message}");
+        assert_eq!(tally, first, "{words}: changed");
+    };
+    refused(part(&planning, task(&problems[1..]), 256..700), "another plan");
+    let later = problems.iter().map(|problem| problem.clone().at_step(3)).collect::<Vec<_>>();
+    refused(part(&planning, task(&later), 256..700), "another first step");
+    let next = MppiTask { iteration: 2, ..task(&problems) };
+    refused(part(&planning, next, 256..700), "of the iterations 1 and 2");
+    let summary = MppiTask { costs: CostQuery::Summary, ..task(&problems) };
+    refused(part(&planning, summary, 256..700), "with the cost of each sample");
+    let cooler = self::planning(|settings| settings.temperature = 1.0);
+    refused(part(&cooler, task(&problems), 256..700), "another specification of the samples");
+    let value = ValueTerm { network: network(1), weight: 1.0, threshold: 0.0 };
+    let valued = Planning { value: Some(value), ..planning.clone() };
+    refused(part(&valued, task(&problems), 256..700), "another value network");
+    let mut pushed = (*planning.model).clone();
+    pushed.parameters.iter_mut().for_each(|parameter| parameter.value += 0.1);
+    let pushed = Planning { model: Arc::new(pushed), ..planning.clone() };
+    refused(part(&pushed, task(&problems), 256..700), "another model");
+    let short = self::planning(|settings| settings.horizon = 3);
+    let cut = |numbers: &[f32]| numbers[..numbers.len() / HORIZON * 3].to_vec();
+    let cut = |problem: &MppiProblem| MppiProblem {
+        plan: cut(&problem.plan),
+        context: cut(&problem.context),
+        ..problem.clone()
+    };
+    refused(part(&short, task(&[cut(&problems[0])]), 256..700), "another horizon");
+
+    // Who runs it makes no difference.
+    let mut whole = first.clone();
+    let program = two.prepare_plans(&self::planning(|_| {})).unwrap();
+    whole.merge(program.tally(&task(&problems), 256..700).unwrap().remove(0)).unwrap();
+    let finished = program.finish(whole.clone(), &problems[0]).unwrap();
+    assert_eq!(finished, program.improve(&task(&problems)).unwrap()[0]);
+    let of_another = program.finish(whole.clone(), &problems[1]).unwrap_err().to_string();
+    assert!(of_another.contains("of two problems: another plan"), "{of_another}");
+    let elsewhere = one.prepare_plans(&cooler).unwrap().finish(whole, &problems[0]);
+    assert!(elsewhere.unwrap_err().to_string().contains("of two programs"));
+}
+
+#[test]
+fn models_whose_step_does_not_fit_are_refused() {
+    let planning = planning(|_| {});
+    let inputs = planning.model.inputs();
+    for (inputs, outputs) in [(inputs, 1), (inputs, 13), (1, 12)] {
+        let step = record(inputs, |x| vec![x[0]; outputs]);
+        let mut model = (*planning.model).clone();
+        model.step = step;
+        let planning = Planning { model: Arc::new(model), ..planning.clone() };
+        let refused = cpu(1).prepare_plans(&planning).err().unwrap().to_string();
+        assert!(refused.contains("model.step"), "{refused}");
+        assert!(refused.contains(&format!("{inputs} inputs and gives {outputs}")), "{refused}");
+    }
+}
+
 /// A network from the states.
 fn network(outputs: usize) -> Arc<Mlp> {
     let layer = |inputs: usize, outputs: usize, seed: usize| Layer {

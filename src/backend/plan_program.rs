@@ -1,16 +1,17 @@
 //! A plan program: model, cost and samples prepared on a backend once, for any number of plans.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::{Backend, cpu, gpu};
 use crate::error::{Error, Result};
-use crate::rollout::{MppiProblem, MppiResult, MppiTask, PlanTally, Planning};
+use crate::rollout::{MppiProblem, MppiResult, MppiTask, Origin, PlanTally, Planning};
 
 /// What is planned for, prepared on a backend: nothing that its calls could share is done again by
 /// any of them.
 pub struct PlanProgram<'a> {
     backend: &'a Backend,
-    planning: Planning,
+    planning: Arc<Planning>,
     prepared: Prepared<'a>,
 }
 
@@ -31,7 +32,7 @@ impl Backend {
             Self::Cpu(cpu) => Prepared::Cpu(cpu, Box::new(cpu.prepare_plans(planning))),
             Self::Gpu(gpu) => Prepared::Gpu(Box::new(gpu.prepare_plans(planning)?)),
         };
-        Ok(PlanProgram { backend: self, planning: planning.clone(), prepared })
+        Ok(PlanProgram { backend: self, planning: Arc::new(planning.clone()), prepared })
     }
 }
 
@@ -56,7 +57,7 @@ impl PlanProgram<'_> {
         let mut failed = Ok(());
         self.run(task, 0..self.planning.spec.settings().samples, &mut |tallies| {
             for tally in tallies {
-                match self.finish(tally, &task.problems[results.len()]) {
+                match tally.finish(&self.planning.spec, &task.problems[results.len()]) {
                     Ok(result) => results.push(result),
                     Err(error) => failed = Err(error),
                 }
@@ -75,14 +76,19 @@ impl PlanProgram<'_> {
     pub fn tally(&self, task: &MppiTask<'_>, samples: Range<u32>) -> Result<Vec<PlanTally>> {
         let mut all = Vec::with_capacity(task.problems.len());
         self.run(task, samples, &mut |tallies| all.extend(tallies))?;
-        Ok(all)
+        let known = |(tally, problem): (PlanTally, &MppiProblem)| {
+            tally.of(Origin::new(&self.planning, task, problem))
+        };
+        Ok(all.into_iter().zip(task.problems).map(known).collect())
     }
 
     /// The improved plan of `problem` from the tally of all its samples.
     ///
     /// # Errors
-    /// [`Error::Invalid`] naming the first sample that is missing.
+    /// [`Error::Invalid`] naming the first sample that is missing, or what differs where the tally is
+    /// of other plans or another problem.
     pub fn finish(&self, tally: PlanTally, problem: &MppiProblem) -> Result<MppiResult> {
+        tally.check(&self.planning, problem)?;
         tally.finish(&self.planning.spec, problem)
     }
 

@@ -3,8 +3,8 @@
 use crate::error::{Error, Result};
 use crate::rollout::{Region, RolloutSpec, Starts, Tightening};
 
-/// Refuses a range beyond its list of starts, a region whose sides have different lengths, and a
-/// tightening that has not one entry per step.
+/// Refuses a horizon or discount out of range, a range beyond its list of starts, a region whose sides
+/// have different lengths, and a tightening that has not one entry per step.
 ///
 /// # Errors
 /// [`Error::Invalid`] with the figures.
@@ -14,6 +14,7 @@ pub(super) fn check_task(
     tightening: &Tightening,
     spec: &RolloutSpec,
 ) -> Result<()> {
+    spec.check()?;
     if let Starts::Listed(list) = starts
         && end > list.len() as u64
     {
@@ -38,4 +39,31 @@ pub(super) fn check_task(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rollout::{MAX_HORIZON, States};
+
+    #[test]
+    fn specifications_made_by_hand_are_checked() {
+        let refusal = |horizon: u32, gamma: f32| {
+            let spec = RolloutSpec { horizon, gamma };
+            let starts = Starts::Listed(States::one(&[0.0]));
+            check_task(&starts, 1, &Tightening::none(&spec), &spec)
+        };
+        refusal(5, 1.0).expect("a specification");
+        for (horizon, gamma, words) in [
+            (0, 1.0, "horizon: 0 is not within"),
+            (MAX_HORIZON + 1, 1.0, "horizon: 10001 is not within"),
+            (5, 0.0, "gamma: 0 is outside"),
+            (5, -0.5, "gamma: -0.5 is outside"),
+            (5, 1.5, "gamma: 1.5 is outside"),
+            (5, f32::NAN, "gamma: NaN is outside"),
+        ] {
+            let found = refusal(horizon, gamma).expect_err(words).to_string();
+            assert!(found.contains(words), "no `{words}` in: {found}");
+        }
+    }
 }

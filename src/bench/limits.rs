@@ -30,11 +30,14 @@ const TRIAD_BYTES: usize = 3 * size_of::<f32>();
 #[serde(deny_unknown_fields)]
 pub struct HostLimits {
     /// f32 matrix products on one thread, floating-point operations per second: the best call.
+    #[serde(with = "crate::files::number")]
     pub gemm_one_flops: f64,
     /// The same on all threads, each with matrices of its own: the limit of every CPU workload.
+    #[serde(with = "crate::files::number")]
     pub gemm_all_flops: f64,
     /// `a = b + s c` over arrays larger than the caches on all threads, bytes per second: two
     /// numbers read and one written; that a cache may read the line it is to write is not counted.
+    #[serde(with = "crate::files::number")]
     pub triad_bytes: f64,
     /// Length of each of the three arrays, bytes.
     pub triad_array_bytes: usize,

@@ -15,8 +15,10 @@ const MOST_CALLS: usize = 10_000;
 pub struct Protocol {
     /// Calls are not counted until this has passed, s. A call that alone takes longer than
     /// `budget_seconds` is counted all the same: it has warmed up on its own.
+    #[serde(with = "crate::files::number")]
     pub warm_up_seconds: f64,
     /// Calls are repeated until this has passed, s.
+    #[serde(with = "crate::files::number")]
     pub budget_seconds: f64,
     /// Fewest calls that are counted.
     pub least_calls: usize,
@@ -36,12 +38,16 @@ pub struct Timing {
     /// How many there were.
     pub calls: usize,
     /// The median.
+    #[serde(with = "crate::files::number")]
     pub median_seconds: f64,
     /// The shortest.
+    #[serde(with = "crate::files::number")]
     pub best_seconds: f64,
     /// One in ten took no longer.
+    #[serde(with = "crate::files::number")]
     pub p10_seconds: f64,
     /// One in ten took no less.
+    #[serde(with = "crate::files::number")]
     pub p90_seconds: f64,
 }
 

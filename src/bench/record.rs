@@ -75,19 +75,25 @@ pub struct WorkloadRecord {
     /// Units of a call.
     pub units: u64,
     /// Steps of a unit, a mean where they end early.
+    #[serde(with = "crate::files::number")]
     pub steps_per_unit: f64,
     /// Floating-point operations of a unit.
+    #[serde(with = "crate::files::number")]
     pub flops_per_unit: f64,
     /// Time of a call.
     pub timing: Timing,
     /// Units per second, at the median.
+    #[serde(with = "crate::files::number")]
     pub units_per_second: f64,
     /// Steps per second, at the median.
+    #[serde(with = "crate::files::number")]
     pub steps_per_second: f64,
     /// Floating-point operations per second, at the median.
+    #[serde(with = "crate::files::number")]
     pub flops_per_second: f64,
     /// Rate of the best call over the limit of its backend, both undisturbed: matrix products of the
     /// CPU, multiply-adds in the adapter's registers.
+    #[serde(with = "crate::files::number")]
     pub share: f64,
     /// Time on the adapter by kernel, of one more call; empty on the CPU, and where the adapter has
     /// no timestamps.
@@ -103,6 +109,7 @@ pub struct KernelRecord {
     /// How often it was dispatched.
     pub dispatches: u64,
     /// Time of all of them, s.
+    #[serde(with = "crate::files::number")]
     pub seconds: f64,
 }
 
@@ -129,6 +136,7 @@ pub struct ScalingRecord {
     /// Time of a call.
     pub timing: Timing,
     /// Rollouts per second, at the median.
+    #[serde(with = "crate::files::number")]
     pub rollouts_per_second: f64,
     /// Most memory that the process held during these calls, bytes; none where the system does
     /// not tell.

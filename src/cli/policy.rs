@@ -204,7 +204,9 @@ struct Inspect {
     #[serde(flatten)]
     network: Inspection,
     /// Corners of the box that the actions are over.
+    #[serde(with = "crate::files::number")]
     low: Vec<f32>,
+    #[serde(with = "crate::files::number")]
     high: Vec<f32>,
     actions: Vec<Action>,
     /// Random states that `seen` is over.
@@ -217,8 +219,10 @@ struct Inspect {
 struct Action {
     name: String,
     /// By interval arithmetic: every state of the box.
+    #[serde(with = "crate::files::number")]
     interval: [f64; 2],
     /// Of the random states.
+    #[serde(with = "crate::files::number")]
     seen: [f32; 2],
 }
 

@@ -38,8 +38,10 @@ struct Summary {
     successes: u64,
     non_finite: u64,
     /// Two-sided 95 % interval of the success rate (Clopper-Pearson).
+    #[serde(with = "crate::files::number")]
     success_interval: [f64; 2],
     horizon: u32,
+    #[serde(with = "crate::files::number")]
     gamma: f32,
     measures: String,
     backend: String,
@@ -47,6 +49,7 @@ struct Summary {
     events: Vec<Event>,
     /// What the samples do not tell.
     notes: Vec<String>,
+    #[serde(with = "crate::files::number")]
     wall_seconds: f64,
 }
 

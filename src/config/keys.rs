@@ -3,6 +3,7 @@
 use toml::{Table, Value};
 
 use crate::error::{Error, Result};
+use crate::formula::text::meant;
 
 /// The document that `section.key=value` stands for; the value in TOML, or else a string.
 pub(super) fn parse_assignment(text: &str) -> Result<Table> {
@@ -185,7 +186,10 @@ fn suggestion(root: &Table, valid: &Table, prefix: &str, key: &str) -> String {
     match (namesakes.is_empty(), prefix.is_empty() || siblings.is_empty()) {
         (false, _) => nearest(&path, &namesakes).to_owned(),
         (true, true) => nearest(&path, &all).to_owned(),
-        (true, false) => format!("{prefix}{}", nearest(key, &siblings)),
+        (true, false) => {
+            let meant = meant(key, siblings.iter().map(String::as_str));
+            format!("{prefix}{}", meant.unwrap_or_else(|| nearest(key, &siblings)))
+        }
     }
 }
 

@@ -4,6 +4,7 @@ mod counts;
 mod keys;
 mod layers;
 mod model;
+mod open;
 mod plant;
 pub(crate) mod profile;
 mod section;
@@ -25,7 +26,6 @@ pub use section::{
 pub use value::{Constant, Coordinates, Named};
 
 pub(crate) use plant::{check_network, no_formula};
-pub(crate) use settings::positive_f32;
 
 use std::path::Path;
 
@@ -107,7 +107,7 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_json(&self) -> Result<serde_json::Value> {
-        stored(&Self { train: None, ..self.clone() })
+        stored(Self { train: None, ..self.clone() })
     }
 
     /// The configuration as training stores it, every default filled in, without the section `race`.
@@ -115,7 +115,7 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_train_json(&self) -> Result<serde_json::Value> {
-        stored(&Self { study: None, ..self.clone() })
+        stored(Self { study: None, ..self.clone() })
     }
 
     /// The configuration that a certificate stores.
@@ -125,7 +125,10 @@ impl Config {
     pub fn from_json(value: &serde_json::Value) -> Result<Self> {
         let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("provenance.config: {e}"));
         unknown_plant(value).map_or(Ok(()), Err)?;
-        let config = Self::deserialize(value).map_err(|e| refused(&e))?;
+        let mut value = value.clone();
+        open::of_nulls(&mut value);
+        let mut config = Self::deserialize(&value).map_err(|e| refused(&e))?;
+        config.model.iter_mut().for_each(open::of_words);
         config.policy.check(config.train.is_some()).map_err(|e| refused(&e))?;
         Ok(config)
     }
@@ -152,9 +155,10 @@ fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
 }
 
 /// A configuration as JSON.
-fn stored(config: &Config) -> Result<serde_json::Value> {
+fn stored(mut config: Config) -> Result<serde_json::Value> {
+    config.model.iter_mut().for_each(open::to_words);
     // By way of the text, in which an f32 is the shortest decimal that stands for it.
-    let text = serde_json::to_string(config);
+    let text = serde_json::to_string(&config);
     text.and_then(|text| serde_json::from_str(&text))
         .map_err(|e| Error::invalid("configuration", e.to_string()))
 }

@@ -41,16 +41,28 @@ impl Config {
     /// The policy; a file is sought relative to `folder`, where the configuration lies.
     ///
     /// # Errors
-    /// Those of [`PolicySource::read`]; [`Error::Invalid`] without file and formula.
+    /// Those of [`PolicySource::read`], of a model with the key that names the file, as
+    /// [`Error::Invalid`]; [`Error::Invalid`] without file and formula.
     pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
         let missing = || self.placed(Error::invalid("policy", "neither `file` nor `formula`"));
         match (&self.policy.file, &self.policy.formula) {
-            (Some(file), _) => PolicySource::read(folder.join(file)),
+            (Some(file), _) => PolicySource::read(folder.join(file)).map_err(|e| self.of_key(e)),
             (None, Some(FormulaSection::Name(name))) => Ok(PolicySource::Formula(name.clone())),
             (None, Some(FormulaSection::Controls(_))) => {
                 Ok(PolicySource::Formula("formula".to_owned()))
             }
             (None, None) => Err(missing()),
+        }
+    }
+
+    /// What is wrong with the file of the policy, for a model at the key that names it.
+    fn of_key(&self, error: Error) -> Error {
+        match error {
+            Error::File { path, problem } if self.model.is_some() => {
+                let problem = format!("{}: {problem}", path.display());
+                self.placed(Error::invalid("policy.file", problem))
+            }
+            other => other,
         }
     }
 

@@ -5,6 +5,7 @@ use super::section::{Config, SliceAxisSection};
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
+use crate::scenario::limits::{finite, positive, positive_f32};
 use crate::scenario::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings, SliceAxis,
 };
@@ -14,10 +15,6 @@ use crate::system::Axis;
 const MOST_VALUES: f64 = 4096.0;
 /// Most cells of a slice: states, margins and picture of more would not fit a small machine.
 const MOST_CELLS: usize = 1 << 20;
-/// Most rollouts or pairs of a sample: a fast GPU's work of a day.
-const MOST_SAMPLES: u64 = 1_000_000_000_000;
-/// Most rounds of growth: each has a random stream of its own.
-const MOST_ROUNDS: u32 = 10_000;
 
 impl Config {
     /// Length and discount of a rollout.
@@ -63,10 +60,7 @@ impl Config {
                 constraint: constant("constants.constraint", self.constants.constraint)?,
             },
             deviation: self.deviation_settings()?,
-            global: GlobalSettings {
-                draws: sample_size("global.draws", self.global.draws)?,
-                beta: share("global.beta", self.global.beta)?,
-            },
+            global: self.global_settings()?,
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
@@ -88,36 +82,40 @@ impl Config {
     /// The deviation bound.
     pub(super) fn deviation_settings(&self) -> Result<DeviationSettings> {
         let asked = self.deviation;
-        Ok(DeviationSettings {
+        let settings = DeviationSettings {
             radius: positive_f32("deviation.radius", asked.radius)?,
-            epsilon: share("deviation.epsilon", asked.epsilon)?,
-            beta: share("deviation.beta", asked.beta)?,
-            scenarios: sample_size("deviation.scenarios", asked.scenarios)?,
-            pilot: sample_size("deviation.pilot", asked.pilot)?,
+            epsilon: asked.epsilon,
+            beta: asked.beta,
+            scenarios: asked.scenarios,
+            pilot: asked.pilot,
             joint: asked.joint,
             control: asked.control,
             source: asked.source,
-        })
+        };
+        settings.check().map(|()| settings)
+    }
+
+    /// The certified set.
+    fn global_settings(&self) -> Result<GlobalSettings> {
+        let settings = GlobalSettings { draws: self.global.draws, beta: self.global.beta };
+        settings.check().map(|()| settings)
     }
 
     /// Local growth.
     fn growth_settings(&self, axes: &[Axis]) -> Result<GrowthSettings> {
         let asked = &self.growth;
-        if !(1..=MOST_ROUNDS).contains(&asked.rounds) {
-            let problem = format!("{} is not within 1..={MOST_ROUNDS}", asked.rounds);
-            return Err(Error::invalid("growth.rounds", problem));
-        }
-        Ok(GrowthSettings {
+        let settings = GrowthSettings {
             radius: positive_f32("growth.radius", asked.radius)?,
             rounds: asked.rounds,
-            scenarios: sample_size("growth.scenarios", asked.scenarios)?,
-            epsilon: share("growth.epsilon", asked.epsilon)?,
-            beta: share("growth.beta", asked.beta)?,
+            scenarios: asked.scenarios,
+            epsilon: asked.epsilon,
+            beta: asked.beta,
             split_beta: asked.split_beta,
             varies: self.varies(axes)?,
             boundary: asked.boundary,
             heading: self.heading(axes)?,
-        })
+        };
+        settings.check().map(|()| settings)
     }
 
     /// The coordinates of growth that vary.
@@ -261,45 +259,4 @@ fn in_order<T: Copy, U>(
         check(&key, value)
     };
     axes.iter().map(value).collect()
-}
-
-/// `value` as an f32, finite.
-fn finite(key: &str, value: f64) -> Result<f32> {
-    let single = value as f32;
-    if single.is_finite() {
-        return Ok(single);
-    }
-    Err(Error::invalid(key, format!("{value} is not a finite number")))
-}
-
-/// `value`, finite and above 0.
-fn positive(key: &str, value: f64) -> Result<f64> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(value);
-    }
-    Err(Error::invalid(key, format!("{value} is not a positive number")))
-}
-
-/// `value` as an f32, finite and above 0.
-pub(crate) fn positive_f32(key: &str, value: f64) -> Result<f32> {
-    let single = value as f32;
-    positive(key, value)?;
-    positive(key, f64::from(single))?;
-    Ok(single)
-}
-
-/// `value`, strictly between 0 and 1.
-fn share(key: &str, value: f64) -> Result<f64> {
-    if value > 0.0 && value < 1.0 {
-        return Ok(value);
-    }
-    Err(Error::invalid(key, format!("{value} is not strictly between 0 and 1")))
-}
-
-/// `count`, at least 1 and no more than can be rolled out.
-fn sample_size(key: &str, count: u64) -> Result<u64> {
-    if (1..=MOST_SAMPLES).contains(&count) {
-        return Ok(count);
-    }
-    Err(Error::invalid(key, format!("{count} is not within 1..={MOST_SAMPLES}")))
 }

@@ -12,7 +12,7 @@ use crate::real::Real;
 
 /// The cost of one stage of a plan, `l(x_t, u_t, context_t)`.
 ///
-/// Parameters are recorded as literals, like those of a system; what changes from problem to
+/// Numbers are recorded as literals; what changes from problem to
 /// problem or from step to step comes through the `NC >= 1` numbers of the context. Mark the
 /// formula `#[inline(always)]`.
 pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {

@@ -14,6 +14,7 @@ mod list;
 mod made;
 #[cfg(feature = "cli")]
 mod npz;
+pub(crate) mod number;
 mod plain;
 mod states;
 #[cfg(feature = "cli")]

@@ -59,7 +59,62 @@ impl fmt::Debug for StageCost {
 }
 
 impl StageCost {
-    /// A cost as data, without anything compiled.
+    /// A cost as data, without anything compiled: what plans for a model that is given as text need.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// use std::sync::Arc;
+    /// use reachcast::backend::Backend;
+    /// use reachcast::formula::record;
+    /// use reachcast::model::{StageCost, text};
+    /// use reachcast::rollout::{
+    ///     CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, Planning, Purpose, Stream,
+    /// };
+    ///
+    /// let text = r#"
+    /// [model]
+    /// name = "cart"
+    /// [model.states]
+    /// position = { unit = "m", box = [-1.0, 1.0] }
+    /// velocity = { unit = "m/s", box = [-1.0, 1.0] }
+    /// [model.controls]
+    /// force = { unit = "N", bounds = [-1.0, 1.0] }
+    /// [model.flow]
+    /// position = "velocity"
+    /// velocity = "force"
+    /// [model.time]
+    /// period = 0.1
+    /// integrator = "rk4"
+    /// [model.task]
+    /// kind = "reach-avoid"
+    /// target = "0.1 - hypot(position, velocity)"
+    /// constraint = "1.5 - abs(position)"
+    /// "#;
+    /// let model = Arc::new(text::read(text, "cart.toml", Path::new("."))?.model()?);
+    ///
+    /// // The square of the distance from a goal, which each stage is told behind the model's inputs.
+    /// let goal = model.inputs();
+    /// let stage = record(goal + 1, |x| {
+    ///     let off = x[0] - x[goal];
+    ///     vec![off * off]
+    /// });
+    /// let samples = MppiSettings::new(&model.controls, 256, 20);
+    /// let planning = Planning {
+    ///     model,
+    ///     cost: Arc::new(StageCost::new(stage, 1, None)),
+    ///     spec: Arc::new(MppiSpec::new(MppiSettings { temperature: 0.1, ..samples })?),
+    ///     value: None,
+    ///     disturbance: None,
+    /// };
+    /// let backend = Backend::cpu()?;
+    /// let program = backend.prepare_plans(&planning)?;
+    /// let stream = Stream::new(1, Purpose::CONTROL_NOISE, 0);
+    /// let problem = MppiProblem::new([-0.5, 0.0], &[[0.0]; 20], &[[0.5]; 20], stream);
+    /// let task = MppiTask { problems: &[problem], iteration: 0, costs: CostQuery::Summary };
+    /// let improved = program.improve(&task)?;
+    /// assert!(improved[0].plan[0] > 0.0, "it sets off to the right");
+    /// # Ok::<(), reachcast::Error>(())
+    /// ```
     pub fn new(stage: Graph, contexts: usize, map: Option<MapCost>) -> Self {
         Self { stage, contexts, map, native: None }
     }

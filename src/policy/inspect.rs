@@ -34,6 +34,7 @@ pub struct Inspection {
     pub layers: Vec<LayerInspection>,
     /// Upper bound of the Lipschitz constant in the Euclidean norm, over all inputs: the product
     /// of the layers' spectral norms and the slopes of the activations.
+    #[serde(with = "crate::files::number")]
     pub lipschitz_bound: f64,
 }
 
@@ -45,10 +46,13 @@ pub struct LayerInspection {
     /// Rows of the weight.
     pub outputs: usize,
     /// Least and largest weight.
+    #[serde(with = "crate::files::number")]
     pub weight_range: [f32; 2],
     /// Least and largest bias.
+    #[serde(with = "crate::files::number")]
     pub bias_range: [f32; 2],
     /// Upper bound of the spectral norm of the weight, at most 1.0001 times the norm.
+    #[serde(with = "crate::files::number")]
     pub spectral_norm: f64,
 }
 

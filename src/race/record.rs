@@ -30,6 +30,7 @@ pub struct RaceRecord {
     /// Longest race, control steps.
     pub steps: u32,
     /// Duration of a control step, s.
+    #[serde(with = "crate::files::number")]
     pub step_seconds: f64,
     /// The starts.
     pub starts: StartsRecord,
@@ -56,6 +57,7 @@ pub struct BoundsRecord {
     /// The deviation bound and its claim.
     pub deviation: DeviationRecord,
     /// Measures this close to zero were run again in f64.
+    #[serde(with = "crate::files::number")]
     pub band: f64,
 }
 
@@ -117,10 +119,13 @@ pub struct JudgedRecord {
     /// Successes with each noise seed, in the order of the seeds, each out of all starts.
     pub successes: Vec<u64>,
     /// Mean success rate over the seeds.
+    #[serde(with = "crate::files::number")]
     pub rate: f64,
     /// 95 % interval (Clopper-Pearson) of the run with the first seed, as the published ones are.
+    #[serde(with = "crate::files::number")]
     pub interval: [f64; 2],
     /// Standard deviation of the rate between seeds; none for one seed.
+    #[serde(with = "crate::files::number", default)]
     pub spread: Option<f64>,
     /// How the others failed, summed over seeds; every class, also those without failures.
     pub failures: Vec<FailureRecord>,
@@ -143,8 +148,10 @@ pub struct FailureRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PublishedRecord {
     /// Share of 500 races.
+    #[serde(with = "crate::files::number")]
     pub rate: f64,
     /// Clopper-Pearson.
+    #[serde(with = "crate::files::number")]
     pub interval: [f64; 2],
 }
 
@@ -156,10 +163,13 @@ pub struct PairedRecord {
     /// Starts, with the first noise seed, where the other one alone succeeded.
     pub only_other: u64,
     /// Two-sided exact p-value of McNemar's test on these two counts.
+    #[serde(with = "crate::files::number")]
     pub p_value: f64,
     /// Difference of the mean rates, this one less the other, over all seeds.
+    #[serde(with = "crate::files::number")]
     pub difference: f64,
     /// 95 % interval of the difference: normal, over starts, seeds averaged within each start.
+    #[serde(with = "crate::files::number")]
     pub interval: [f64; 2],
 }
 
@@ -171,16 +181,22 @@ pub struct MetricsRecord {
     /// Number of races averaged.
     pub races: u64,
     /// Time to the gate, s.
+    #[serde(with = "crate::files::number")]
     pub time_seconds: f64,
     /// Length of the ego's path, m.
+    #[serde(with = "crate::files::number")]
     pub path_m: f64,
     /// Mean jerk, m/s^3.
+    #[serde(with = "crate::files::number")]
     pub jerk: f64,
     /// Mean acceleration, m/s^2.
+    #[serde(with = "crate::files::number")]
     pub acceleration: f64,
     /// Mean over races of the smallest distance of the two drones, m.
+    #[serde(with = "crate::files::number")]
     pub separation_m: f64,
     /// Smallest distance in any of them, m.
+    #[serde(with = "crate::files::number")]
     pub least_separation_m: f64,
 }
 
@@ -190,6 +206,7 @@ pub struct TierRecord {
     /// Per control step, races in tier 0, 1, 2, 3, and races that are over, summed over seeds.
     pub occupancy: Vec<[u64; 5]>,
     /// Share of all control steps flown in each tier.
+    #[serde(with = "crate::files::number")]
     pub shares: [f64; 4],
     /// Calls of local growth.
     pub growth_calls: u64,
@@ -203,13 +220,17 @@ pub struct TierRecord {
     pub f64_reruns: u64,
     /// Beta spent on the deviation bound, once for all races; for each step where the steps were
     /// bounded separately.
+    #[serde(with = "crate::files::number")]
     pub beta_deviation: f64,
     /// Beta of one call of growth; 0 where none is made.
+    #[serde(with = "crate::files::number")]
     pub beta_call: f64,
     /// Most that a single race spent, the deviation bound included.
+    #[serde(with = "crate::files::number")]
     pub beta_race: f64,
     /// Sum over all races and calls of this controller, the deviation bound once: by the union bound
     /// all its claims hold together with at least one minus this; above 1 it says nothing.
+    #[serde(with = "crate::files::number")]
     pub beta_total: f64,
 }
 
@@ -240,8 +261,10 @@ pub struct PictureRecord {
     /// Verdict under each judge; none for a success.
     pub verdicts: Vec<(Judge, Option<FailureClass>)>,
     /// Columns of the slices, ego x, m.
+    #[serde(with = "crate::files::number")]
     pub slice_x: Vec<f32>,
     /// Rows of the slices, ego y, m.
+    #[serde(with = "crate::files::number")]
     pub slice_y: Vec<f32>,
     /// One frame per control step, then one for the last state.
     pub frames: Vec<FrameRecord>,
@@ -253,20 +276,25 @@ pub struct FrameRecord {
     /// Control step.
     pub step: u32,
     /// State, in state order.
+    #[serde(with = "crate::files::number")]
     pub x: Vec<f32>,
     /// Control applied; none in the last frame.
+    #[serde(with = "crate::files::number", default)]
     pub u: Option<Vec<f32>>,
     /// Tier; none in the last frame and for controllers without tiers.
     pub tier: Option<u8>,
     /// `V_check` of the state.
+    #[serde(with = "crate::files::number", default)]
     pub check_margin: Option<f32>,
     /// Certified cells of the slice through the state, `[rows, columns]`; none where not computed.
     pub certified: Option<Vec<bool>>,
     /// Ball of local growth in the x-y plane; none where growth was not asked.
     pub ball: Option<FrameBall>,
     /// Point that the recovery steers toward, x and y, m.
+    #[serde(with = "crate::files::number", default)]
     pub recovery: Option<[f32; 2]>,
     /// Sampled plans: x and y of the ego over the planning horizon, m.
+    #[serde(with = "crate::files::number")]
     pub fan: Vec<Vec<[f32; 2]>>,
 }
 
@@ -274,8 +302,10 @@ pub struct FrameRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameBall {
     /// Ego x and y of the centre, m.
+    #[serde(with = "crate::files::number")]
     pub center: [f32; 2],
     /// Last radius tried, m.
+    #[serde(with = "crate::files::number")]
     pub radius: f32,
     /// Whether it passed clean.
     pub verified: bool,

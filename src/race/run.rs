@@ -70,10 +70,13 @@ pub struct TimingRecord {
     /// Control steps, over all races and seeds.
     pub steps: u64,
     /// Mean share of a race in the wall time of a step, s.
+    #[serde(with = "crate::files::number")]
     pub mean_seconds: f64,
     /// The share that 99 % of the steps stay below, s.
+    #[serde(with = "crate::files::number")]
     pub p99_seconds: f64,
     /// The largest share, s.
+    #[serde(with = "crate::files::number")]
     pub most_seconds: f64,
 }
 

@@ -15,6 +15,7 @@ mod sample;
 mod spec;
 mod starts;
 mod tally;
+mod tally_origin;
 
 pub use crate::files::{StateList, States};
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
@@ -37,3 +38,4 @@ pub use spec::{
 pub use starts::{Pairs, Starts};
 pub(crate) use tally::Partial;
 pub use tally::PlanTally;
+pub(crate) use tally_origin::Origin;

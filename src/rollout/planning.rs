@@ -177,10 +177,11 @@ impl Planning {
     /// Refuses parts that do not fit each other.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for bounds that are not those of as many controls as the model has, a cost
-    /// for another model, a network of the wrong shape, or a weight, threshold or scale that is not
+    /// [`Error::Invalid`] for a step that is none of the model, bounds that are not those of as many
+    /// controls as the model has, a cost for another model, a network of the wrong shape, or a weight, threshold or scale that is not
     /// finite.
     pub(crate) fn check(&self) -> Result<()> {
+        self.check_step()?;
         let (has, controls) = (self.spec.controls(), self.model.controls.len());
         if has != controls {
             let text = format!("has bounds of {has} controls; the model has {controls}");
@@ -189,6 +190,20 @@ impl Planning {
         self.cost.check(&self.model)?;
         self.check_value()?;
         self.check_disturbance()
+    }
+
+    fn check_step(&self) -> Result<()> {
+        let Model { step, states, .. } = &*self.model;
+        let [has, need] = [[step.inputs, step.outputs.len()], [self.model.inputs(), states.len()]];
+        if !states.is_empty() && has == need {
+            return Ok(());
+        }
+        let text = format!(
+            "the formula takes {} inputs and gives {} numbers; {} and {} are needed, one state at \
+             least",
+            has[0], has[1], need[0], need[1]
+        );
+        Err(Error::invalid("model.step", text))
     }
 
     fn check_value(&self) -> Result<()> {

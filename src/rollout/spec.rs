@@ -25,6 +25,13 @@ impl RolloutSpec {
     /// # Errors
     /// [`Error::Invalid`] if the horizon is 0 or above [`MAX_HORIZON`], or gamma is outside (0, 1].
     pub fn new(horizon: u32, gamma: f32) -> Result<Self> {
+        let spec = Self { horizon, gamma };
+        spec.check().map(|()| spec)
+    }
+
+    /// Refuses a specification that [`RolloutSpec::new`] would not make.
+    pub(crate) fn check(&self) -> Result<()> {
+        let &Self { horizon, gamma } = self;
         if !(1..=MAX_HORIZON).contains(&horizon) {
             let problem = format!("{horizon} is not within 1..={MAX_HORIZON} steps");
             return Err(Error::invalid("horizon", problem));
@@ -32,7 +39,7 @@ impl RolloutSpec {
         if !(gamma > 0.0 && gamma <= 1.0) {
             return Err(Error::invalid("gamma", format!("{gamma} is outside (0, 1]")));
         }
-        Ok(Self { horizon, gamma })
+        Ok(())
     }
 }
 
@@ -117,6 +124,7 @@ pub struct PairMeasure {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Farthest {
     /// Euclidean distance; [`super::HUGE`] where a state is not finite.
+    #[serde(with = "crate::files::number")]
     pub distance: f32,
     /// Index of the pair.
     pub pair: u64,

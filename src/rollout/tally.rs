@@ -1,9 +1,11 @@
 //! Improved plans by parts: blocks of samples, added in any order and cut, merged to the same bits.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::mppi::MppiSpec;
-use super::planning::{MppiProblem, MppiResult};
+use super::planning::{MppiProblem, MppiResult, Planning};
+use super::tally_origin::Origin;
 use crate::error::{Error, Result};
 
 /// The samples of a block, weighted against the smallest cost among them.
@@ -92,9 +94,12 @@ impl Partial {
 /// What some samples of a problem come to: blocks by the number of their first sample.
 ///
 /// Blocks are merged in order when the tally is finished, so its bits depend on how the samples are
-/// cut into blocks, and neither on who ran which range nor on the order in which tallies met.
+/// cut into blocks, and neither on who ran which range nor on the order in which tallies met. A tally
+/// knows the plans, the problem and the iteration that it is of; an empty one is of any.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanTally {
+    /// What it is of; none before it has met another.
+    origin: Option<Origin>,
     blocks: BTreeMap<u32, Block>,
 }
 
@@ -112,6 +117,11 @@ impl PlanTally {
         self.blocks.insert(first, Block { partial, costs });
     }
 
+    /// The same, known to be of `origin`.
+    pub(crate) fn of(self, origin: Origin) -> Self {
+        Self { origin: Some(origin), ..self }
+    }
+
     /// Samples so far.
     pub fn samples(&self) -> u32 {
         self.blocks.values().map(|block| block.partial.count).sum()
@@ -120,8 +130,12 @@ impl PlanTally {
     /// Adds the samples of `other`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if both have the same sample; neither is changed then.
+    /// [`Error::Invalid`] if both have the same sample, or if they are of different plans, problems or
+    /// iterations, saying what differs; neither is changed then.
     pub fn merge(&mut self, other: Self) -> Result<()> {
+        if let (Some(origin), Some(another)) = (&self.origin, &other.origin) {
+            origin.check_same(another)?;
+        }
         for (&first, block) in &other.blocks {
             let end = first + block.partial.count;
             let before = self.blocks.range(..end).next_back();
@@ -134,15 +148,24 @@ impl PlanTally {
                 return Err(Error::invalid("tally", problem));
             }
         }
+        self.origin = self.origin.take().or(other.origin);
         self.blocks.extend(other.blocks);
         Ok(())
     }
 
-    /// The improved plan of `problem`.
+    /// Refuses plans and a problem that this is not of.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] saying what differs.
+    pub(crate) fn check(&self, planning: &Arc<Planning>, problem: &MppiProblem) -> Result<()> {
+        self.origin.as_ref().map_or(Ok(()), |origin| origin.check(planning, problem))
+    }
+
+    /// The improved plan of `problem`, which this is of.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the first sample that is missing.
-    pub fn finish(self, spec: &MppiSpec, problem: &MppiProblem) -> Result<MppiResult> {
+    pub(crate) fn finish(self, spec: &MppiSpec, problem: &MppiProblem) -> Result<MppiResult> {
         let settings = spec.settings();
         let mut all = Partial::none(spec.horizon() * spec.controls());
         let mut costs = Vec::new();

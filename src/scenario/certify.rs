@@ -77,12 +77,13 @@ pub fn certify(
     })
 }
 
-/// Refuses settings whose claims could not be made, as far as that shows without work: scenarios
-/// that are too few, claims that spend more than 1 together, an empty box.
+/// Refuses settings whose claims could not be made, as far as that shows without work: numbers out of
+/// range, scenarios that are too few, claims that spend more than 1 together, an empty box.
 ///
 /// # Errors
 /// [`crate::Error::TooFewScenarios`] and [`crate::Error::Invalid`].
 pub fn check_settings(settings: &Settings) -> Result<()> {
+    settings.check()?;
     growth::check_scenarios(&settings.growth)?;
     deviation::check_scenarios(&settings.deviation, settings.spec.horizon)?;
     ledger(settings)?;

@@ -27,14 +27,17 @@ pub struct Claim {
     #[serde(deserialize_with = "present")]
     pub epsilon: Option<f64>,
     /// One minus the confidence asked for, before any split.
+    #[serde(with = "crate::files::number")]
     pub beta: f64,
     /// Beta of this very draw, after the split over rounds or steps.
+    #[serde(with = "crate::files::number")]
     pub beta_used: f64,
     /// Scenarios that the simple bound asks for; absent where it does not apply.
     pub required_simple: Option<u64>,
     /// Scenarios that the exact bound asks for; absent where it does not apply.
     pub required_exact: Option<u64>,
     /// Risk obtained: what N and k certify at `beta_used`.
+    #[serde(with = "crate::files::number")]
     pub certified_risk: f64,
 }
 

@@ -11,14 +11,15 @@ pub enum Figure {
     /// A number of rollouts.
     Count(u64),
     /// A number.
-    Number(f64),
+    Number(#[serde(with = "crate::files::number")] f64),
     /// Whether something is so.
     Flag(bool),
     /// Lower and upper end.
-    Interval([f64; 2]),
+    Interval(#[serde(with = "crate::files::number")] [f64; 2]),
     /// A bound.
     AtMost {
         /// The largest value.
+        #[serde(with = "crate::files::number")]
         at_most: f64,
     },
     /// Failures of fresh trials, and the risk that they show.
@@ -28,6 +29,7 @@ pub enum Figure {
         /// All of them.
         trials: u64,
         /// The smallest risk that is left.
+        #[serde(with = "crate::files::number")]
         at_least: f64,
     },
     /// Anything else.

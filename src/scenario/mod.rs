@@ -17,6 +17,7 @@ pub mod global;
 pub mod growth;
 pub mod growth_batch;
 pub mod ledger;
+pub(crate) mod limits;
 pub mod linear;
 pub mod lipschitz;
 mod origin;

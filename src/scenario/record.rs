@@ -16,14 +16,9 @@ pub const SCHEMA: u32 = 2;
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
 
-/// A margin as a record has it: JSON knows no infinity, so the largest number stands for it.
+/// A margin as a record has it: the largest number stands for infinity, as it does in a measure.
 pub(crate) fn finite_margin(margin: f32) -> f32 {
     margin.clamp(f32::MIN, f32::MAX)
-}
-
-/// An f64 of a record that may be infinite, which JSON writes as null.
-fn or_infinite<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    Option::<f64>::deserialize(from).map(|value| value.unwrap_or(f64::INFINITY))
 }
 
 /// The shortest decimal that is this f32, so that a record says 0.4 and not 0.4000000059604645; as an
@@ -33,6 +28,9 @@ pub(crate) fn decimal(value: f32) -> f64 {
 }
 
 /// A stored certificate: everything in `certificate.json`.
+///
+/// A number that JSON has no word for stands between quotes: `"inf"`, `"-inf"`, `"nan"`. Older
+/// documents have `null` for an open bound and for a margin that is NaN, which are read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -52,6 +50,7 @@ pub struct Record {
     /// Steps T.
     pub horizon: u32,
     /// Discount per step.
+    #[serde(with = "crate::files::number")]
     pub gamma: f64,
     /// The Lipschitz constants.
     pub constants: ConstantsRecord,
@@ -68,6 +67,7 @@ pub struct Record {
     /// What of beta was spent on which claim.
     pub ledger: Vec<Spending>,
     /// Sum of the ledger: all claims hold together with confidence one minus this.
+    #[serde(with = "crate::files::number")]
     pub beta_total: f64,
     /// A few rollouts, for the picture.
     pub picture: PictureRecord,
@@ -132,13 +132,15 @@ pub struct ConstantsRecord {
 #[serde(deny_unknown_fields)]
 pub struct ConstantRecord {
     /// The constant used, Euclidean norm over all states.
+    #[serde(with = "crate::files::number")]
     pub used: f64,
     /// Where it comes from: `computed` (gradient bound over the box) or `given`.
     pub source: String,
     /// The computed bound, also where a given constant is used; infinite where none could be shown.
-    #[serde(deserialize_with = "or_infinite")]
+    #[serde(with = "crate::files::number::or_infinite")]
     pub computed: f64,
     /// Largest gradient among random points: a lower estimate.
+    #[serde(with = "crate::files::number")]
     pub sampled: f64,
 }
 
@@ -149,6 +151,7 @@ pub struct DeviationRecord {
     /// The claim.
     pub claim: Claim,
     /// Radius of the ball around each nominal start.
+    #[serde(with = "crate::files::number")]
     pub radius: f64,
     /// How perturbed rollouts were driven.
     pub control: PairControl,
@@ -157,18 +160,23 @@ pub struct DeviationRecord {
     /// Which bound tightens the margins.
     pub source: DeviationSource,
     /// Bound used at each step, `[T + 1]`.
+    #[serde(with = "crate::files::number")]
     pub bound: Vec<f64>,
     /// Largest distance seen at each step, `[T + 1]`.
+    #[serde(with = "crate::files::number")]
     pub largest: Vec<f64>,
     /// Exact supremum at each step for a system linear in its state, `[T + 1]`.
+    #[serde(with = "crate::files::number", default)]
     pub exact: Option<Vec<f64>>,
     /// Pairs of the pilot; 0 where no shape was fixed.
     pub pilot: u64,
     /// The one scalar of the fixed shape.
+    #[serde(with = "crate::files::number", default)]
     pub scale: Option<f64>,
     /// Support scenarios of the bound.
     pub support: u64,
     /// A posteriori risk from their number (wait and judge).
+    #[serde(with = "crate::files::number")]
     pub posterior_risk: f64,
     /// Pairs of which a state was not finite.
     pub non_finite: u64,
@@ -185,18 +193,23 @@ pub struct GlobalRecord {
     /// Nominal starts with `V_check > 0`.
     pub accepted: u64,
     /// Two-sided interval of `P(V_global)`.
+    #[serde(with = "crate::files::number")]
     pub share_interval: [f64; 2],
     /// Volume of the box in the coordinates that vary.
+    #[serde(with = "crate::files::number")]
     pub box_volume: f64,
     /// Two-sided interval of the volume of `V_global`.
+    #[serde(with = "crate::files::number")]
     pub volume_interval: [f64; 2],
     /// Draws whose own reach-avoid measure (perturbed start) is positive.
     pub reached: u64,
     /// Perturbed rollouts that failed for a state that is not finite.
     pub non_finite: u64,
     /// Measured f32 error of the measure: sample maximum against f64.
+    #[serde(with = "crate::files::number")]
     pub f32_error: f64,
     /// Measures within this distance of zero were run again in f64.
+    #[serde(with = "crate::files::number")]
     pub band: f64,
     /// How many were.
     pub f64_reruns: u64,
@@ -207,14 +220,18 @@ pub struct GlobalRecord {
 #[serde(deny_unknown_fields)]
 pub struct StateRecord {
     /// The state.
+    #[serde(with = "crate::files::number")]
     pub x: Vec<f32>,
     /// 0 in the target, 1 globally certified, 2 in the verified ball, 3 otherwise.
     pub tier: u8,
     /// `V_check` there.
+    #[serde(with = "crate::files::number::or_nan")]
     pub check_margin: f64,
     /// Target margin there.
+    #[serde(with = "crate::files::number::or_nan")]
     pub target_margin: f64,
     /// Constraint margin there.
+    #[serde(with = "crate::files::number::or_nan")]
     pub constraint_margin: f64,
 }
 
@@ -227,10 +244,13 @@ pub struct SliceRecord {
     /// Along the rows.
     pub y: SliceAxisRecord,
     /// `V_check`, row by row: `[y.values.len(), x.values.len()]`.
+    #[serde(with = "crate::files::number::or_nan")]
     pub check_margin: Vec<f32>,
     /// Target margin of each cell's state, same shape.
+    #[serde(with = "crate::files::number::or_nan")]
     pub target_margin: Vec<f32>,
     /// Constraint margin of each cell's state, same shape.
+    #[serde(with = "crate::files::number::or_nan")]
     pub constraint_margin: Vec<f32>,
 }
 
@@ -241,6 +261,7 @@ pub struct SliceAxisRecord {
     /// Index of the state.
     pub state: usize,
     /// Values, ascending.
+    #[serde(with = "crate::files::number")]
     pub values: Vec<f32>,
 }
 
@@ -253,12 +274,16 @@ pub struct GrowthRecord {
     /// Where the centre was looked for.
     pub boundary: BoundarySearch,
     /// The boundary point closest to the state.
+    #[serde(with = "crate::files::number", default)]
     pub center: Option<Vec<f32>>,
     /// Its distance from the state in the coordinates that vary.
+    #[serde(with = "crate::files::number", default)]
     pub distance: Option<f64>,
     /// Radius of the verified ball; 0 if none was.
+    #[serde(with = "crate::files::number")]
     pub radius: f64,
     /// Volume of the verified ball in the coordinates that vary.
+    #[serde(with = "crate::files::number")]
     pub volume: f64,
     /// Whether each coordinate varies.
     pub varies: Vec<bool>,
@@ -298,12 +323,14 @@ impl GrowthOutcome {
 #[serde(deny_unknown_fields)]
 pub struct RoundRecord {
     /// Radius tried.
+    #[serde(with = "crate::files::number")]
     pub radius: f64,
     /// Starts drawn.
     pub scenarios: u64,
     /// Of which failed.
     pub failures: u64,
     /// Distance of the nearest failure from the centre.
+    #[serde(with = "crate::files::number", default)]
     pub nearest_failure: Option<f64>,
     /// Failures for a state that is not finite.
     pub non_finite: u64,
@@ -316,6 +343,7 @@ pub struct RoundRecord {
 #[serde(deny_unknown_fields)]
 pub struct SampleRecord {
     /// The start.
+    #[serde(with = "crate::files::number")]
     pub x: Vec<f32>,
     /// Whether its measure is positive.
     pub success: bool,
@@ -330,6 +358,7 @@ pub struct Spending {
     /// Which call, round or step.
     pub item: String,
     /// What it spent.
+    #[serde(with = "crate::files::number")]
     pub beta: f64,
 }
 
@@ -346,6 +375,7 @@ pub struct PictureRecord {
 #[serde(deny_unknown_fields)]
 pub struct RolloutRecord {
     /// States, `[T + 1, NX]`; fewer where one is not finite, which ends them.
+    #[serde(with = "crate::files::number")]
     pub states: Vec<Vec<f32>>,
     /// Whether the measure is positive.
     pub success: bool,
@@ -356,6 +386,7 @@ pub struct RolloutRecord {
 #[serde(deny_unknown_fields)]
 pub struct Timing {
     /// All of it, seconds.
+    #[serde(with = "crate::files::number")]
     pub wall_seconds: f64,
     /// Threads used.
     pub threads: usize,

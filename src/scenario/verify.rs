@@ -36,8 +36,10 @@ pub struct QueryRow {
     /// Its tier.
     pub tier: Tier,
     /// `V_check`.
+    #[serde(with = "crate::files::number")]
     pub check_margin: f32,
     /// Target margin.
+    #[serde(with = "crate::files::number")]
     pub target_margin: f32,
 }
 
@@ -183,7 +185,8 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         name: name.to_owned(),
         stored: Figure::Number(stored),
         found: Figure::Number(found),
-        holds: (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
+        // Two that are infinite have no difference.
+        holds: stored == found || (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
     };
     let count = |name: &str, stored: u64, found: u64, of: u64| Finding {
         name: name.to_owned(),

@@ -12,8 +12,9 @@ use crate::real::Real;
 
 /// A discrete-time system `x[t+1] = f(x[t], u[t])` with its two margins.
 ///
-/// `NX` states and `NU` controls. The parameters are recorded as literals: the WGSL text that
-/// comes of it is the experiment, and its hash goes into every certificate. Mark the formulas
+/// `NX` states and `NU` controls. Numbers are recorded as literals, but for those that
+/// [`System::parameters`] declares, which are inputs: the WGSL text that comes of it, with the values
+/// of the parameters, is the experiment, and its hash goes into every certificate. Mark the formulas
 /// `#[inline(always)]`, so that SIMD lanes are compiled for the machine's widest instructions.
 ///
 /// ```
@@ -138,8 +139,10 @@ pub struct Axis {
     /// SI unit.
     pub unit: String,
     /// Lower end of the default box, or lower bound of a control.
+    #[serde(with = "crate::files::number::or_minus_infinite")]
     pub low: f32,
     /// Upper end.
+    #[serde(with = "crate::files::number::or_infinite")]
     pub high: f32,
 }
 
@@ -159,6 +162,7 @@ pub struct Parameter {
     /// SI unit.
     pub unit: String,
     /// Value.
+    #[serde(with = "crate::files::number")]
     pub value: f32,
 }
 

@@ -29,6 +29,7 @@ pub struct RunProgress {
     /// Iterations done at the best score.
     pub best: u64,
     /// Sum of the losses since the last score.
+    #[serde(with = "crate::files::number")]
     pub loss: f64,
     /// The scores so far.
     pub curve: Vec<CurvePoint>,

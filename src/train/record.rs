@@ -69,8 +69,10 @@ pub struct CurvePoint {
     /// Iterations done.
     pub iteration: u64,
     /// Mean loss since the score before; none before the first iteration.
+    #[serde(with = "crate::files::number", default)]
     pub loss: Option<f64>,
     /// The scores on the held-out starts; larger is better.
+    #[serde(with = "crate::files::number")]
     pub scores: Vec<f64>,
 }
 

@@ -37,12 +37,16 @@ const REPETITIONS: usize = 7;
 #[serde(deny_unknown_fields)]
 pub struct DeviceLimits {
     /// Rate of f32 multiplications and additions in registers, a multiply-add counted as two, 1/s.
+    #[serde(with = "crate::files::number")]
     pub flops_per_second: f64,
     /// Rate of a copy between two large buffers, bytes read plus bytes written, 1/s.
+    #[serde(with = "crate::files::number")]
     pub copy_bytes_per_second: f64,
     /// An empty submission and the wait for it, s.
+    #[serde(with = "crate::files::number")]
     pub submit_seconds: f64,
     /// One more dispatch in a submission, each waiting for the one before, s.
+    #[serde(with = "crate::files::number")]
     pub dispatch_seconds: f64,
 }
 

@@ -18,6 +18,7 @@ pub struct KernelTime {
     /// Dispatches that were timed.
     pub dispatches: u64,
     /// Time on the device from the end of what came before each to its own end, summed, s.
+    #[serde(with = "crate::files::number")]
     pub seconds: f64,
 }
 

@@ -26,8 +26,8 @@ impl Description {
     ///
     /// # Errors
     /// [`Error::Invalid`] if there is no policy, a formula is too large or asks for an output that
-    /// the network does not have, or calls a network that cannot be read or does not fit;
-    /// [`Error::File`] if the policy's network cannot be read or has another width.
+    /// the network does not have, or calls a network that cannot be read or does not fit, or if the
+    /// policy's network cannot be read or has another width.
     pub fn controller(&self) -> Result<Controller> {
         let missing = || self.origin.refuse("policy", "missing; expected a section with a policy");
         match self.policy.as_ref().ok_or_else(missing)? {
@@ -36,7 +36,13 @@ impl Description {
                 let law = Law::Formula(self.recorded("policy.formula", formulas, &networks)?);
                 Ok(Controller::new("formula", law))
             }
-            Policy::Network(policy) => self.network(policy, Mlp::load(&policy.file)?),
+            Policy::Network(policy) => {
+                let network = Mlp::load(&policy.file).map_err(|error| match error {
+                    Error::File { problem, .. } => self.refuse_file(&policy.file, &problem),
+                    other => other,
+                })?;
+                self.network(policy, network)
+            }
         }
     }
 
@@ -49,6 +55,11 @@ impl Description {
             Some(Policy::Network(policy)) => self.network(policy, network),
             _ => Err(self.origin.refuse("policy", "no network; expected `file`")),
         }
+    }
+
+    /// The refusal of the network in `file`, at the key that names it.
+    fn refuse_file(&self, file: &Path, problem: &str) -> Error {
+        self.origin.refuse("policy.file", format!("{}: {problem}", file.display()))
     }
 
     fn network(&self, policy: &NetworkPolicy, network: Mlp) -> Result<Controller> {
@@ -77,7 +88,7 @@ impl Description {
         if given != inputs {
             let problem =
                 format!("the network takes {inputs} inputs, the model has {given} {what}");
-            return Err(Error::file(&policy.file, problem));
+            return Err(self.refuse_file(&policy.file, &problem));
         }
         match network.state_order() {
             Some(order) if policy.observe.is_none() => self.check_order(&policy.file, order),
@@ -97,7 +108,7 @@ impl Description {
             order.join(","),
             states.join(",")
         );
-        Err(Error::file(file, problem))
+        Err(self.refuse_file(file, &problem))
     }
 
     /// Refuses a network that does not give what is asked for.
@@ -112,7 +123,7 @@ impl Description {
                 "the network has {outputs} outputs, the model has {controls} controls; `act` makes \
                  controls of other outputs"
             );
-            return Err(Error::file(&policy.file, problem));
+            return Err(self.refuse_file(&policy.file, &problem));
         };
         for written in act {
             let beyond = written.formula.outputs().find(|out| out.number as usize >= outputs);

@@ -35,6 +35,7 @@ unsafe starts aside: the share of starts that violate no rule before anyone move
 /// What `timing.json` holds: it differs from run to run, so it is no part of the results.
 #[derive(Serialize)]
 struct Timing {
+    #[serde(with = "crate::files::number")]
     wall_seconds: f64,
     threads: usize,
     controllers: Vec<TimingRecord>,

@@ -89,15 +89,18 @@ pub struct RacePoint {
     pub judged: Vec<JudgedRecord>,
     /// Mean over control steps of `1 / sum w^2` of the last improvement of a plan, from 1 to K;
     /// none without plans.
+    #[serde(with = "crate::files::number", default)]
     pub effective_samples: Option<f64>,
     /// Mean over control steps of the smallest cost that a sample of the last improvement achieved;
     /// none without plans. Costs of different horizons or cost keys do not compare.
+    #[serde(with = "crate::files::number", default)]
     pub best_cost: Option<f64>,
     /// Samples of all plans whose cost was not finite: their weight was 0.
     pub non_finite_samples: u64,
     /// Compute time of a control step of one race that flies alone.
     pub latency: LatencyRecord,
     /// Mean share of a race in the wall time of a step of its batch, s.
+    #[serde(with = "crate::files::number")]
     pub batch_seconds: f64,
 }
 
@@ -108,10 +111,13 @@ pub struct LatencyRecord {
     /// Control steps timed, after one that warmed up.
     pub steps: u64,
     /// Half of the steps stay below, s.
+    #[serde(with = "crate::files::number")]
     pub median_seconds: f64,
     /// 95 % of the steps stay below, s.
+    #[serde(with = "crate::files::number")]
     pub p95_seconds: f64,
     /// 99 % of the steps stay below, s.
+    #[serde(with = "crate::files::number")]
     pub p99_seconds: f64,
 }
 
@@ -122,18 +128,23 @@ pub struct CertificatePoint {
     /// Pairs N of the deviation bound.
     pub deviation_scenarios: u64,
     /// Risk that the deviation bound is certified at.
+    #[serde(with = "crate::files::number")]
     pub deviation_risk: f64,
     /// Largest deviation bound over the steps: what the margins lose, before the constants.
+    #[serde(with = "crate::files::number")]
     pub deviation_bound: f64,
     /// Draws from the box.
     pub draws: u64,
     /// Draws with `V_check > 0`.
     pub accepted: u64,
     /// Two-sided interval of the certified set's share of the box.
+    #[serde(with = "crate::files::number")]
     pub share_interval: [f64; 2],
     /// Two-sided interval of its volume, in the coordinates that vary.
+    #[serde(with = "crate::files::number")]
     pub volume_interval: [f64; 2],
     /// Risk that a perturbed rollout from the certified set fails.
+    #[serde(with = "crate::files::number")]
     pub conditional_risk: f64,
     /// Starts N of each round of growth.
     pub growth_scenarios: u64,
@@ -142,11 +153,14 @@ pub struct CertificatePoint {
     /// Rounds of growth.
     pub rounds: u64,
     /// Radius of the verified ball; 0 if none was.
+    #[serde(with = "crate::files::number")]
     pub radius: f64,
     /// Whether every claim that was asked for was obtained.
     pub holds: bool,
     /// All claims hold together with confidence one minus this.
+    #[serde(with = "crate::files::number")]
     pub beta_total: f64,
     /// Wall time, s.
+    #[serde(with = "crate::files::number")]
     pub seconds: f64,
 }
