@@ -87,13 +87,14 @@ mod tests {
         let of = |found: String, words: [&str; 2]| {
             words.iter().for_each(|word| assert!(found.contains(word), "no `{word}` in: {found}"));
         };
+        let needed = |inputs: usize, outputs: usize| format!("{inputs} and {outputs} are needed");
         of(refusal(model.clone(), Law::Formula(sums(2, 1))), ["policy: ", "takes 2 inputs"]);
         of(
             refusal(model.clone(), Law::Formula(sums(inputs, 3))),
-            ["gives 3 numbers", "5 and 1 are"],
+            ["gives 3 numbers", &needed(inputs, 1)],
         );
         let step = Model { step: sums(inputs, 1), ..model.clone() };
-        of(refusal(step, Law::Formula(sums(inputs, 1))), ["model.step", "5 and 2 are needed"]);
+        of(refusal(step, Law::Formula(sums(inputs, 1))), ["model.step", &needed(inputs, 2)]);
         let target = Model { target: sums(inputs, 2), ..model.clone() };
         of(refusal(target, Law::Formula(sums(inputs, 1))), ["model.target", "gives 2 numbers"]);
         let layer = Layer { weight: vec![1.0; 4], bias: vec![0.0; 2], inputs: 2, outputs: 2 };
@@ -101,8 +102,8 @@ mod tests {
         let network = Arc::new(network.expect("a network"));
         let around = |observe, act| Law::Network { observe, network: Arc::clone(&network), act };
         let act = Some(sums(inputs, 1));
-        of(refusal(model.clone(), around(None, act)), ["policy.act", "7 and 1 are needed"]);
+        of(refusal(model.clone(), around(None, act)), ["policy.act", &needed(inputs + 2, 1)]);
         let observe = Some(sums(inputs + 1, 2));
-        of(refusal(model, around(observe, None)), ["policy.observe", "5 and 2 are needed"]);
+        of(refusal(model, around(observe, None)), ["policy.observe", &needed(inputs, 2)]);
     }
 }
