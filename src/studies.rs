@@ -91,8 +91,8 @@ impl BuiltIn {
     /// The system as data.
     pub(crate) fn model(&self) -> Model {
         match self {
-            Self::DroneRace(system) => Model::of(system.clone()),
-            Self::DoubleIntegrator(system) => Model::of(system.clone()),
+            Self::DroneRace(system) => Model::of(*system),
+            Self::DoubleIntegrator(system) => Model::of(*system),
         }
     }
 
@@ -104,7 +104,7 @@ impl BuiltIn {
         match self {
             Self::DoubleIntegrator(system) if name == "bang-bang" => {
                 let policy = BangBang { acceleration: system.acceleration };
-                Ok(Plant::of(system.clone(), policy))
+                Ok(Plant::of(*system, policy))
             }
             Self::DoubleIntegrator(_) => Err(no_formula(&self.model().name, name, "bang-bang")),
             Self::DroneRace(_) => Err(no_formula(&self.model().name, name, "none")),

@@ -18,7 +18,7 @@ pub(crate) struct CompiledForm<T: ?Sized> {
 impl<T: ?Sized> CompiledForm<T> {
     /// `code` that computes `formulas` where the parameters have `values`.
     pub(super) fn new(code: Arc<T>, formulas: &[&Graph], values: Vec<f32>) -> Arc<Self> {
-        let formulas = formulas.iter().map(|graph| Graph::clone(graph)).collect();
+        let formulas = formulas.iter().copied().cloned().collect();
         Arc::new(Self { code, formulas, values })
     }
 

@@ -125,7 +125,7 @@ fn policy_of<'a>(system: &DroneRace, policy: &'a PolicySource) -> Result<&'a Mlp
     match policy {
         PolicySource::Formula(name) => Err(no_formula(system.name(), name, "none")),
         PolicySource::Network { path, network, .. } => {
-            check_network(&Model::of(system.clone()), path, network)?;
+            check_network(&Model::of(*system), path, network)?;
             Ok(network)
         }
     }

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::super::Prepared;
 use super::fixture::*;
+use crate::backend::Backend;
 use crate::error::Error;
 use crate::model::Plant;
 use crate::policy::{Activation, Mlp, OutputActivation};
@@ -134,7 +134,7 @@ fn an_error_of_the_sink_ends_the_batch() {
 #[test]
 fn wrong_tasks_are_refused() {
     assert!(super::super::Cpu::new(Some(0)).is_err());
-    let (spec, policy, cpu) = (spec(), race_policy(), cpu(1));
+    let (spec, policy, backend) = (spec(), race_policy(), Backend::Cpu(cpu(1)));
     let list = [[0.0; 12]; 5];
     let run = |end, tightening: &Tightening, policy: &Mlp| {
         let task = ReachAvoidTask {
@@ -144,9 +144,8 @@ fn wrong_tasks_are_refused() {
             tightening,
             query: Query::Measure,
         };
-        let prepared = cpu.prepare(&race_under(policy.clone()));
-        let run = |prepared: Prepared| prepared.reach_avoid(&cpu, &task, &mut |_, _| Ok(()));
-        let outcome = prepared.and_then(run);
+        let program = backend.prepare(&race_under(policy.clone()));
+        let outcome = program.and_then(|program| program.reach_avoid(&task, &mut |_, _| Ok(())));
         outcome.err().map(|error| error.to_string())
     };
     let none = Tightening::none(&spec);
