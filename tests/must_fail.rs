@@ -339,6 +339,59 @@ fn map_parity(gpu: Gpu) -> bool {
     drive::disagreement(&Backend::Gpu(gpu), &common::cpu(1)).is_ok()
 }
 
+/// What marks the outputs of a formula, and the same without it.
+const MARK: [&str; 2] =
+    ["select(bitcast<u32>(x), 0x7fc00000u, lost)", "select(bitcast<u32>(x), 0x7fc00000u, false)"];
+
+/// [`caught`] where no output is marked: a NaN is kept by its bits and by the mark, and either is to be
+/// missed where the other is gone.
+fn caught_unmarked(parity: fn(Gpu) -> bool, old: &'static str, new: &'static str) {
+    let Some(gpu) = adapter() else { return };
+    let unmarked = move |text: &str| text.replace(MARK[0], MARK[1]);
+    assert!(parity(gpu.with_shader_edit(unmarked)), "the bits alone keep it");
+    let Some(gpu) = adapter() else { return };
+    let edited = move |text: &str| text.replace(MARK[0], MARK[1]).replace(old, new);
+    assert!(
+        !parity(gpu.with_shader_edit(edited)),
+        "`{old}` changed to `{new}` and nothing noticed"
+    );
+    assert!(include_str!("../shaders/choices.wgsl").contains(old), "no kernel has `{old}`");
+}
+
+/// Whether what a driver makes 0 of is NaN all the same: a square root of a negative number, times 0.
+fn mark_parity(gpu: Gpu) -> bool {
+    let backend = Backend::Gpu(gpu);
+    let Ok(program) = backend.prepare(&Plant::of(Rooted, Still)) else { return false };
+    let spec = RolloutSpec::new(1, 1.0).expect("spec");
+    let starts = [[-0.5, 0.3], [0.5, 0.3]];
+    program.measures(&starts, &spec).is_ok_and(|found| found == [NON_FINITE, 2.0])
+}
+
+/// Its target margin is 2, and the root of its first state times 0.
+#[derive(Clone)]
+struct Rooted;
+
+impl System<2, 1> for Rooted {
+    fn name(&self) -> &str {
+        "rooted"
+    }
+    fn states(&self) -> [Axis; 2] {
+        ["x", "y"].map(|name| Axis::new(name, "", -1.0, 1.0))
+    }
+    fn controls(&self) -> [Axis; 1] {
+        [Axis::new("u", "", -1.0, 1.0)]
+    }
+    fn step<R: Real>(&self, x: [R; 2], _: [R; 1]) -> [R; 2] {
+        x
+    }
+    fn target<R: Real>(&self, [x, _]: [R; 2]) -> R {
+        R::lit(2.0) + R::lit(0.0) * x.sqrt()
+    }
+    fn constraint<R: Real>(&self, _: [R; 2]) -> R {
+        R::lit(3.0)
+    }
+}
+
 /// Requires that `parity` fails once `old` is replaced by `new`, and that the text had `old`.
 fn caught(parity: fn(Gpu) -> bool, old: &'static str, new: &'static str) {
     let Some(gpu) = adapter() else { return };
@@ -360,7 +413,7 @@ fn kernels_as_they_are_agree() {
     if let Some(gpu) = adapter() {
         assert!(fused_parity(gpu));
     }
-    for parity in [drift_parity, fused_drift_parity, walls_parity] {
+    for parity in [drift_parity, fused_drift_parity, walls_parity, mark_parity] {
         if let Some(gpu) = adapter() {
             assert!(parity(gpu));
         }
@@ -401,6 +454,12 @@ mutants! {
     perturbed_is_nominal: "perturbed = advance(perturbed, replayed, t);" => "perturbed = advance(nominal, replayed, t);";
     states_swapped: "let v1 = x[1];" => "let v1 = x[0];";
     branches_turned: "a < b)" => "a > b)";
+}
+
+mutants! {
+    mark_parity:
+    outputs_not_marked: "select(bitcast<u32>(x), 0x7fc00000u, lost)" => "bitcast<u32>(x)";
+    births_not_noted: "< 0.0);" => "< -9.0);";
 }
 
 mutants! {
@@ -517,6 +576,21 @@ function_mutants! {
     larger_is_smaller: Case::Larger, "select(b, a, b < a)" => "select(a, b, b < a)";
     not_held_below: Case::Held, "select(x, low, x < low)" => "x";
     not_held_above: Case::Held, "select(floored, high, high < floored)" => "floored";
+}
+
+/// The same of what keeps a NaN by its bits.
+macro_rules! nan_mutants {
+    ($($name:ident: $case:expr, $old:expr => $new:expr;)*) => {
+        $(
+            #[test]
+            fn $name() {
+                caught_unmarked(|gpu| disagreement(&Backend::Gpu(gpu), $case).is_ok(), $old, $new);
+            }
+        )*
+    };
+}
+
+nan_mutants! {
     nan_lost_in_a_minimum: Case::Smaller, "largest > INFINITE" => "largest > ~0u";
     nan_lost_in_a_maximum: Case::Larger, "largest > INFINITE" => "largest > ~0u";
     nan_lost_in_a_bound: Case::HeldBelow, "largest > INFINITE" => "largest > ~0u";

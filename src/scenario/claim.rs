@@ -24,7 +24,7 @@ pub struct Claim {
     pub decision_vars: u32,
     /// Risk asked for; none of the conditional claim, which says the risk that its sample gives. As JSON
     /// a number in either case: where none was asked for, the risk obtained.
-    #[serde(deserialize_with = "present")]
+    #[serde(serialize_with = "crate::files::number::serialize", deserialize_with = "present")]
     pub epsilon: Option<f64>,
     /// One minus the confidence asked for, before any split.
     #[serde(with = "crate::files::number")]
@@ -55,7 +55,7 @@ impl Claim {
 
 /// A number, which may not be left out as an option may.
 fn present<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-    f64::deserialize(from).map(Some)
+    crate::files::number::deserialize::<f64, D>(from).map(Some)
 }
 
 impl Serialize for Claim {
