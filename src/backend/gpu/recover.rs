@@ -46,7 +46,8 @@ impl Delivered {
 /// See [`crate::backend::Program::reach_avoid`].
 pub(super) fn reach_avoid(
     gpu: &Gpu,
-    (subject, plant): (Subject<'_>, &Plant),
+    subject: Subject<'_>,
+    plant: &Plant,
     task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
 ) -> Result<()> {
@@ -56,7 +57,7 @@ pub(super) fn reach_avoid(
             &mut |first, values| delivered.deliver(values.len(), || sink(first, values));
         match runner {
             Runner::Adapter(opened, attempt) => {
-                reach_avoid::reach_avoid((opened, attempt), subject, &task, sink)
+                reach_avoid::reach_avoid(opened, attempt, subject, &task, sink)
             }
             // A CPU prepares the plant when it takes over, once per call that it takes over.
             Runner::Cpu(cpu) => cpu.prepare(plant)?.reach_avoid(cpu, &task, sink),
@@ -67,7 +68,8 @@ pub(super) fn reach_avoid(
 /// See [`crate::backend::Program::deviation`].
 pub(super) fn deviation(
     gpu: &Gpu,
-    (subject, plant): (Subject<'_>, &Plant),
+    subject: Subject<'_>,
+    plant: &Plant,
     task: &DeviationTask<'_>,
     sink: PairSink<'_>,
 ) -> Result<Vec<Farthest>> {
@@ -79,7 +81,7 @@ pub(super) fn deviation(
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                deviation::deviation((opened, attempt), subject, &task, (&mut farthest, sink))
+                deviation::deviation(opened, attempt, subject, &task, &mut farthest, sink)
             }
             Runner::Cpu(cpu) => {
                 let rest = cpu.prepare(plant)?.deviation(cpu, &task, sink)?;
@@ -96,7 +98,8 @@ pub(super) fn deviation(
 pub(super) fn tally(
     gpu: &Gpu,
     source: &Arc<PlanSource>,
-    (task, samples): (&MppiTask<'_>, Range<u32>),
+    task: &MppiTask<'_>,
+    samples: Range<u32>,
     sink: &mut dyn FnMut(Vec<PlanTally>),
 ) -> Result<()> {
     gpu.persevere("problems", 0, |runner, delivered| {
@@ -107,7 +110,7 @@ pub(super) fn tally(
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                mppi::tally((opened, attempt), source, (&task, samples.clone()), sink)
+                mppi::tally(opened, attempt, source, &task, samples.clone(), sink)
             }
             Runner::Cpu(cpu) => {
                 let prepared = cpu.prepare_plans(&source.planning);
