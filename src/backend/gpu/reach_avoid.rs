@@ -118,7 +118,7 @@ fn segment<'a>(
         let Params { columns, stride: row, horizon, .. } = params;
         kernels.chain(batch, ChainStep { step, horizon, columns, row, acting: row });
         if step < params.horizon {
-            kernels.drive(batch, buffers, params.columns, params.stride, step);
+            kernels.drive(batch, buffers, columns, row, step);
         }
         batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params.over(step, count));
         step += count;

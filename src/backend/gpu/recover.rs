@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::adapter::Gpu;
 use super::attempt::Attempt;
+use super::fault::Failure;
 use super::job::Subject;
 use super::mppi_source::PlanSource;
 use super::opened::Opened;
@@ -142,7 +143,7 @@ impl Gpu {
             let attempt = Attempt::new(limit);
             match run(Runner::Adapter(&opened, &attempt), &delivered) {
                 Err(error) if !delivered.refused.get() => {
-                    let (fault, problem) = self.survivable(error)?;
+                    let Failure { fault, problem } = self.survivable(error)?;
                     let columns = attempt.columns.get();
                     let Some(action) = self.go_on(fault, &opened, columns) else {
                         return Err(Error::DeviceFailed { fault, problem });
@@ -160,10 +161,12 @@ impl Gpu {
     /// # Errors
     /// `error` itself where it is none of the adapter's, or says that work does not fit it and
     /// nobody else may do it.
-    fn survivable(&self, error: Error) -> Result<(Fault, String)> {
+    fn survivable(&self, error: Error) -> Result<Failure> {
         match error {
-            Error::DeviceFailed { fault, problem } => Ok((fault, problem)),
-            Error::Device(problem) if self.fallback.is_some() => Ok((Fault::Unfit, problem)),
+            Error::DeviceFailed { fault, problem } => Ok(Failure { fault, problem }),
+            Error::Device(problem) if self.fallback.is_some() => {
+                Ok(Failure { fault: Fault::Unfit, problem })
+            }
             other => Err(other),
         }
     }

@@ -95,12 +95,7 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    fn new(
-        flight: &Flight<'_>,
-        compiled: &Compiled,
-        network: Option<&Mlp>,
-        shape: Shape,
-    ) -> Self {
+    fn new(flight: &Flight<'_>, compiled: &Compiled, network: Option<&Mlp>, shape: Shape) -> Self {
         let storage = |bytes| flight.pool.take(&flight.device, Use::Storage, bytes);
         let sizes = sizes(shape, compiled.text.states());
         let row = shape.chunking.row;
