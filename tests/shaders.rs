@@ -254,7 +254,7 @@ fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInf
         }
     }
     for kernel in Kernel::LIMITS {
-        let (text, bindings) = limit_kernel(kernel);
+        let (text, bindings) = (limit_kernel(kernel), kernel.bindings(false));
         let name = format!("{kernel:?}");
         let (module, info) = validated(&name, &text);
         see(&name, (kernel, kernel.workgroup(), &bindings), &module, &info);

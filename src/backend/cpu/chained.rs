@@ -35,12 +35,14 @@ struct Ask {
 }
 
 impl Chained {
-    /// The formulas `graphs`, one after the other, as for [`Tape::new`]; their networks packed by `pack`.
+    /// The formulas `graphs`, one after the other, as for [`Tape::new`]: what lies between is in
+    /// rows from `first_own` on. Their networks are packed by `pack`.
     pub(super) fn new(
         graphs: &[&Graph],
         sources: &[Source],
         outputs: &[usize],
-        (first_own, pack): (usize, Pack<'_>),
+        first_own: usize,
+        pack: Pack<'_>,
     ) -> Self {
         if graphs.iter().all(|graph| graph.calls.is_empty()) {
             let tape = Tape::new(graphs, sources, outputs, first_own);
@@ -50,7 +52,7 @@ impl Chained {
         let chain = Chain::new(&Graph::joined(graphs));
         let rows = Rows::new(&chain, first_own);
         let links: Vec<Link> =
-            chain.links.iter().map(|link| rows.link(link, (sources, outputs), pack)).collect();
+            chain.links.iter().map(|link| rows.link(link, sources, outputs, pack)).collect();
         let own = links.iter().map(|link| link.tape.own_rows()).max().unwrap_or(0);
         Self { links, own: own + rows.end - first_own }
     }
@@ -111,7 +113,8 @@ impl Rows {
     fn link(
         &self,
         link: &crate::formula::Link,
-        (sources, outputs): (&[Source], &[usize]),
+        sources: &[Source],
+        outputs: &[usize],
         pack: Pack<'_>,
     ) -> Link {
         let reads = link.reads.iter().map(|place| Source::Row(self.of(*place)));

@@ -52,10 +52,16 @@ impl Inputs {
         self
     }
 
-    /// `graph` as tapes, its outputs in `rows`; what lies between is in rows from `own.0` on, and
-    /// `own.1` packs the networks that it calls.
-    pub(super) fn chained(&self, graph: &Graph, rows: &[usize], own: (usize, Pack<'_>)) -> Chained {
-        Chained::new(&[graph], &self.sources, rows, own)
+    /// `graph` as tapes, its outputs in `rows`; what lies between is in rows from `first_own` on,
+    /// and `pack` packs the networks that it calls.
+    pub(super) fn chained(
+        &self,
+        graph: &Graph,
+        rows: &[usize],
+        first_own: usize,
+        pack: Pack<'_>,
+    ) -> Chained {
+        Chained::new(&[graph], &self.sources, rows, first_own, pack)
     }
 
     /// The row of the steps taken.
@@ -81,10 +87,10 @@ impl InterpretedSystem {
         let layout = held.layout;
         let next: Vec<usize> = (0..layout.states).collect();
         let margins = [&model.target, &model.constraint];
-        let own = (layout.first_own(), pack);
+        let own = layout.first_own();
         Self {
-            step: Chained::new(&[&model.step], &held.sources, &next, own),
-            margins: Chained::new(&margins, &free.sources, &layout.margins(), own),
+            step: Chained::new(&[&model.step], &held.sources, &next, own, pack),
+            margins: Chained::new(&margins, &free.sources, &layout.margins(), own, pack),
             layout,
         }
     }
@@ -123,10 +129,16 @@ pub(super) struct InterpretedFormula {
 
 impl InterpretedFormula {
     /// `graph` of `inputs`, its outputs in the rows from `to` on; what lies between is in rows from
-    /// `own.0` on, and `own.1` packs the networks that it calls.
-    pub(super) fn new(graph: &Graph, inputs: &Inputs, to: usize, own: (usize, Pack<'_>)) -> Self {
+    /// `first_own` on, and `pack` packs the networks that it calls.
+    pub(super) fn new(
+        graph: &Graph,
+        inputs: &Inputs,
+        to: usize,
+        first_own: usize,
+        pack: Pack<'_>,
+    ) -> Self {
         let outputs: Vec<usize> = (to..to + graph.outputs.len()).collect();
-        let tape = inputs.chained(graph, &outputs, own);
+        let tape = inputs.chained(graph, &outputs, first_own, pack);
         Self { tape, layout: inputs.layout }
     }
 

@@ -31,14 +31,13 @@ pub(super) struct InterpretedStages {
 impl InterpretedStages {
     /// The formulas of `model` and `cost`, whose rows begin at `first`; `pack` packs the networks that
     /// they call.
-    pub(super) fn new(model: &Model, cost: &StageCost, (first, pack): (usize, Pack<'_>)) -> Self {
+    pub(super) fn new(model: &Model, cost: &StageCost, first: usize, pack: Pack<'_>) -> Self {
         let values = model.values();
         let contexts = first..first + cost.contexts;
         let (staged, own) = (contexts.end, contexts.end + 2);
         let held = || Inputs::new(model, &values, Held::Rows);
-        let tape = |graph: &Graph, inputs: &Inputs, rows: &[usize]| {
-            inputs.chained(graph, rows, (own, pack))
-        };
+        let tape =
+            |graph: &Graph, inputs: &Inputs, rows: &[usize]| inputs.chained(graph, rows, own, pack);
         let next: Vec<usize> = (0..model.states.len()).collect();
         let step = tape(&model.step, &held(), &next);
         let stage = tape(&cost.stage, &held().followed_by(contexts.clone()), &[staged]);

@@ -45,10 +45,10 @@ impl PreparedPlanning {
         };
         let outs = cut(&mut costs, count, task.problems.len() * units.len()).into_iter();
         let parts: Vec<Partial> = spread(&cpu.pool, outs, |number, costs| {
-            let problem = (&task.problems[number / units.len()], task.iteration);
+            let (problem, iteration) = (&task.problems[number / units.len()], task.iteration);
             let samples = units[number % units.len()].clone();
             let with = cpu.instructions;
-            run(with, MppiRollout { prepared: self, with, problem, samples, costs })
+            run(with, MppiRollout { prepared: self, with, problem, iteration, samples, costs })
         });
         let mut tallies = vec![PlanTally::default(); task.problems.len()];
         for (number, part) in parts.into_iter().enumerate() {

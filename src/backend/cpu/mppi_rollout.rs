@@ -21,8 +21,10 @@ pub(super) struct MppiRollout<'a> {
     pub(super) prepared: &'a PreparedPlanning,
     /// The instructions of the formulas.
     pub(super) with: Instructions,
-    /// The problem, and the number of the iteration.
-    pub(super) problem: (&'a MppiProblem, u32),
+    /// The problem.
+    pub(super) problem: &'a MppiProblem,
+    /// Number of the iteration.
+    pub(super) iteration: u32,
     /// Which samples.
     pub(super) samples: Range<u32>,
     /// Where their costs go, if they are wanted.
@@ -35,18 +37,18 @@ impl Unit for MppiRollout<'_> {
     const DRAWS: bool = true;
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Partial {
-        let Self { prepared, with, problem, samples, mut costs } = self;
+        let Self { prepared, with, problem, iteration, samples, mut costs } = self;
         let spec = &prepared.planning.spec;
         let length = spec.horizon() * spec.controls();
         let mut softmin = Softmin::<N>::new(length, spec.settings().temperature);
         let count = (samples.end - samples.start) as usize;
         // Networks and tapes want wide tiles, plain rollouts stay in the registers of one group.
         let width = if prepared.by_the_step() { count.next_multiple_of(N) } else { N };
-        let mut tile = Tile::<K, N>::new((kernel, with), prepared, width);
+        let mut tile = Tile::<K, N>::new(kernel, with, prepared, width);
         for first in samples.clone().step_by(width) {
             let live = width.min((samples.end - first) as usize);
-            tile.draw(problem, first, live);
-            tile.roll(problem.0, live);
+            tile.draw(problem, iteration, first, live);
+            tile.roll(problem, live);
             for group in 0..live.div_ceil(N) {
                 let at = first + (group * N) as u32;
                 let live = N.min((samples.end - at) as usize);
@@ -85,11 +87,7 @@ struct Tile<'a, K, const N: usize> {
 
 impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
     /// Room for `width` samples.
-    fn new(
-        (kernel, with): (K, Instructions),
-        prepared: &'a PreparedPlanning,
-        width: usize,
-    ) -> Self {
+    fn new(kernel: K, with: Instructions, prepared: &'a PreparedPlanning, width: usize) -> Self {
         let spec = &prepared.planning.spec;
         let zero = Lanes([0.0; N]);
         let networks = prepared
@@ -113,7 +111,7 @@ impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
     }
 
     /// Draws the noise of the samples `first..first + live`.
-    fn draw(&mut self, (problem, iteration): (&MppiProblem, u32), first: u32, live: usize) {
+    fn draw(&mut self, problem: &MppiProblem, iteration: u32, first: u32, live: usize) {
         let length = self.length();
         let (controls, _) = self.controls.all_mut().as_chunks_mut::<N>();
         for (group, out) in controls.chunks_mut(length).take(live.div_ceil(N)).enumerate() {

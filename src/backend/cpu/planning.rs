@@ -43,7 +43,7 @@ impl Cpu {
             Some(compiled) => Arc::clone(compiled),
             None => {
                 let stages =
-                    InterpretedStages::new(model, cost, (pushes.end, &|mlp| self.packed(mlp)));
+                    InterpretedStages::new(model, cost, pushes.end, &|mlp| self.packed(mlp));
                 layout.own += stages.rows();
                 Arc::new(stages)
             }

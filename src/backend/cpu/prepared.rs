@@ -65,7 +65,7 @@ impl Cpu {
                 PreparedLaw::Formula(Arc::new(formula))
             }
             (Law::Network { observe, network, act }, _) => {
-                let (observe, act) = needs.around(network, [observe.as_ref(), act.as_ref()])?;
+                let [observe, act] = needs.around(network, [observe.as_ref(), act.as_ref()])?;
                 PreparedLaw::Network { network: self.packed(network), observe, act }
             }
         };
@@ -93,7 +93,7 @@ impl Needs<'_> {
         &mut self,
         network: &Mlp,
         [observe, act]: [Option<&Graph>; 2],
-    ) -> Result<(Option<Beside>, Option<Beside>)> {
+    ) -> Result<[Option<Beside>; 2]> {
         let Layout { states, controls, .. } = self.layout;
         let widths = network.widths();
         let outputs = widths[widths.len() - 1];
@@ -112,7 +112,7 @@ impl Needs<'_> {
             rows: [said, own],
         });
         self.room(own - first, Clock::Ignored);
-        Ok((observe, act))
+        Ok([observe, act])
     }
 
     /// The inputs of a formula that makes controls.
@@ -128,7 +128,7 @@ impl Needs<'_> {
         to: usize,
         first_own: usize,
     ) -> InterpretedFormula {
-        let formula = InterpretedFormula::new(graph, inputs, to, (first_own, self.pack));
+        let formula = InterpretedFormula::new(graph, inputs, to, first_own, self.pack);
         let before = first_own - self.layout.first_own();
         self.room(before + formula.own_rows(), formula.clock());
         formula

@@ -126,7 +126,8 @@ impl Buffer {
     pub(super) fn copy(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        (sink, offset): (&Self, u64),
+        sink: &Self,
+        offset: u64,
         bytes: u64,
     ) {
         encoder.copy_buffer_to_buffer(&self.inner, 0, &sink.inner, offset, bytes);
@@ -140,7 +141,7 @@ impl Buffer {
         let bytes = (count * size_of::<T>()) as u64;
         let mut staging = self.pool.take(device, Use::Readback, bytes);
         let mut encoder = device.device.create_command_encoder(&Default::default());
-        self.copy(&mut encoder, (&staging, 0), bytes);
+        self.copy(&mut encoder, &staging, 0, bytes);
         device.submit(encoder.finish())?;
         staging.mapped(device, bytes, || device.wait(None), bytemuck::pod_collect_to_vec)
     }

@@ -31,7 +31,7 @@ pub(super) struct ChainBuffers {
 
 impl ChainBuffers {
     /// For `row` trajectories.
-    pub(super) fn new((device, pool): (&Device, &Pool), chain: &ChainText, row: u32) -> Self {
+    pub(super) fn new(device: &Device, pool: &Pool, chain: &ChainText, row: u32) -> Self {
         let row = u64::from(row);
         let [kept, asked, said, first, second] =
             ChainLoad::new(chain).bytes.map(|bytes| pool.take(device, Use::Storage, bytes * row));
@@ -121,12 +121,13 @@ impl ChainBinder<'_> {
             let kernel = if i + 1 == count { Kernel::OutputLayer } else { Kernel::HiddenLayer };
             let pipeline = self.compiled.given(
                 &self.flight.device,
-                (kernel, kernel.bindings(false)),
+                kernel,
+                kernel.bindings(false),
                 layer_kernel(mlp, kernel),
             )?;
             Ok(pipeline.bind(&self.flight.device, |slot| {
                 let part = self.inputs.binding(slot);
-                part.unwrap_or_else(|| self.end(slot, (mlp, ask), i))
+                part.unwrap_or_else(|| self.end(slot, mlp, ask, i))
             }))
         };
         let layers = (0..count).map(layer).collect::<Result<_>>()?;
@@ -134,7 +135,7 @@ impl ChainBinder<'_> {
     }
 
     /// What layer `i` of a network binds in `slot`.
-    fn end(&self, slot: Slot, (mlp, ask): (&Mlp, &AskShape), i: usize) -> wgpu::BufferBinding<'_> {
+    fn end(&self, slot: Slot, mlp: &Mlp, ask: &AskShape, i: usize) -> wgpu::BufferBinding<'_> {
         let ChainBuffers { asked, said, activations, .. } = self.buffers;
         let layer = &mlp.layers()[i];
         match slot {
@@ -175,7 +176,7 @@ impl BoundChain {
         for (number, BoundLink { link, asks }) in self.links[..count].iter().enumerate() {
             batch.push_columns(Kernel::Link(number as u32), link, &params);
             for BoundAsk { layers, shapes } in asks {
-                push_layers(batch, (layers, shapes), (columns, row));
+                push_layers(batch, layers, shapes, columns, row);
             }
         }
     }

@@ -135,7 +135,7 @@ impl Chunking {
         let driven_by = DrivenBy::new(size);
         let segment = work.segment(driven_by);
         let layered = network.filter(|_| driven_by == DrivenBy::Layered);
-        let mut parts = column_bytes(work, (states, seen), layered, segment);
+        let mut parts = column_bytes(work, states, seen, layered, segment);
         let called = chain.map_or([0; 5], |load| load.bytes);
         parts.extend(called.map(|bytes| bytes * u64::from(work.sides())));
         let largest = parts.iter().copied().max().unwrap_or(1);
@@ -173,7 +173,8 @@ impl Chunking {
 /// Bytes that each buffer holds per column.
 fn column_bytes(
     work: Work,
-    (states, seen): (usize, usize),
+    states: usize,
+    seen: usize,
     network: Option<&Mlp>,
     segment: u32,
 ) -> Vec<u64> {
@@ -235,7 +236,8 @@ mod tests {
 
     fn size<'a>(
         states: usize,
-        (network, fused): (Option<&'a Mlp>, Option<&'a Fused>),
+        network: Option<&'a Mlp>,
+        fused: Option<&'a Fused>,
         count: u64,
     ) -> Size<'a> {
         Size { states, flops: 200, network, fused, chain: None, seen: 0, count }
@@ -254,11 +256,11 @@ mod tests {
                 for work in [Work::Measure, Work::Sign, Work::Pairs] {
                     // Parameters of the wide network take a megabyte of their own.
                     let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
-                    let size = size(12, (network, fused.as_ref()), count);
+                    let size = size(12, network, fused.as_ref(), count);
                     let chunking = planned(&Adapter::made_up(binding), work, &size);
                     let chunking = chunking.expect("a chunking within the limits");
                     let layered = network.filter(|_| fused.is_none());
-                    let bytes = column_bytes(work, (12, 0), layered, chunking.segment);
+                    let bytes = column_bytes(work, 12, 0, layered, chunking.segment);
                     let stride = u64::from(chunking.stride);
                     assert_eq!(stride % COLUMN_UNIT, 0);
                     assert!(bytes.iter().all(|bytes| bytes * stride <= binding));
@@ -275,14 +277,14 @@ mod tests {
 
     #[test]
     fn small_batches_get_small_chunks() {
-        let size = size(12, (None, None), 468);
+        let size = size(12, None, None, 468);
         let chunking = planned(&Adapter::made_up(1 << 27), Work::Measure, &size);
         assert_eq!(chunking.expect("a chunking").stride, 512);
     }
 
     #[test]
     fn what_cannot_run_is_refused() {
-        let formula = |states| size(states, (None, None), 10);
+        let formula = |states| size(states, None, None, 10);
         let small = planned(&Adapter::made_up(1 << 10), Work::Measure, &formula(12));
         assert!(matches!(small, Err(Error::Device(_))), "{small:?}");
         let states = 4 * MAX_TRIPS as usize;
@@ -294,7 +296,7 @@ mod tests {
     #[test]
     fn a_submission_has_no_more_work_than_a_watchdog_allows() {
         let wide = network(&[12, 64, 64, 3]);
-        let size = size(12, (Some(&wide), None), 1 << 20);
+        let size = size(12, Some(&wide), None, 1 << 20);
         let step = size.step_flops();
         for (pieces, expected) in
             [(1 << 20, (1 << 14, 64)), (1 << 15, (1 << 14, 2)), (100, (64, 1))]
@@ -322,7 +324,7 @@ mod tests {
                 &Adapter::made_up(1 << 27),
                 limit,
                 Work::Pairs,
-                &size(12, (None, None), u64::MAX / 2),
+                &size(12, None, None, u64::MAX / 2),
             );
             assert_eq!(u64::from(chunking.expect("a chunking").stride), columns);
         }
@@ -334,7 +336,7 @@ mod tests {
         let deep = network(&[[12].as_slice(), &[128; 60], &[3]].concat());
         let fused = Fused::new(&deep);
         let adapter = Adapter::made_up(1 << 27);
-        let size = size(12, (Some(&deep), Some(&fused)), 1000);
+        let size = size(12, Some(&deep), Some(&fused), 1000);
         let limit = Limit { flops: u64::MAX, ..Limit::default() };
         let chunking = Chunking::new(&adapter, limit, Work::Measure, &size);
         // 3 vectors of inputs, then 60 times 32, and the 61 layers themselves.

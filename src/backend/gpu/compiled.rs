@@ -29,7 +29,8 @@ impl Compiled {
     /// # Errors
     /// [`crate::Error::Device`] if a network is to be fused and does not fit.
     pub(super) fn new(
-        (device, pool): (&Device, &Pool),
+        device: &Device,
+        pool: &Pool,
         pipelines: &Arc<Pipelines>,
         source: &Source,
         networks: NetworkKernels,
@@ -64,7 +65,8 @@ impl Compiled {
     pub(super) fn given(
         &self,
         device: &Device,
-        (kernel, bindings): (Kernel, Vec<(Slot, Access)>),
+        kernel: Kernel,
+        bindings: Vec<(Slot, Access)>,
         text: String,
     ) -> Result<Arc<Pipeline>> {
         device.counters.add(Count::Text);

@@ -16,10 +16,12 @@ use crate::rollout::{DeviationTask, Farthest, PairControl, PairMeasure};
 /// See [`crate::backend::Program::deviation`]; the farthest pairs are merged into `farthest` chunk by
 /// chunk, as the measures go to the sink.
 pub(super) fn deviation(
-    adapter: (&Opened, &Attempt),
+    opened: &Opened,
+    attempt: &Attempt,
     subject: Subject<'_>,
     task: &DeviationTask<'_>,
-    (farthest, sink): (&mut [Farthest], PairSink<'_>),
+    farthest: &mut [Farthest],
+    sink: PairSink<'_>,
 ) -> Result<()> {
     let count = task.range.end.saturating_sub(task.range.start);
     if count == 0 {
@@ -27,7 +29,7 @@ pub(super) fn deviation(
     }
     let (starts, spec, tightening) = (&task.pairs.nominal, &task.spec, task.tightening);
     let request = Request { work: Work::Pairs, starts, spec, tightening, count };
-    let mut job = Job::new(adapter, subject, request)?;
+    let mut job = Job::new(opened, attempt, subject, request)?;
     let params = pair_params(task, job.chunking.stride);
     let mut first = task.range.start;
     while first < task.range.end {
@@ -81,14 +83,14 @@ fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
     let mut step = 0;
     while step <= params.horizon {
         let count = chunking.segment.min(params.horizon + 1 - step);
-        segment(&mut batch, (kernels, &*buffers), *chunking, (params, step, count));
+        segment(&mut batch, kernels, buffers, *chunking, params, step, count);
         step += count;
         inputs.write(&flight.device, &batch);
         let copy = |encoder: &mut _| {
             if step > params.horizon {
                 let [first, second] = [MEASURES_AT, MEASURES_AT + measures];
-                readback.copy(encoder, buffers.of(Slot::Measures), (first, measures));
-                readback.copy(encoder, buffers.of(Slot::Farthest), (second, farthest));
+                readback.copy(encoder, buffers.of(Slot::Measures), first, measures);
+                readback.copy(encoder, buffers.of(Slot::Farthest), second, farthest);
             }
         };
         flight.submit(&batch, |_| {}, copy)?;
@@ -106,9 +108,12 @@ fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
 /// Adds the dispatches of `count` steps from `first` on, and the reduction of their distances.
 fn segment<'a>(
     batch: &mut Batch<'a>,
-    (kernels, buffers): (&'a Kernels, &Buffers),
+    kernels: &'a Kernels,
+    buffers: &Buffers,
     chunking: Chunking,
-    (params, first, count): (Params, u32, u32),
+    params: Params,
+    first: u32,
+    count: u32,
 ) {
     let params = Params { segment_start: first, ..params };
     let mut step = first;
@@ -120,7 +125,7 @@ fn segment<'a>(
         if step < params.horizon {
             // Perturbed states stand `stride` columns after the nominal ones.
             let columns = if params.closed_loop == 0 { params.columns } else { chunking.row };
-            kernels.drive(batch, buffers, (columns, chunking.row), step);
+            kernels.drive(batch, buffers, columns, chunking.row, step);
         }
         batch.push_columns(Kernel::Deviation, &kernels.rollout, &params.over(step, steps));
         step += steps;

@@ -5,7 +5,7 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::fault::{Faults, Injection, Injector};
+use super::fault::{Failure, Faults, Injection, Injector};
 use super::traffic::{Count, Counters};
 use crate::error::{Error, Fault, Result};
 
@@ -258,7 +258,7 @@ impl Device {
     /// [`Error::DeviceFailed`] with what failed.
     pub(super) fn check(&self) -> Result<()> {
         match self.faults.since(self.seen) {
-            Some((fault, problem)) => Err(self.failed(fault, &problem)),
+            Some(Failure { fault, problem }) => Err(self.failed(fault, &problem)),
             None => Ok(()),
         }
     }

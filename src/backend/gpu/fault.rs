@@ -5,14 +5,23 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::error::Fault;
 
+/// A failure of a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Failure {
+    /// Its kind.
+    pub(super) fault: Fault,
+    /// What the driver says.
+    pub(super) problem: String,
+}
+
 /// Failures of a device, in order.
 #[derive(Default)]
-pub(super) struct Faults(Mutex<Vec<(Fault, String)>>);
+pub(super) struct Faults(Mutex<Vec<Failure>>);
 
 impl Faults {
     /// Adds a failure.
     pub(super) fn note(&self, fault: Fault, problem: String) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push((fault, problem));
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(Failure { fault, problem });
     }
 
     /// How many there are.
@@ -22,9 +31,9 @@ impl Faults {
 
     /// What fails a call that began when there were `seen`: the loss of the device, whenever it
     /// was, else the first failure since: later ones follow from it.
-    pub(super) fn since(&self, seen: usize) -> Option<(Fault, String)> {
+    pub(super) fn since(&self, seen: usize) -> Option<Failure> {
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let lost = all.iter().find(|(fault, _)| *fault == Fault::Lost);
+        let lost = all.iter().find(|failure| failure.fault == Fault::Lost);
         lost.or(all.get(seen)).cloned()
     }
 }
@@ -80,9 +89,10 @@ mod tests {
         assert_eq!(faults.since(faults.count()), None);
         note(Fault::Validation, "first");
         note(Fault::Timeout, "second");
-        assert_eq!(faults.since(1), Some((Fault::Validation, "first".to_owned())));
+        let failed = |fault, text: &str| Some(Failure { fault, problem: text.to_owned() });
+        assert_eq!(faults.since(1), failed(Fault::Validation, "first"));
         note(Fault::Lost, "gone");
-        let gone = Some((Fault::Lost, "gone".to_owned()));
+        let gone = failed(Fault::Lost, "gone");
         assert_eq!((faults.since(1), faults.since(faults.count())), (gone.clone(), gone));
     }
 

@@ -44,7 +44,8 @@ impl<'a> Job<'a> {
     /// # Errors
     /// Those of the device.
     pub(super) fn new(
-        (opened, attempt): (&'a Opened, &Attempt),
+        opened: &'a Opened,
+        attempt: &Attempt,
         subject: Subject<'_>,
         request: Request<'_>,
     ) -> Result<Self> {
@@ -52,7 +53,7 @@ impl<'a> Job<'a> {
         // Before the first buffer is made: what fails from here on is this call's.
         let flight = opened.flight();
         let program = opened.program(&flight, subject.source)?;
-        let chunking = program.chunking(&flight.device, attempt, (work, count))?;
+        let chunking = program.chunking(&flight.device, attempt, work, count)?;
         let listed = matches!(starts, Starts::Listed(_));
         let shape = Shape { work, listed, horizon: spec.horizon, chunking };
         let mut space = program.take(&flight, shape)?;

@@ -145,7 +145,7 @@ fn dispatch_seconds(call: &Call<'_>) -> Result<f64> {
 }
 
 fn bind(call: &Call<'_>, kernel: Kernel, [source, sink]: [&Buffer; 2]) -> Result<Bound> {
-    let (text, bindings) = limit_kernel(kernel);
+    let (text, bindings) = (limit_kernel(kernel), kernel.bindings(false));
     call.bind(kernel, bindings, text, |slot| if slot == Slot::Source { source } else { sink })
 }
 

@@ -17,9 +17,11 @@ use crate::rollout::{CostQuery, HUGE, MppiProblem, MppiTask, Partial, PlanTally}
 
 /// See [`crate::backend::PlanProgram::tally`]; tallies go to `sink` chunk by chunk, in order.
 pub(super) fn tally(
-    (opened, attempt): (&Opened, &Attempt),
+    opened: &Opened,
+    attempt: &Attempt,
     source: &Arc<PlanSource>,
-    (task, samples): (&MppiTask<'_>, Range<u32>),
+    task: &MppiTask<'_>,
+    samples: Range<u32>,
     sink: &mut dyn FnMut(Vec<PlanTally>),
 ) -> Result<()> {
     if task.problems.is_empty() {
@@ -106,7 +108,7 @@ impl Chunk<'_> {
             for (layers, bound) in buffers.layers.iter().zip(&kernels.layers) {
                 if let Some(layers) = layers {
                     let (columns, row) = (params.columns, params.stride);
-                    layers.forward(&mut batch.dispatches, bound, (columns, row));
+                    layers.forward(&mut batch.dispatches, bound, columns, row);
                 }
             }
             let params = params.over(step, steps);
@@ -124,9 +126,9 @@ impl Chunk<'_> {
             &batch.dispatches,
             |_| {},
             |encoder| {
-                readback.copy(encoder, buffers.of(Slot::Partials), (0, partials));
+                readback.copy(encoder, buffers.of(Slot::Partials), 0, partials);
                 if totals > 0 {
-                    readback.copy(encoder, buffers.of(Slot::Totals), (partials, totals));
+                    readback.copy(encoder, buffers.of(Slot::Totals), partials, totals);
                 }
             },
         )

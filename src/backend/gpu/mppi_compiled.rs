@@ -31,7 +31,8 @@ pub(super) struct PlanCompiled {
 impl PlanCompiled {
     /// What `source` plans for on `device`, its tables and its networks' parameters uploaded.
     pub(super) fn new(
-        (device, pool): (&Device, &Pool),
+        device: &Device,
+        pool: &Pool,
         pipelines: &Arc<Pipelines>,
         source: &Arc<PlanSource>,
     ) -> Self {
@@ -58,7 +59,8 @@ impl PlanCompiled {
     pub(super) fn pipeline(
         &self,
         device: &Device,
-        (kernel, network): Which,
+        kernel: Kernel,
+        network: usize,
     ) -> Result<Arc<Pipeline>> {
         let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = built.get(&(kernel, network)) {

@@ -22,11 +22,13 @@ pub(super) struct PlanProgram {
 impl PlanProgram {
     /// What `source` plans for on `device`, its tables and its networks' parameters uploaded.
     pub(super) fn new(
-        on: (&Device, &Pool),
+        device: &Device,
+        pool: &Pool,
         pipelines: &Arc<Pipelines>,
         source: &Arc<PlanSource>,
     ) -> Self {
-        Self { compiled: PlanCompiled::new(on, pipelines, source), kept: Recent::new(KEPT) }
+        let compiled = PlanCompiled::new(device, pool, pipelines, source);
+        Self { compiled, kept: Recent::new(KEPT) }
     }
 
     /// Whether it is what `source` plans for.

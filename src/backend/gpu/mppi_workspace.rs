@@ -186,7 +186,7 @@ impl Binder<'_> {
     }
 
     fn bind(&self, kernel: Kernel) -> Result<Bound> {
-        let pipeline = self.compiled.pipeline(&self.flight.device, (kernel, 0))?;
+        let pipeline = self.compiled.pipeline(&self.flight.device, kernel, 0)?;
         let said = |network: usize| {
             let layers = self.buffers.layers[network].as_ref();
             layers.map_or(self.buffers.of(Slot::Totals), Layers::output)
@@ -210,7 +210,7 @@ impl Binder<'_> {
             return Ok(Vec::new());
         };
         layers.bind(self.buffers.of(Slot::State), |kernel, [source, sink]| {
-            let pipeline = self.compiled.pipeline(&self.flight.device, (kernel, network))?;
+            let pipeline = self.compiled.pipeline(&self.flight.device, kernel, network)?;
             Ok(pipeline.bind(&self.flight.device, |slot| match slot {
                 Slot::Params => self.inputs.0.params(),
                 Slot::Weights => weights.binding(),

@@ -104,17 +104,20 @@ impl Layers {
         &self,
         batch: &mut Batch<'a>,
         bound: &'a [Bound],
-        (columns, row): (u32, u32),
+        columns: u32,
+        row: u32,
     ) {
-        push_layers(batch, (bound, &self.shapes), (columns, row));
+        push_layers(batch, bound, &self.shapes, columns, row);
     }
 }
 
 /// Adds the dispatches of layers of these shapes over the first `columns` columns, in rows of `row`.
 pub(super) fn push_layers<'a>(
     batch: &mut Batch<'a>,
-    (bound, shapes): (&'a [Bound], &[LayerShape]),
-    (columns, row): (u32, u32),
+    bound: &'a [Bound],
+    shapes: &[LayerShape],
+    columns: u32,
+    row: u32,
 ) {
     for (bound, layer) in bound.iter().zip(shapes) {
         let params = Params {

@@ -95,8 +95,8 @@ impl Opened {
         self.programs.get(
             |program| program.is(source),
             || {
-                let on = (&flight.device, &self.pool);
-                Program::new(on, &self.pipelines, source, self.setup.networks).map(Arc::new)
+                let (device, networks) = (&flight.device, self.setup.networks);
+                Program::new(device, &self.pool, &self.pipelines, source, networks).map(Arc::new)
             },
         )
     }
@@ -111,8 +111,8 @@ impl Opened {
         self.plan_programs.get(
             |program| program.is(source),
             || {
-                let on = (&flight.device, &self.pool);
-                Ok(Arc::new(PlanProgram::new(on, &self.pipelines, source)))
+                let device = &flight.device;
+                Ok(Arc::new(PlanProgram::new(device, &self.pool, &self.pipelines, source)))
             },
         )
     }

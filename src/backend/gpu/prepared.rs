@@ -47,7 +47,7 @@ impl Prepared<'_> {
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
-        recover::reach_avoid(self.gpu, (self.subject(), &self.plant), task, sink)
+        recover::reach_avoid(self.gpu, self.subject(), &self.plant, task, sink)
     }
 
     /// See [`crate::backend::Program::deviation`].
@@ -56,7 +56,7 @@ impl Prepared<'_> {
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
-        recover::deviation(self.gpu, (self.subject(), &self.plant), task, sink)
+        recover::deviation(self.gpu, self.subject(), &self.plant, task, sink)
     }
 
     /// What calls roll out.

@@ -75,7 +75,7 @@ impl PreparedPlanning<'_> {
         sink: &mut dyn FnMut(Vec<PlanTally>),
     ) -> Result<()> {
         match &self.work {
-            Work::Adapter(source) => recover::tally(self.gpu, source, (task, samples), sink),
+            Work::Adapter(source) => recover::tally(self.gpu, source, task, samples, sink),
             Work::Cpu(cpu, prepared) => {
                 prepared.tally(cpu, task, samples, sink);
                 Ok(())

@@ -35,12 +35,13 @@ impl Program {
     /// # Errors
     /// [`crate::Error::Device`] if a network is to be fused and does not fit.
     pub(super) fn new(
-        on: (&Device, &Pool),
+        device: &Device,
+        pool: &Pool,
         pipelines: &Arc<Pipelines>,
         source: &Arc<Source>,
         networks: NetworkKernels,
     ) -> Result<Self> {
-        let compiled = Compiled::new(on, pipelines, source, networks)?;
+        let compiled = Compiled::new(device, pool, pipelines, source, networks)?;
         Ok(Self { source: Arc::clone(source), compiled, kept: Recent::new(KEPT) })
     }
 
@@ -57,7 +58,8 @@ impl Program {
         &self,
         device: &Device,
         attempt: &Attempt,
-        (work, count): (Work, u64),
+        work: Work,
+        count: u64,
     ) -> Result<Chunking> {
         let network = self.source.network.as_deref();
         let text = &self.compiled.text;
@@ -83,7 +85,7 @@ impl Program {
     pub(super) fn take(&self, flight: &Flight<'_>, shape: Shape) -> Result<Workspace> {
         let kept = self.kept.take(|workspace| workspace.shape == shape);
         let network = self.source.network.as_deref();
-        kept.map_or_else(|| Workspace::new(flight, (&self.compiled, network), shape), Ok)
+        kept.map_or_else(|| Workspace::new(flight, &self.compiled, network, shape), Ok)
     }
 
     /// Keeps `workspace` for a later call.

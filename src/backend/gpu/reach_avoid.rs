@@ -20,7 +20,8 @@ const SURVIVORS_BYTES: u64 = 4;
 
 /// See [`crate::backend::Program::reach_avoid`].
 pub(super) fn reach_avoid(
-    adapter: (&Opened, &Attempt),
+    opened: &Opened,
+    attempt: &Attempt,
     subject: Subject<'_>,
     task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
@@ -34,7 +35,8 @@ pub(super) fn reach_avoid(
         Query::Sign => (Work::Sign, 1),
     };
     let (starts, spec, tightening) = (&task.starts, &task.spec, task.tightening);
-    let mut job = Job::new(adapter, subject, Request { work, starts, spec, tightening, count })?;
+    let request = Request { work, starts, spec, tightening, count };
+    let mut job = Job::new(opened, attempt, subject, request)?;
     let stride = job.chunking.stride;
     let params = Params { stride, sign_only, ..Params::of_starts(starts, spec) };
     let mut first = task.range.start;
@@ -59,7 +61,7 @@ fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
     let (mut step, mut set) = (0, 0);
     loop {
         let end = params.horizon.saturating_add(1).min(step + chunking.segment);
-        segment(&mut batch, (&kernels[set], &*buffers), *chunking, (params, step..end));
+        segment(&mut batch, &kernels[set], buffers, *chunking, params, step..end);
         step = end;
         let last = step > params.horizon;
         let compacted = kernels[set].after.as_ref().filter(|_| !last);
@@ -75,10 +77,10 @@ fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
         // Measures come along with the number of survivors: there may be none.
         let copy = |encoder: &mut _| {
             if compacted.is_some() {
-                readback.copy(encoder, buffers.of(Slot::Survivors), (0, SURVIVORS_BYTES));
+                readback.copy(encoder, buffers.of(Slot::Survivors), 0, SURVIVORS_BYTES);
             }
             if compacted.is_some() || last {
-                readback.copy(encoder, buffers.of(Slot::Measures), (MEASURES_AT, measures));
+                readback.copy(encoder, buffers.of(Slot::Measures), MEASURES_AT, measures);
             }
         };
         flight.submit(&batch, clear, copy)?;
@@ -104,9 +106,11 @@ fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
 /// Adds the dispatches of some steps.
 fn segment<'a>(
     batch: &mut Batch<'a>,
-    (kernels, buffers): (&'a Kernels, &Buffers),
+    kernels: &'a Kernels,
+    buffers: &Buffers,
     chunking: Chunking,
-    (params, steps): (Params, Range<u32>),
+    params: Params,
+    steps: Range<u32>,
 ) {
     let mut step = steps.start;
     while step < steps.end {
@@ -114,7 +118,7 @@ fn segment<'a>(
         let Params { columns, stride: row, horizon, .. } = params;
         kernels.chain(batch, ChainStep { step, horizon, columns, row, acting: row });
         if step < params.horizon {
-            kernels.drive(batch, buffers, (params.columns, params.stride), step);
+            kernels.drive(batch, buffers, columns, row, step);
         }
         batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params.over(step, count));
         step += count;

@@ -20,9 +20,10 @@ impl Readback {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         source: &Buffer,
-        (offset, bytes): (u64, u64),
+        offset: u64,
+        bytes: u64,
     ) {
-        source.copy(encoder, (&self.0, offset), bytes);
+        source.copy(encoder, &self.0, offset, bytes);
     }
 
     /// What `take` makes of the first `bytes`, once the last submission of `flight` is done.

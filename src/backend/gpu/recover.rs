@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::adapter::Gpu;
 use super::attempt::Attempt;
+use super::fault::Failure;
 use super::job::Subject;
 use super::mppi_source::PlanSource;
 use super::opened::Opened;
@@ -46,7 +47,8 @@ impl Delivered {
 /// See [`crate::backend::Program::reach_avoid`].
 pub(super) fn reach_avoid(
     gpu: &Gpu,
-    (subject, plant): (Subject<'_>, &Plant),
+    subject: Subject<'_>,
+    plant: &Plant,
     task: &ReachAvoidTask<'_>,
     sink: MeasureSink<'_>,
 ) -> Result<()> {
@@ -56,7 +58,7 @@ pub(super) fn reach_avoid(
             &mut |first, values| delivered.deliver(values.len(), || sink(first, values));
         match runner {
             Runner::Adapter(opened, attempt) => {
-                reach_avoid::reach_avoid((opened, attempt), subject, &task, sink)
+                reach_avoid::reach_avoid(opened, attempt, subject, &task, sink)
             }
             // A CPU prepares the plant when it takes over, once per call that it takes over.
             Runner::Cpu(cpu) => cpu.prepare(plant)?.reach_avoid(cpu, &task, sink),
@@ -67,7 +69,8 @@ pub(super) fn reach_avoid(
 /// See [`crate::backend::Program::deviation`].
 pub(super) fn deviation(
     gpu: &Gpu,
-    (subject, plant): (Subject<'_>, &Plant),
+    subject: Subject<'_>,
+    plant: &Plant,
     task: &DeviationTask<'_>,
     sink: PairSink<'_>,
 ) -> Result<Vec<Farthest>> {
@@ -79,7 +82,7 @@ pub(super) fn deviation(
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                deviation::deviation((opened, attempt), subject, &task, (&mut farthest, sink))
+                deviation::deviation(opened, attempt, subject, &task, &mut farthest, sink)
             }
             Runner::Cpu(cpu) => {
                 let rest = cpu.prepare(plant)?.deviation(cpu, &task, sink)?;
@@ -96,7 +99,8 @@ pub(super) fn deviation(
 pub(super) fn tally(
     gpu: &Gpu,
     source: &Arc<PlanSource>,
-    (task, samples): (&MppiTask<'_>, Range<u32>),
+    task: &MppiTask<'_>,
+    samples: Range<u32>,
     sink: &mut dyn FnMut(Vec<PlanTally>),
 ) -> Result<()> {
     gpu.persevere("problems", 0, |runner, delivered| {
@@ -107,7 +111,7 @@ pub(super) fn tally(
         };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                mppi::tally((opened, attempt), source, (&task, samples.clone()), sink)
+                mppi::tally(opened, attempt, source, &task, samples.clone(), sink)
             }
             Runner::Cpu(cpu) => {
                 let prepared = cpu.prepare_plans(&source.planning);
@@ -139,7 +143,7 @@ impl Gpu {
             let attempt = Attempt::new(limit);
             match run(Runner::Adapter(&opened, &attempt), &delivered) {
                 Err(error) if !delivered.refused.get() => {
-                    let (fault, problem) = self.survivable(error)?;
+                    let Failure { fault, problem } = self.survivable(error)?;
                     let columns = attempt.columns.get();
                     let Some(action) = self.go_on(fault, &opened, columns) else {
                         return Err(Error::DeviceFailed { fault, problem });
@@ -157,10 +161,12 @@ impl Gpu {
     /// # Errors
     /// `error` itself where it is none of the adapter's, or says that work does not fit it and
     /// nobody else may do it.
-    fn survivable(&self, error: Error) -> Result<(Fault, String)> {
+    fn survivable(&self, error: Error) -> Result<Failure> {
         match error {
-            Error::DeviceFailed { fault, problem } => Ok((fault, problem)),
-            Error::Device(problem) if self.fallback.is_some() => Ok((Fault::Unfit, problem)),
+            Error::DeviceFailed { fault, problem } => Ok(Failure { fault, problem }),
+            Error::Device(problem) if self.fallback.is_some() => {
+                Ok(Failure { fault: Fault::Unfit, problem })
+            }
             other => Err(other),
         }
     }

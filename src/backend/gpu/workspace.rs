@@ -49,7 +49,8 @@ impl Workspace {
     /// [`crate::Error::DeviceFailed`] if the driver refuses a kernel.
     pub(super) fn new(
         flight: &Flight<'_>,
-        (compiled, network): (&Compiled, Option<&Mlp>),
+        compiled: &Compiled,
+        network: Option<&Mlp>,
         shape: Shape,
     ) -> Result<Self> {
         let (device, pool) = (&flight.device, flight.pool);
@@ -65,7 +66,7 @@ impl Workspace {
             dispatches: 2 + chunking.segment as usize * (layers + chained + 2),
         };
         let inputs = Inputs::new(device, pool, sizes);
-        let buffers = Buffers::new(flight, (compiled, network), shape);
+        let buffers = Buffers::new(flight, compiled, network, shape);
         let sets = if shape.work == Work::Sign { 2 } else { 1 };
         let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers };
         let kernels =
@@ -94,11 +95,7 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    fn new(
-        flight: &Flight<'_>,
-        (compiled, network): (&Compiled, Option<&Mlp>),
-        shape: Shape,
-    ) -> Self {
+    fn new(flight: &Flight<'_>, compiled: &Compiled, network: Option<&Mlp>, shape: Shape) -> Self {
         let storage = |bytes| flight.pool.take(&flight.device, Use::Storage, bytes);
         let sizes = sizes(shape, compiled.text.states());
         let row = shape.chunking.row;
@@ -108,8 +105,8 @@ impl Buffers {
         let layers = layered.map(|mlp| Layers::new(&flight.device, flight.pool, mlp, row));
         let seen = seen.map(|seen| storage(16 * seen.div_ceil(4) as u64 * u64::from(row)));
         let all = slots.iter().map(|(_, buffer)| buffer).chain(&seen);
-        let on = (&flight.device, flight.pool);
-        let chain = compiled.text.chain().map(|chain| ChainBuffers::new(on, chain, row));
+        let chain = |chain| ChainBuffers::new(&flight.device, flight.pool, chain, row);
+        let chain = compiled.text.chain().map(chain);
         let bytes = all.map(Buffer::size).sum::<u64>()
             + layers.as_ref().map_or(0, Layers::size)
             + chain.as_ref().map_or(0, ChainBuffers::size);
@@ -191,7 +188,8 @@ impl Kernels {
         &'a self,
         batch: &mut Batch<'a>,
         buffers: &Buffers,
-        (columns, row): (u32, u32),
+        columns: u32,
+        row: u32,
         step: u32,
     ) {
         if let Some(observe) = &self.observe {
@@ -199,7 +197,7 @@ impl Kernels {
             batch.push_columns(Kernel::Observe, observe, &params);
         }
         if let Some(layers) = &buffers.layers {
-            layers.forward(batch, &self.layers, (columns, row));
+            layers.forward(batch, &self.layers, columns, row);
         }
     }
 }

@@ -94,7 +94,7 @@ fn a_pair_that_is_not_finite_is_the_farthest() {
         control: PairControl::Replay,
     };
     for cpu in every_cpu() {
-        let (farthest, measures) = deviation(&cpu, &plant, &task);
+        let Measured { farthest, measures } = deviation(&cpu, &plant, &task);
         assert!(farthest[0].distance <= 1.001e-3, "{:?}", farthest[0]);
         // The first start of NaN control is number 5; its state is NaN from step 1 on.
         assert_eq!((farthest[1].distance, farthest[1].pair), (HUGE, 5));

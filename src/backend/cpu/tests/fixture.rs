@@ -115,20 +115,25 @@ pub(super) fn race(
     measures(cpu, plant, &task)
 }
 
-/// Farthest pairs and measures of `task`, which the sink must get in order.
-pub(super) fn deviation(
-    cpu: &Cpu,
-    plant: &Plant,
-    task: &DeviationTask<'_>,
-) -> (Vec<Farthest>, Vec<PairMeasure>) {
-    let mut all = Vec::new();
+/// What pairs come to.
+#[derive(Debug, PartialEq)]
+pub(super) struct Measured {
+    /// Of each step.
+    pub(super) farthest: Vec<Farthest>,
+    /// Of each pair.
+    pub(super) measures: Vec<PairMeasure>,
+}
+
+/// What the pairs of `task` come to; the sink must get their measures in order.
+pub(super) fn deviation(cpu: &Cpu, plant: &Plant, task: &DeviationTask<'_>) -> Measured {
+    let mut measures = Vec::new();
     let prepared = cpu.prepare(plant).expect("it fits");
     let farthest = prepared.deviation(cpu, task, &mut |first, values| {
-        assert_eq!(first, task.range.start + all.len() as u64, "order of the sink");
-        all.extend_from_slice(values);
+        assert_eq!(first, task.range.start + measures.len() as u64, "order of the sink");
+        measures.extend_from_slice(values);
         Ok(())
     });
-    (farthest.expect("the batch runs"), all)
+    Measured { farthest: farthest.expect("the batch runs"), measures }
 }
 
 /// The bits of `values`.

@@ -135,7 +135,8 @@ fn deviation_of_a_formula_is_the_scalar_loop() {
                 perturbed: scalar_measure(&system, &states[1], &spec, &plain),
             });
         }
-        assert_eq!(deviation(&cpu(2), &race_under(Damping), &task), (farthest, measures));
+        let found = deviation(&cpu(2), &race_under(Damping), &task);
+        assert_eq!(found, Measured { farthest, measures });
     }
 }
 
@@ -172,7 +173,7 @@ fn deviation_of_a_network_is_near_f64() {
             tightening: &tightening,
             control,
         };
-        let (_, measures) = deviation(&cpu(2), &plant, &task);
+        let Measured { measures, .. } = deviation(&cpu(2), &plant, &task);
         let mut worst = 0.0_f64;
         for (pair, measure) in measures.iter().enumerate() {
             let [nominal, perturbed] = task.pairs.pair(pair as u64);

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::model::Plant;
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::rollout::{
-    DeviationTask, Farthest, PairControl, PairMeasure, Query, ReachAvoidTask, Starts, Tightening,
+    DeviationTask, Farthest, PairControl, Query, ReachAvoidTask, Starts, Tightening,
 };
 
 /// How the starts `0..COUNT` are split into ranges.
@@ -45,7 +45,7 @@ fn race_deviation(
     plant: &Plant,
     range: Range<u64>,
     control: PairControl,
-) -> (Vec<Farthest>, Vec<PairMeasure>) {
+) -> Measured {
     let spec = spec();
     let task =
         DeviationTask { pairs: race_pairs(), range, spec, tightening: &tightening(&spec), control };
@@ -57,20 +57,24 @@ fn deviation_does_not_depend_on_threads_or_place() {
     let plant = race_under(race_policy());
     for control in [PairControl::Replay, PairControl::ClosedLoop] {
         let whole = race_deviation(&cpu(1), &plant, 0..COUNT, control);
-        assert!(whole.0.iter().all(|farthest| farthest.pair < COUNT));
+        assert!(whole.farthest.iter().all(|farthest| farthest.pair < COUNT));
         for threads in [1, 2, 3] {
             let cpu = cpu(threads);
             for cuts in SPLITS {
-                let mut farthest = vec![Farthest::NONE; whole.0.len()];
+                let mut farthest = vec![Farthest::NONE; whole.farthest.len()];
                 let mut measures = Vec::new();
                 for range in ranges(cuts) {
                     let part = race_deviation(&cpu, &plant, range, control);
-                    for (farthest, part) in farthest.iter_mut().zip(part.0) {
+                    for (farthest, part) in farthest.iter_mut().zip(part.farthest) {
                         *farthest = farthest.merge(part);
                     }
-                    measures.extend(part.1);
+                    measures.extend(part.measures);
                 }
-                assert_eq!((farthest, measures), whole, "{threads} threads, cuts {cuts:?}");
+                assert_eq!(
+                    Measured { farthest, measures },
+                    whole,
+                    "{threads} threads, cuts {cuts:?}"
+                );
             }
         }
     }
@@ -167,6 +171,7 @@ fn wrong_tasks_are_refused() {
 fn an_empty_range_gives_nothing() {
     let plant = race_under(Damping);
     assert!(race(&cpu(2), &plant, 5..5, Query::Sign).is_empty());
-    let (farthest, measures) = race_deviation(&cpu(2), &plant, 5..5, PairControl::Replay);
+    let Measured { farthest, measures } =
+        race_deviation(&cpu(2), &plant, 5..5, PairControl::Replay);
     assert_eq!((farthest, measures), (vec![Farthest::NONE; 31], vec![]));
 }

@@ -95,12 +95,13 @@ pub(super) fn component(i: usize) -> String {
 pub(super) type Argument<'a> = (&'a str, &'a str, usize);
 
 /// The function `name` that calls the recorded function `recorded`, whose single states, controls
-/// and the like are plain numbers.
+/// and the like are plain numbers; this one returns the `length` numbers of that as a `kind`.
 pub(super) fn call(
     name: &str,
     recorded: &str,
     arguments: &[Argument<'_>],
-    (kind, length): (&str, usize),
+    kind: &str,
+    length: usize,
 ) -> String {
     let declared: Vec<String> =
         arguments.iter().map(|(name, kind, _)| format!("{name}: {kind}")).collect();

@@ -62,6 +62,22 @@ impl LayerShape {
     }
 }
 
+/// The functions at the ends of the layers of a network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Activations {
+    /// Of the hidden layers.
+    hidden: Activation,
+    /// Of the last layer.
+    output: OutputActivation,
+}
+
+impl Activations {
+    /// Those of `mlp`.
+    pub(super) fn of(mlp: &Mlp) -> Self {
+        Self { hidden: mlp.activation(), output: mlp.output() }
+    }
+}
+
 /// The layers of a network that the rollouts run themselves, all steps in one dispatch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fused {
@@ -97,17 +113,13 @@ impl Fused {
 }
 
 /// The text of a layer's kernel: of the last one, or of another.
-pub(super) fn layer_text(network: Option<(Activation, OutputActivation)>, last: bool) -> String {
+pub(super) fn layer_text(activations: Option<Activations>, last: bool) -> String {
     let last = format!("const LAST_LAYER: bool = {last};\n");
-    [recorded_activations(network), last, TILE.to_owned(), MLP.to_owned()].join("\n")
+    [recorded_activations(activations), last, TILE.to_owned(), MLP.to_owned()].join("\n")
 }
 
 /// `drive` by a network that the rollout runs itself, whose activations `glue` puts and takes.
-pub(super) fn fused_text(
-    activations: (Activation, OutputActivation),
-    fused: &Fused,
-    glue: &str,
-) -> String {
+pub(super) fn fused_text(activations: Activations, fused: &Fused, glue: &str) -> String {
     let sizes = format!(
         "const FUSED_QUADS: u32 = {}u;\nconst LAYER_COUNT: u32 = {}u;\n",
         fused.quads(),
@@ -151,9 +163,9 @@ pub(super) fn activation_glue(inputs: usize, outputs: usize) -> String {
 }
 
 /// `hidden_activation` and `output_activation`; the identity where there is no network.
-fn recorded_activations(network: Option<(Activation, OutputActivation)>) -> String {
-    let hidden = |x: Expr| network.map_or(x, |(hidden, _)| hidden.apply(x));
-    let output = |x: Expr| network.map_or(x, |(_, output)| output.apply(x));
+fn recorded_activations(activations: Option<Activations>) -> String {
+    let hidden = |x: Expr| activations.map_or(x, |network| network.hidden.apply(x));
+    let output = |x: Expr| activations.map_or(x, |network| network.output.apply(x));
     [
         function("hidden_activation", &[("x", 1)], &record(1, |x| vec![hidden(x[0])])),
         function("output_activation", &[("x", 1)], &record(1, |x| vec![output(x[0])])),

@@ -109,7 +109,7 @@ impl MppiText {
         let state = state_glue(states);
         let parts = match kernel {
             Kernel::MppiStart => {
-                vec![loader("start_of", "State", "starts", (states, 0..states)), state]
+                vec![loader("start_of", "State", "starts", states, 0..states), state]
             }
             Kernel::MppiRollout => vec![state, self.noise.clone(), self.rollout()],
             Kernel::MppiUpdate => {
@@ -139,8 +139,8 @@ impl MppiText {
         if contexts > 0 {
             text += &format!("alias Context = array<f32, {contexts}>;\n");
             let controls = self.outline.controls;
-            let row = (controls + contexts, controls..controls + contexts);
-            text += &loader("context_at", "Context", "plans", row);
+            let row = controls + contexts;
+            text += &loader("context_at", "Context", "plans", row, controls..row);
         }
         let functions: Vec<&Function> = self.functions.iter().collect();
         [text, physics_glue(&self.outline, &functions), self.charge.clone()].concat()
@@ -185,7 +185,7 @@ fn noise_text(spec: &MppiSpec, contexts: usize) -> String {
         draw(controls),
         recorded,
         shape.to_owned(),
-        loader("plan_at", "Control", "plans", (controls + contexts, 0..controls)),
+        loader("plan_at", "Control", "plans", controls + contexts, 0..controls),
         recorded_control(spec),
     ]
     .join("\n")
@@ -208,7 +208,7 @@ fn draw(controls: usize) -> String {
 }
 
 /// A function that loads the numbers `part` of row `row` of a table of rows of `length` numbers.
-fn loader(name: &str, kind: &str, table: &str, (length, part): (usize, Range<usize>)) -> String {
+fn loader(name: &str, kind: &str, table: &str, length: usize, part: Range<usize>) -> String {
     let all: Vec<String> = part.map(|i| format!("{table}[at + {i}u]")).collect();
     format!(
         "fn {name}(row: u32) -> {kind} {{\n    let at = row * {length}u;\n    \
@@ -224,7 +224,7 @@ fn recorded_recurrence(count: usize, keep: f32, fresh: f32) -> String {
         (0..count).map(next).collect()
     });
     let arguments = [("before", "Control", count), ("fresh", "Control", count)];
-    both("recurrence", "recorded_recurrence", &arguments, ("Control", count), &graph)
+    both("recurrence", "recorded_recurrence", &arguments, "Control", count, &graph)
 }
 
 /// `mixture`: the weighted sum of four knots.
@@ -242,7 +242,7 @@ fn recorded_mixture(count: usize) -> String {
     let knot = |name| (name, "Control", count);
     let weights = ("weights", "array<f32, 4>", SPLINE_SUPPORT);
     let arguments = [weights, knot("a"), knot("b"), knot("c"), knot("d")];
-    both("mixture", "recorded_mixture", &arguments, ("Control", count), &graph)
+    both("mixture", "recorded_mixture", &arguments, "Control", count, &graph)
 }
 
 /// `control_at`: the plan, its noise added, clipped.
@@ -262,7 +262,7 @@ fn recorded_control(spec: &MppiSpec) -> String {
         (0..count).map(control).collect()
     });
     let arguments = [("nominal", "Control", count), ("z", "Control", count)];
-    both("control_at", "recorded_control", &arguments, ("Control", count), &graph)
+    both("control_at", "recorded_control", &arguments, "Control", count, &graph)
 }
 
 /// `charge`: the cost so far with that of a stage, of its noise where noise costs, and of its place
@@ -299,7 +299,7 @@ fn recorded_noise_cost(penalty: &[f32], count: usize) -> String {
         vec![(0..count).fold(Expr::lit(0.0), cost)]
     });
     let arguments = [("nominal", "Control", count), ("u", "Control", count)];
-    both("noise_cost", "recorded_noise_cost", &arguments, ("f32", 1), &graph)
+    both("noise_cost", "recorded_noise_cost", &arguments, "f32", 1, &graph)
 }
 
 /// `charge_value`: the cost so far with the penalty on the value.
@@ -335,7 +335,7 @@ fn push_text(states: usize, disturbance: Option<&Disturbance>) -> String {
         x
     });
     let arguments = [("x", "State", states), ("d", "Push", outputs)];
-    let recorded = both("pushed", "recorded_push", &arguments, ("State", states), &graph);
+    let recorded = both("pushed", "recorded_push", &arguments, "State", states, &graph);
     let slot = Slot::Push as u32;
     let mut text = format!(
         "alias Push = array<f32, {outputs}>;\n{recorded}\
@@ -364,16 +364,17 @@ fn update_text(controls: usize) -> String {
     text + "}\n"
 }
 
-/// The recorded function and the one that calls it.
+/// The recorded function, and the one that calls it and returns its `length` numbers as a `kind`.
 fn both(
     name: &str,
     recorded: &str,
     arguments: &[(&str, &str, usize)],
-    result: (&str, usize),
+    kind: &str,
+    length: usize,
     graph: &Graph,
 ) -> String {
     let inputs: Vec<(&str, usize)> =
         arguments.iter().map(|(name, _, length)| (*name, *length)).collect();
     let text = careful_function(recorded, &inputs, graph);
-    [text, call(name, recorded, arguments, result)].concat()
+    [text, call(name, recorded, arguments, kind, length)].concat()
 }

@@ -1,9 +1,9 @@
 //! Recorded functions under the names and with the arguments that the kernels call them by.
 
 use super::kernels::Slot;
-use super::layers::Fused;
+use super::layers::{Activations, Fused};
 use crate::backend::physics::{Function, Part, Physics, Role};
-use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::policy::Mlp;
 
 /// What the texts have of a plant besides its formulas.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub(super) struct Outline {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct DrivingNetwork {
     /// Activation of hidden layers and of the last one.
-    pub(super) activations: (Activation, OutputActivation),
+    pub(super) activations: Activations,
     /// Numbers that it sees.
     pub(super) inputs: usize,
     /// Numbers that it says.
@@ -40,7 +40,7 @@ impl DrivingNetwork {
     pub(super) fn new(mlp: &Mlp) -> Self {
         let widths = mlp.widths();
         Self {
-            activations: (mlp.activation(), mlp.output()),
+            activations: Activations::of(mlp),
             inputs: widths[0],
             outputs: widths[widths.len() - 1],
             fused: None,
