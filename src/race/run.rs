@@ -340,7 +340,7 @@ impl Experiment<'_> {
         let most = logs.iter().map(seen).max().unwrap_or(0);
         let start = logs.iter().position(|race| seen(race) == most).unwrap_or(0);
         let seed = race_seed(noise_seed, start as u64);
-        let shown = picture(name, world, (start, self.starts[start]), (noise_seed, seed), watch)?;
+        let shown = picture(name, world, start, self.starts[start], noise_seed, seed, watch)?;
         let flown = shown.frames.iter().map(|frame| frame.x.as_slice());
         let same = flown.eq(logs[start].states.iter().map(|x| x.as_slice()));
         Ok(same.then_some(shown))

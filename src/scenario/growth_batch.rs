@@ -116,7 +116,7 @@ fn round(
     let mut nearest: Vec<Option<f64>> = vec![None; balls.len()];
     for first in (0..total).step_by(LISTED) {
         let range = first..total.min(first + LISTED as u64);
-        piece(context, settings, requests, (balls, range), (&mut nearest, band))?;
+        piece(context, settings, requests, balls, range, &mut nearest, band)?;
     }
     balls.iter_mut().for_each(|open| open.rounds += 1);
     Ok(nearest)
@@ -127,8 +127,10 @@ fn piece(
     context: Context<'_>,
     settings: &Settings,
     requests: &[Request],
-    (balls, range): (&mut [Open], Range<u64>),
-    (nearest, band): (&mut [Option<f64>], f64),
+    balls: &mut [Open],
+    range: Range<u64>,
+    nearest: &mut [Option<f64>],
+    band: f64,
 ) -> Result<()> {
     let count = settings.growth.scenarios;
     let draw = |(place, open): (usize, &Open)| {
