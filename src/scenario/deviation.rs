@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
-use super::coordinates::coordinates;
+use super::coordinates::{Coordinates, coordinates};
 use super::purpose;
 use super::record::{Claim, DeviationRecord, decimal};
 use super::settings::{DeviationSettings, DeviationSource, Joint, Program, Settings};
@@ -216,7 +216,7 @@ fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim>
         ),
     };
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let (dimension, frozen) = coordinates(model, &region.varies());
+    let Coordinates { dimension, frozen } = coordinates(model, &region.varies());
     // Risk of one program, times the programs whose risks add up.
     let programs = asked.epsilon / program.epsilon;
     let risk = certified_risk(asked.scenarios, u64::from(program.decision_vars) - 1, program.beta);

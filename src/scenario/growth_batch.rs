@@ -190,7 +190,7 @@ mod tests {
     use crate::rollout::RolloutSpec;
     use crate::scenario::Unwatched;
     use crate::scenario::boundary::Boundary;
-    use crate::scenario::growth::grow;
+    use crate::scenario::growth::{GrowthRun, grow};
     use crate::scenario::record::RoundRecord;
     use crate::system::{BangBang, DoubleIntegrator};
 
@@ -230,7 +230,7 @@ mod tests {
         for (request, grown) in requests().into_iter().zip(&grown) {
             let settings = Settings { seed: request.seed, ..asked.clone() };
             let boundary = Boundary { point: request.center.clone(), distance: 0.0 };
-            let (outcome, rounds, _) =
+            let GrowthRun { outcome, rounds, .. } =
                 grow(context, &settings, &boundary, band, request.call).unwrap();
             let reruns = |round: &RoundRecord| round.f64_reruns;
             assert_eq!(grown.outcome, outcome, "{request:?}");

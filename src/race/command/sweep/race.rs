@@ -10,7 +10,7 @@ use crate::cli::progress::Progress;
 use crate::config::Overrides;
 use crate::error::Result;
 use crate::files::Existing;
-use crate::race::command::input::{RaceInput, name, noise_seeds};
+use crate::race::command::input::{RaceInput, RaceStarts, name, noise_seeds};
 use crate::race::controller::Name;
 use crate::race::run::Experiment;
 use crate::race::sweep::record::PointResult;
@@ -40,7 +40,7 @@ pub(super) fn run(
 ) -> Result<Store> {
     let base = global.overrides();
     let input = RaceInput::load(&asked.config, &base)?;
-    let (starts, source) = input.starts(asked.race.starts.as_deref())?;
+    let RaceStarts { states: starts, source } = input.starts(asked.race.starts.as_deref())?;
     input.inputs(&asked.config, asked.race.starts.as_deref()).spare_folder(out)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.race.noise_seeds.unwrap_or(1))?;
     let config = asked.config.as_path();
