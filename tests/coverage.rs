@@ -407,7 +407,7 @@ fn false_balls(plant: &Plant, asked: &Settings, trial: Trial, failure: impl Fn(f
             // A looser risk than the one judged by, where the count asks for it.
             match grow(context, &settings, &boundary, 1e-5, 0) {
                 Err(Error::TooFewScenarios { .. }) => settings.growth.epsilon *= 1.02,
-                outcome => break outcome.expect("growth").0,
+                grown => break grown.expect("growth").outcome,
             }
         };
         if let Growth::Verified(ball) = growth {

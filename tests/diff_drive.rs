@@ -15,7 +15,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::control::DriveBenchmark;
 use reachcast::control::mppi::{Planner, shifted};
-use reachcast::cost::{Cost, CostMap, GoalCost, Grid, MAX_CELLS};
+use reachcast::cost::{Cost, CostMap, GoalCost, Grid, Lookup, MAX_CELLS};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, MppiProblem, MppiSettings, MppiSpec, MppiTask, NoiseKind, Planning, Purpose, Stream,
@@ -230,8 +230,8 @@ impl Cost<2, 1, 1> for Charged {
     fn stage<R: Real>(&self, _: [R; 2], _: [R; 1], _: [R; 1]) -> R {
         R::lit(0.0)
     }
-    fn map<R: Real>(&self, x: [R; 2]) -> Option<(&CostMap, [R; 2])> {
-        Some((&self.0, x))
+    fn map<R: Real>(&self, x: [R; 2]) -> Option<Lookup<'_, R>> {
+        Some(Lookup { map: &self.0, place: x })
     }
 }
 

@@ -12,15 +12,14 @@ use std::path::Path;
 use allocator::peak;
 use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed, TestRunner};
-use reachcast::backend::Event;
 use reachcast::config::{Config, Overrides};
 use reachcast::files::{StateReader, npy_bytes, npz_bytes, read_npz};
 use reachcast::policy::Mlp;
 use reachcast::policy::import::{self, Request};
 use reachcast::race::log::{RaceLog, StepLog, arrays, races};
 use reachcast::race::record::RaceRecord;
-use reachcast::race::sweep::Store;
 use reachcast::race::sweep::record::{PointResult, SweepRecord};
+use reachcast::race::sweep::{Computed, Store};
 use reachcast::scenario::record::Record;
 use serde_json::json;
 
@@ -332,14 +331,17 @@ fn points_of_sweeps() {
     let (record, result) = sweep();
     let mut store = Store::open(folder.path(), &json!({}), record.clone()).unwrap();
     let hash = "a".repeat(64);
-    store.point(hash.clone(), vec!["1".to_owned()], || Ok((result.clone(), vec![]))).unwrap();
+    store
+        .point(hash.clone(), vec!["1".to_owned()], || {
+            Ok(Computed { result: result.clone(), events: vec![] })
+        })
+        .unwrap();
     let name = format!("{hash}.json");
     let whole = std::fs::read(folder.path().join("points").join(&name)).unwrap();
     let read = |path: &Path| {
         std::fs::copy(path, folder.path().join("points").join(&name)).unwrap();
         let mut store = Store::open(folder.path(), &json!({}), record.clone()).unwrap();
-        let computes =
-            || -> reachcast::Result<(PointResult, Vec<Event>)> { panic!("it is stored") };
+        let computes = || -> reachcast::Result<Computed> { panic!("it is stored") };
         let stored = store.point(hash.clone(), vec!["1".to_owned()], computes);
         if stored.is_ok() {
             assert_eq!(store.record().points[0].result, result);

@@ -112,7 +112,7 @@ impl PreparedWorkload<'_> {
                 measures(program, rollouts, *query)
             }
             (Kind::Pairs { rollouts, radius, stream }, Prepared::Plant(program)) => {
-                deviations(program, rollouts, (*radius, *stream))
+                deviations(program, rollouts, *radius, *stream)
             }
             (Kind::Plan { problem, .. }, Prepared::Plans(program)) => {
                 let problems = std::slice::from_ref(problem);
@@ -144,7 +144,8 @@ fn measures(program: &Program<'_>, rollouts: &Rollouts, query: Query) -> Result<
 fn deviations(
     program: &Program<'_>,
     rollouts: &Rollouts,
-    (radius, stream): (f32, Stream),
+    radius: f32,
+    stream: Stream,
 ) -> Result<()> {
     let Rollouts { starts, count, spec, .. } = rollouts;
     let task = DeviationTask {

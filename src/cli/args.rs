@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use super::options::{Changes, Common, Global, Keys, Replace};
+use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::files::Existing;
 use crate::policy::{Activation, OutputActivation};
 use crate::studies::StudyCommand;
@@ -23,9 +23,9 @@ pub(super) struct Arguments {
 impl Arguments {
     /// The options that are not of one command alone.
     pub(crate) fn global(&self) -> Global {
-        let (changes, out, replace) = self.command.options();
+        let Own { changes, out, replace } = self.command.options();
         let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
-        Global { common: self.common.clone(), changes, out: out.cloned(), existing }
+        Global { common: self.common.clone(), changes, out, existing }
     }
 }
 
@@ -185,29 +185,27 @@ Examples:
 impl Command {
     /// What lies over the configuration, where the results go and whether they may replace others;
     /// nothing where the command has no such option.
-    pub(super) fn options(&self) -> (Changes, Option<&PathBuf>, Replace) {
+    pub(super) fn options(&self) -> Own {
         let no_seed = |keys: &Keys| Changes { seed: None, keys: keys.clone() };
+        let own =
+            |changes, out: &Option<PathBuf>, replace| Own { changes, out: out.clone(), replace };
         match self {
             Self::Certify { changes, out, replace, .. }
-            | Self::Train { changes, out, replace, .. } => {
-                (changes.clone(), out.as_ref(), *replace)
-            }
-            Self::Rollout { keys, replace, .. } => (no_seed(keys), None, *replace),
-            Self::Query { out, replace, .. } => (Changes::default(), out.as_ref(), *replace),
+            | Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
+            Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
+            Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
             Self::Study(asked) => asked.options(),
             Self::Policy(PolicyCommand::Import(asked)) => {
-                (no_seed(&asked.keys), asked.out.as_ref(), asked.replace)
+                own(no_seed(&asked.keys), &asked.out, asked.replace)
             }
             Self::Policy(PolicyCommand::Inspect { changes, .. }) => {
-                (changes.clone(), None, Replace::default())
+                Own { changes: changes.clone(), ..Own::default() }
             }
             Self::Bench(asked) => {
                 let changes = Changes { seed: asked.seed, ..Changes::default() };
-                (changes, asked.out.as_ref(), asked.replace)
+                own(changes, &asked.out, asked.replace)
             }
-            Self::Check { .. } | Self::Scenarios(_) | Self::Devices => {
-                (Changes::default(), None, Replace::default())
-            }
+            Self::Check { .. } | Self::Scenarios(_) | Self::Devices => Own::default(),
         }
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let work = Certify { global, config: &config, out: &out, manifest: &manifest };
     let (record, mut staged) = work.run(&config.plant(&policy)?)?;
     staged.add(MANIFEST, manifest.as_bytes())?;
-    stage(&mut staged, &record, (&policy, &config.networks))?;
+    stage(&mut staged, &record, &policy, &config.networks)?;
     // Again: the work may have taken hours.
     match global.existing {
         Existing::Kept => is_free(&out, &manifest).map(drop)?,
@@ -105,7 +105,8 @@ fn estimate(settings: &Settings) -> u64 {
 fn stage(
     staged: &mut Staged,
     record: &Record,
-    (policy, networks): (&PolicySource, &[NetworkFile]),
+    policy: &PolicySource,
+    networks: &[NetworkFile],
 ) -> Result<()> {
     if let PolicySource::Network { bytes, .. } = policy {
         staged.add(POLICY, bytes)?;

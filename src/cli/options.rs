@@ -62,6 +62,17 @@ pub(crate) struct Replace {
     pub(crate) overwrite: bool,
 }
 
+/// The options that only some commands have, of one command; nothing where it has no such option.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Own {
+    /// What lies over the configuration.
+    pub(crate) changes: Changes,
+    /// Where the results go.
+    pub(crate) out: Option<PathBuf>,
+    /// Whether they may replace others.
+    pub(crate) replace: Replace,
+}
+
 /// What every command is told by its options, those that it does not have left out.
 #[derive(Clone, Debug)]
 pub(crate) struct Global {

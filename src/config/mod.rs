@@ -60,7 +60,7 @@ impl Config {
         let text = read_text(path, CONFIG_BYTES).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::from_layers(table, Some(text), (&path.display().to_string(), folder), overrides)
+        Self::from_layers(table, Some(text), &path.display().to_string(), folder, overrides)
     }
 
     /// The configuration of the TOML document `table`, which errors call `origin`.
@@ -68,14 +68,15 @@ impl Config {
     /// # Errors
     /// [`Error::Invalid`], as for [`Config::load`].
     pub fn from_table(table: Table, origin: &str, overrides: &Overrides) -> Result<Self> {
-        Self::from_layers(table, None, (origin, Path::new("")), overrides)
+        Self::from_layers(table, None, origin, Path::new(""), overrides)
     }
 
     /// The configuration of the document `table` in `folder`, whose text makes errors name lines.
     fn from_layers(
         table: Table,
         text: Option<String>,
-        (origin, folder): (&str, &Path),
+        origin: &str,
+        folder: &Path,
         overrides: &Overrides,
     ) -> Result<Self> {
         let sets = overrides.set.iter().map(|text| {

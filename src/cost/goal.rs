@@ -1,6 +1,6 @@
 //! The cost of driving to a goal: distance, yaw, and a map of what lies on the way.
 
-use super::{Cost, CostMap};
+use super::{Cost, CostMap, Lookup};
 use crate::real::Real;
 
 /// `distance |p - p_goal| + angle |yaw - yaw_goal|` and the map's cost at p, for a state
@@ -34,7 +34,7 @@ impl<const NU: usize> Cost<3, NU, 3> for GoalCost {
     }
 
     #[inline(always)]
-    fn map<R: Real>(&self, [x, y, _]: [R; 3]) -> Option<(&CostMap, [R; 2])> {
-        Some((&self.map, [x, y]))
+    fn map<R: Real>(&self, [x, y, _]: [R; 3]) -> Option<Lookup<'_, R>> {
+        Some(Lookup { map: &self.map, place: [x, y] })
     }
 }

@@ -29,6 +29,15 @@ pub struct CostMap {
     cells: Vec<f32>,
 }
 
+/// A map and the point where it is looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct Lookup<'a, R> {
+    /// The map.
+    pub map: &'a CostMap,
+    /// The point on the plane, m.
+    pub place: [R; 2],
+}
+
 impl CostMap {
     /// The map of `costs`, `[rows, columns]`: x runs along a row, y from row to row. Whatever lies
     /// outside costs `outside`.

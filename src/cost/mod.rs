@@ -5,7 +5,7 @@ mod map;
 mod quadratic;
 
 pub use goal::GoalCost;
-pub use map::{CostMap, Grid, MAX_CELLS};
+pub use map::{CostMap, Grid, Lookup, MAX_CELLS};
 pub use quadratic::{Obstacle, Quadratic};
 
 use crate::real::Real;
@@ -23,7 +23,7 @@ pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {
     /// only the point may depend on the state. A map is data of the kernels, not part of their
     /// text.
     #[inline(always)]
-    fn map<R: Real>(&self, _x: [R; NX]) -> Option<(&CostMap, [R; 2])> {
+    fn map<R: Real>(&self, _x: [R; NX]) -> Option<Lookup<'_, R>> {
         None
     }
 }

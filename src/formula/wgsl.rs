@@ -49,7 +49,7 @@ pub fn function_with(
     graph: &Graph,
     product: Product<'_>,
 ) -> String {
-    printed((name, arguments), &graph.expanded(), product, None)
+    printed(name, arguments, &graph.expanded(), product, None)
 }
 
 /// Like [`function`], with every NaN kept, whatever a driver makes of `a - a` or `0 * a`: flags follow
@@ -59,12 +59,13 @@ pub fn function_with(
 /// As [`function`] does.
 pub fn careful_function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
     let graph = graph.expanded();
-    printed((name, arguments), &graph, Product::Plain, Flags::of(&graph.nodes))
+    printed(name, arguments, &graph, Product::Plain, Flags::of(&graph.nodes))
 }
 
 /// The function of an expanded graph, with flags where there are any.
 fn printed(
-    (name, arguments): (&str, &[(&str, usize)]),
+    name: &str,
+    arguments: &[(&str, usize)],
     graph: &Graph,
     product: Product<'_>,
     mut flags: Option<Flags<'_>>,
@@ -86,7 +87,7 @@ fn printed(
             Node::Literal(bits) => literal(i, f32::from_bits(bits)),
             Node::Said(call, output) => {
                 let call = call as usize;
-                said(i, (&graph.calls[call], &digests[call]), output)
+                said(i, &graph.calls[call], &digests[call], output)
             }
             Node::SelectLt(a, b, yes, no) => {
                 let less = flags.as_ref().map_or(format!("v{a} < v{b}"), |flags| flags.less(a, b));
@@ -137,7 +138,7 @@ fn operation(node: Node, inputs: &[String], product: Product<'_>) -> String {
 
 /// The statement of an output of a network, which WGSL has no operation for: its text tells plants
 /// apart, and no kernel is made of it. The network is named by its digest.
-fn said(i: usize, (call, digest): (&Call, &str), output: u32) -> String {
+fn said(i: usize, call: &Call, digest: &str, output: u32) -> String {
     let arguments: Vec<String> = call.arguments.iter().map(|at| format!("v{at}")).collect();
     let arguments = arguments.join(", ");
     format!("    let v{i} = network_{digest}({arguments})[{output}];\n")

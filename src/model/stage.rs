@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::Model;
 use super::compiled::CompiledForm;
 use super::recorded::recorded_with;
-use crate::cost::{Cost, CostMap};
+use crate::cost::{Cost, CostMap, Lookup};
 use crate::error::{Error, Result};
 use crate::formula::{Expr, Graph};
 use crate::system::System;
@@ -139,11 +139,11 @@ impl StageCost {
             vec![cost.stage(from_fn(|i| x[i]), from_fn(|i| u[i]), from_fn(|i| context[i]))]
         };
         let stage = recorded_with(&system, NC, stage);
-        let map = cost.map([0.0_f32; NX]).map(|(map, _)| MapCost {
-            map: Arc::new(map.clone()),
+        let map = cost.map([0.0_f32; NX]).map(|lookup| MapCost {
+            map: Arc::new(lookup.map.clone()),
             cell: recorded_with(&system, 0, |x, _, _| {
-                let place = cost.map::<Expr>(from_fn(|i| x[i]));
-                place.into_iter().map(|(map, place)| map.cell(place)).collect()
+                let lookup = cost.map::<Expr>(from_fn(|i| x[i]));
+                lookup.into_iter().map(|Lookup { map, place }| map.cell(place)).collect()
             }),
         });
         let model = Model::recorded(&system);

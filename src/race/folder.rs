@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::controller::Name;
-use super::log::{RaceLog, arrays, damaged, is_sealed, races, sealed};
+use super::log::{RaceLog, StoredRaces, arrays, damaged, is_sealed, races, sealed};
 use crate::backend::Event;
 use crate::error::{Error, Result};
 use crate::files::{Staged, json, npz_bytes, read_npz};
@@ -51,7 +51,8 @@ pub(super) fn stored(
         Error::File { problem, .. } => damaged(path, &problem),
         other => other,
     })?;
-    let (stored, most) = races(&arrays).map_err(|problem| damaged(path, &problem))?;
+    let StoredRaces { races: stored, most } =
+        races(&arrays).map_err(|problem| damaged(path, &problem))?;
     if most != steps as usize {
         return Err(damaged(path, &format!("it holds races of {most} steps, not of {steps}")));
     }

@@ -158,12 +158,20 @@ fn code(status: FilterStatus) -> u8 {
     }
 }
 
-/// The races that the arrays of a file hold, and the most steps of one; the error says what is
-/// wrong with them.
+/// The races of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredRaces {
+    /// The races, in order of their starts.
+    pub races: Vec<RaceLog>,
+    /// The most steps that there is room for in each.
+    pub most: usize,
+}
+
+/// The races that the arrays of a file hold; the error says what is wrong with them.
 ///
 /// # Errors
 /// A sentence that names the array.
-pub fn races(arrays: &BTreeMap<String, Array>) -> Result<(Vec<RaceLog>, usize), String> {
+pub fn races(arrays: &BTreeMap<String, Array>) -> Result<StoredRaces, String> {
     let steps = numbers(arrays, "steps", Data::as_u32)?;
     let tiers = numbers(arrays, "tier", Data::as_u8)?;
     let count = steps.len();
@@ -234,7 +242,7 @@ pub fn races(arrays: &BTreeMap<String, Array>) -> Result<(Vec<RaceLog>, usize), 
         Ok(RaceLog { states: (0..=steps).map(state).collect(), steps: decided })
     };
     let races = steps.iter().enumerate().map(race).collect::<Result<_, String>>()?;
-    Ok((races, most))
+    Ok(StoredRaces { races, most })
 }
 
 /// The status of a number in files.

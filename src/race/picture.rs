@@ -13,8 +13,10 @@ use crate::scenario::Watch;
 pub(super) fn picture(
     name: Name,
     world: World<'_>,
-    (number, start): (usize, [f32; 12]),
-    (noise_seed, seed): (u64, u64),
+    number: usize,
+    start: [f32; 12],
+    noise_seed: u64,
+    seed: u64,
     watch: &dyn Watch,
 ) -> Result<PictureRecord> {
     let steps = world.race.steps;

@@ -80,6 +80,15 @@ pub struct TimingRecord {
     pub most_seconds: f64,
 }
 
+/// What an experiment came to.
+#[derive(Clone, Debug)]
+pub struct RaceResults {
+    /// The record, the same of every run.
+    pub record: RaceRecord,
+    /// The compute time of each controller, in this run.
+    pub timings: Vec<TimingRecord>,
+}
+
 impl Experiment<'_> {
     /// Removes the results of other work from the folder, once nothing is wrong with this.
     ///
@@ -97,7 +106,7 @@ impl Experiment<'_> {
     /// controllers, before any race; [`Error::Write`] or [`Error::NoRoom`] before any race if its
     /// folder does not take the results; [`Error::File`] if the folder holds another experiment or a
     /// stored race is damaged; [`Error::Interrupted`].
-    pub fn run(&self, watch: &dyn Watch) -> Result<(RaceRecord, Vec<TimingRecord>)> {
+    pub fn run(&self, watch: &dyn Watch) -> Result<RaceResults> {
         let reason = |name: &Name| absent(*name, &self.world).map(|reason| (*name, reason));
         let absent: Vec<(Name, String)> = self.names.iter().filter_map(reason).collect();
         let runs = |name: &Name| !absent.iter().any(|(missing, _)| missing == name);
@@ -114,7 +123,7 @@ impl Experiment<'_> {
         }
         let record = self.record(&summaries, absent, watch)?;
         claim.keep();
-        Ok((record, timings))
+        Ok(RaceResults { record, timings })
     }
 
     /// Refuses what would fail later: nothing to race, numbers out of range, and settings that a
@@ -340,7 +349,7 @@ impl Experiment<'_> {
         let most = logs.iter().map(seen).max().unwrap_or(0);
         let start = logs.iter().position(|race| seen(race) == most).unwrap_or(0);
         let seed = race_seed(noise_seed, start as u64);
-        let shown = picture(name, world, (start, self.starts[start]), (noise_seed, seed), watch)?;
+        let shown = picture(name, world, start, self.starts[start], noise_seed, seed, watch)?;
         let flown = shown.frames.iter().map(|frame| frame.x.as_slice());
         let same = flown.eq(logs[start].states.iter().map(|x| x.as_slice()));
         Ok(same.then_some(shown))

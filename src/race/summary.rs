@@ -15,22 +15,36 @@ const RELAXED: f32 = 1e-6;
 /// Sums over the control steps that had a plan.
 #[derive(Clone, Copy, Debug, Default)]
 struct PlanSums {
-    effective_samples: (u64, f64),
-    best_cost: (u64, f64),
+    effective_samples: Sum,
+    best_cost: Sum,
 }
 
 impl PlanSums {
     /// Adds the plan of `step`; a cost that is not finite is not counted.
     fn add(&mut self, step: &StepLog) {
-        add_to(&mut self.effective_samples, step.effective_samples);
-        add_to(&mut self.best_cost, step.best_cost.filter(|cost| cost.is_finite()));
+        self.effective_samples.add(step.effective_samples);
+        self.best_cost.add(step.best_cost.filter(|cost| cost.is_finite()));
     }
 }
 
-/// Counts `value` and adds it, if there is one.
-fn add_to((count, sum): &mut (u64, f64), value: Option<f32>) {
-    *count += u64::from(value.is_some());
-    *sum += f64::from(value.unwrap_or(0.0));
+/// A sum and how many values it is of.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    count: u64,
+    sum: f64,
+}
+
+impl Sum {
+    /// Counts `value` and adds it, if there is one.
+    fn add(&mut self, value: Option<f32>) {
+        self.count += u64::from(value.is_some());
+        self.sum += f64::from(value.unwrap_or(0.0));
+    }
+
+    /// The mean; none of no values.
+    fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
+    }
 }
 
 /// What is kept of the races of one controller.
@@ -139,8 +153,7 @@ impl Summary {
     /// Means over the control steps that had a plan: effective samples, and the smallest cost of a
     /// sample where one was finite.
     pub fn plan_means(&self) -> [Option<f64>; 2] {
-        let mean = |(count, sum): (u64, f64)| (count > 0).then(|| sum / count as f64);
-        [mean(self.plans.effective_samples), mean(self.plans.best_cost)]
+        [self.plans.effective_samples.mean(), self.plans.best_cost.mean()]
     }
 
     /// The record; `hybrid` is the controller that the others are compared with, if it ran.

@@ -15,16 +15,24 @@ pub(super) struct Field {
     pub(super) values: Vec<f64>,
 }
 
+/// A corner of a cell.
+#[derive(Clone, Copy)]
+struct Corner {
+    point: Point,
+    value: f64,
+}
+
 impl Field {
     fn value(&self, column: usize, row: usize) -> f64 {
         self.values[row * self.x.len() + column]
     }
 
     /// The corners of a cell, counter-clockwise from the lower left.
-    fn corners(&self, column: usize, row: usize) -> [(Point, f64); 4] {
+    fn corners(&self, column: usize, row: usize) -> [Corner; 4] {
         [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(right, up)| {
             let (column, row) = (column + right, row + up);
-            ([self.x[column], self.y[row]], self.value(column, row))
+            let point = [self.x[column], self.y[row]];
+            Corner { point, value: self.value(column, row) }
         })
     }
 
@@ -65,7 +73,7 @@ impl Field {
         let cut: Vec<usize> = (0..4)
             .filter(|&side| {
                 let (from, to) = (corners[side], corners[(side + 1) % 4]);
-                let cuts = (from.1 > 0.0) != (to.1 > 0.0);
+                let cuts = (from.value > 0.0) != (to.value > 0.0);
                 if cuts {
                     points.insert(edges[side], crossing(from, to));
                 }
@@ -76,8 +84,8 @@ impl Field {
             [a, b] => vec![[edges[a], edges[b]]],
             [a, b, c, d] => {
                 // A saddle: the mean says whether the two positive corners belong together.
-                let mean: f64 = corners.iter().map(|corner| corner.1).sum();
-                let pairs = if (mean > 0.0) == (corners[0].1 > 0.0) {
+                let mean: f64 = corners.iter().map(|corner| corner.value).sum();
+                let pairs = if (mean > 0.0) == (corners[0].value > 0.0) {
                     [[a, b], [c, d]]
                 } else {
                     [[d, a], [b, c]]
@@ -96,9 +104,10 @@ impl Field {
             let mut run: Option<Vec<Point>> = None;
             for column in 1..self.x.len() {
                 let corners = self.corners(column - 1, row - 1);
-                if corners.iter().all(|corner| corner.1 > 0.0) {
-                    let [_, lower, upper, _] = corners.map(|corner| corner.0);
-                    let run = run.get_or_insert_with(|| corners.map(|corner| corner.0).to_vec());
+                if corners.iter().all(|corner| corner.value > 0.0) {
+                    let points = corners.map(|corner| corner.point);
+                    let [_, lower, upper, _] = points;
+                    let run = run.get_or_insert_with(|| points.to_vec());
                     (run[1], run[2]) = (lower, upper);
                 } else {
                     polygons.extend(run.take());
@@ -113,14 +122,14 @@ impl Field {
 }
 
 /// The part of a cell that is above zero.
-fn positive_part(corners: &[(Point, f64); 4]) -> Vec<Point> {
+fn positive_part(corners: &[Corner; 4]) -> Vec<Point> {
     let mut polygon = Vec::new();
     for side in 0..4 {
         let (from, to) = (corners[side], corners[(side + 1) % 4]);
-        if from.1 > 0.0 {
-            polygon.push(from.0);
+        if from.value > 0.0 {
+            polygon.push(from.point);
         }
-        if (from.1 > 0.0) != (to.1 > 0.0) {
+        if (from.value > 0.0) != (to.value > 0.0) {
             polygon.push(crossing(from, to));
         }
     }
@@ -128,9 +137,9 @@ fn positive_part(corners: &[(Point, f64); 4]) -> Vec<Point> {
 }
 
 /// Where the straight line between two samples of different sign is zero.
-fn crossing((from, low): (Point, f64), (to, high): (Point, f64)) -> Point {
-    let share = low / (low - high);
-    [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]))
+fn crossing(from: Corner, to: Corner) -> Point {
+    let share = from.value / (from.value - to.value);
+    [0, 1].map(|axis| from.point[axis] + share * (to.point[axis] - from.point[axis]))
 }
 
 /// Lines through linked edges, each edge having one or two neighbours: open lines first.

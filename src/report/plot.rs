@@ -1,6 +1,6 @@
 //! A plot as SVG: scales, axes and marks in the coordinates of the data.
 
-use super::span::Span;
+use super::span::{RoundValues, Span};
 use super::text::{escape, ordinary, shorten};
 
 /// Width of a plot in its own units, if none is asked for; the page scales it. Narrow, so that
@@ -325,8 +325,8 @@ fn tick_label([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
 
 /// Ticks at round values, about `parts` of them.
 fn round(span: Span, parts: f64) -> Ticks {
-    let (ticks, decimals) = span.ticks(parts);
-    ticks.into_iter().map(|tick| (tick, label(tick, decimals))).collect()
+    let RoundValues { values, decimals } = span.ticks(parts);
+    values.into_iter().map(|tick| (tick, label(tick, decimals))).collect()
 }
 
 /// Characters of the longest label.

@@ -66,7 +66,7 @@ impl Scale {
 
     /// The axis with ticks at round values, about `parts` of them.
     pub(crate) fn axis(self, parts: f64) -> Axis {
-        let values = if self.log { self.decades() } else { self.span.ticks(parts).0 };
+        let values = if self.log { self.decades() } else { self.span.ticks(parts).values };
         self.axis_at(values.into_iter().map(|value| (value, tick(value))))
     }
 
@@ -88,7 +88,7 @@ impl Scale {
             all.filter(|value| (low..=high).contains(value)).collect()
         };
         let enough = |ticks: &Vec<f64>| ticks.len() >= 3;
-        let linear = || Span { low, high }.ticks(6.0).0;
+        let linear = || Span { low, high }.ticks(6.0).values;
         let choices = [among(&[1]), among(&[1, 2, 5])].into_iter();
         choices.into_iter().find(enough).unwrap_or_else(linear)
     }

@@ -11,6 +11,14 @@ pub(crate) struct Span {
     pub(crate) high: f64,
 }
 
+/// Round values along a span.
+pub(crate) struct RoundValues {
+    /// The values, rising.
+    pub(crate) values: Vec<f64>,
+    /// Decimals that tell them apart.
+    pub(crate) decimals: usize,
+}
+
 impl Span {
     /// The span of the values that can be drawn; `None` without any.
     pub(crate) fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
@@ -44,8 +52,8 @@ impl Span {
         self.widened(((width / self.width() - 1.0) / 2.0).max(0.0))
     }
 
-    /// Round values about `parts` to the span, and the decimals that tell them apart.
-    pub(crate) fn ticks(self, parts: f64) -> (Vec<f64>, usize) {
+    /// Round values about `parts` to the span.
+    pub(crate) fn ticks(self, parts: f64) -> RoundValues {
         let rough = self.width() / parts;
         let power = 10.0_f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]
@@ -59,18 +67,18 @@ impl Span {
         let ticks = (0..=(2.0 * parts) as usize + 2)
             .map(|index| (first + index as f64) * step)
             .take_while(|&tick| tick <= self.high + slack);
-        (ticks.collect(), decimals)
+        RoundValues { values: ticks.collect(), decimals }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Span;
+    use super::{RoundValues, Span};
 
     #[test]
     fn ticks_are_round_and_inside() {
         let span = Span { low: -2.65, high: -0.05 };
-        let (ticks, decimals) = span.ticks(6.0);
+        let RoundValues { values: ticks, decimals } = span.ticks(6.0);
         assert_eq!(decimals, 1);
         assert_eq!(ticks.len(), 5);
         for (tick, expected) in ticks.iter().zip([-2.5, -2.0, -1.5, -1.0, -0.5]) {

@@ -136,7 +136,7 @@ impl Noise {
         normals: &mut [Lanes<N>],
         noise: &mut [[f32; N]],
     ) {
-        self.draw::<V, N>((stream, iteration), first, normals);
+        self.draw::<V, N>(stream, iteration, first, normals);
         let (steps, count) = (noise.chunks_exact_mut(self.controls).enumerate(), self.controls);
         match &self.shape {
             NoiseShape::Independent => {
@@ -168,7 +168,8 @@ impl Noise {
     #[inline(always)]
     fn draw<V: Vector, const N: usize>(
         &self,
-        (stream, iteration): (Stream, u32),
+        stream: Stream,
+        iteration: u32,
         first: u32,
         normals: &mut [Lanes<N>],
     ) {

@@ -119,7 +119,7 @@ fn along_rays(
     let start_certified = certified(States::one(&settings.state))?[0];
     let mut best: Option<Found> = None;
     for (sweep, spread) in SPREADS.into_iter().enumerate() {
-        let around = best.as_ref().map(|found| (&*found.direction, spread));
+        let around = best.as_ref().map(|found| Cone { axis: &found.direction, spread });
         let directions = directions(settings, sweep as u32, around);
         let found = sweep_rays(settings, directions.view(), start_certified, certified)?;
         let nearer = |found: &Found| {
@@ -132,17 +132,25 @@ fn along_rays(
     Ok(best.map(|found| found.boundary))
 }
 
+/// Directions around one.
+struct Cone<'a> {
+    /// The unit direction in its middle.
+    axis: &'a [f32],
+    /// Length of the longest offset from it, before all is scaled to length one.
+    spread: f32,
+}
+
 /// Unit directions in the coordinates that vary: uniform, or spread around a given one.
-fn directions(settings: &Settings, sweep: u32, around: Option<(&[f32], f32)>) -> StateList {
+fn directions(settings: &Settings, sweep: u32, around: Option<Cone<'_>>) -> StateList {
     let stream = Stream::new(settings.seed, purpose::DIRECTION, sweep);
     let draw = |index: u64| {
         let mut offset = vec![Lanes([0.0]); settings.state.len()];
         sample_ball::<1>(stream, index, |i| settings.growth.varies[i], &mut offset);
         let direction = unit(offset.into_iter().map(|lane| lane.0[0]).collect());
-        match around {
-            Some((center, spread)) => {
-                let both = center.iter().zip(direction);
-                unit(both.map(|(center, direction)| center + spread * direction).collect())
+        match &around {
+            Some(Cone { axis, spread }) => {
+                let both = axis.iter().zip(direction);
+                unit(both.map(|(axis, direction)| axis + spread * direction).collect())
             }
             None => direction,
         }

@@ -47,7 +47,7 @@ pub fn certify(
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
-    let state = state(context, settings, &tightening, (&growth, global.band))?;
+    let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
     let mut statements = claims::statements(settings, &deviation, &global, &growth);
     statements.extend(claims::of_samples(plant, settings, &picture));
@@ -95,7 +95,8 @@ fn state(
     context: Context<'_>,
     settings: &Settings,
     tightening: &Tightening,
-    (growth, band): (&GrowthRecord, f64),
+    growth: &GrowthRecord,
+    band: f64,
 ) -> Result<StateRecord> {
     let (x, query) = (&*settings.state, Query::Measure);
     let states = States::one(x);

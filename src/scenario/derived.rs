@@ -3,7 +3,7 @@
 use super::budget::{ledger, spendings};
 use super::claims::{holds, of_samples, statements};
 use super::constants::constants;
-use super::origin::{hashes, system_record};
+use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
@@ -26,7 +26,9 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.provenance.seed = settings.seed;
     record.provenance.generator = GENERATOR.to_owned();
     record.provenance.policy = plant.controller.name.clone();
-    (record.provenance.physics_sha256, record.provenance.policy_sha256) = hashes(plant);
+    let Hashes { physics_sha256, policy_sha256 } = hashes(plant);
+    record.provenance.physics_sha256 = physics_sha256;
+    record.provenance.policy_sha256 = policy_sha256;
     record.system = system_record(model, settings);
     record.constants = constants(model, settings)?;
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;

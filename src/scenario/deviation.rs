@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::bound::{certified_risk, required_scenarios, simple_scenarios, wait_and_judge};
-use super::coordinates::coordinates;
+use super::coordinates::{Coordinates, coordinates};
 use super::purpose;
 use super::record::{Claim, DeviationRecord, decimal};
 use super::settings::{DeviationSettings, DeviationSource, Joint, Program, Settings};
@@ -36,7 +36,7 @@ pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecor
     let largest: Vec<f64> = farthest.iter().map(|f| f64::from(f.distance)).collect();
     let (bound, scale, support) = conclude(farthest, shape.as_deref(), asked.radius);
     let measured = Measured { bound, largest, scale, support, non_finite };
-    record(context.model(), settings, (&program, exact), measured)
+    record(context.model(), settings, &program, exact, measured)
 }
 
 /// What only rollouts tell.
@@ -53,7 +53,8 @@ struct Measured {
 fn record(
     model: &Model,
     settings: &Settings,
-    (program, exact): (&Program, Option<Vec<f64>>),
+    program: &Program,
+    exact: Option<Vec<f64>>,
     measured: Measured,
 ) -> Result<DeviationRecord> {
     let asked = &settings.deviation;
@@ -91,7 +92,7 @@ pub(super) fn derived(
     let DeviationRecord { scale, support, non_finite, .. } = *stored;
     let (bound, largest) = (stored.bound.clone(), stored.largest.clone());
     let measured = Measured { bound, largest, scale, support, non_finite };
-    record(model, settings, (&program, exact), measured)
+    record(model, settings, &program, exact, measured)
 }
 
 /// The program of the bound; refuses fewer pairs than it needs.
@@ -215,7 +216,7 @@ fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim>
         ),
     };
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let (dimension, frozen) = coordinates(model, &region.varies());
+    let Coordinates { dimension, frozen } = coordinates(model, &region.varies());
     // Risk of one program, times the programs whose risks add up.
     let programs = asked.epsilon / program.epsilon;
     let risk = certified_risk(asked.scenarios, u64::from(program.decision_vars) - 1, program.beta);

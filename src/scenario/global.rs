@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Context;
 use super::bound::{certified_risk, interval};
-use super::coordinates::coordinates;
+use super::coordinates::{Coordinates, coordinates};
 use super::finding::{Figure, Finding};
 use super::purpose;
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord, finite_margin};
@@ -155,7 +155,7 @@ fn conclude(
 ) -> Result<GlobalRecord> {
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let box_volume = region.volume();
-    let (dimension, frozen) = coordinates(model, &region.varies());
+    let Coordinates { dimension, frozen } = coordinates(model, &region.varies());
     let (draws, beta) = (settings.global.draws, settings.global.beta);
     let (low, high) = interval(count.accepted, draws, beta);
     let risk = certified_risk(count.accepted, count.failures, beta);

@@ -3,7 +3,7 @@
 use super::Context;
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
 use super::boundary::{self, Boundary};
-use super::coordinates::coordinates;
+use super::coordinates::{Coordinates, coordinates};
 use super::purpose;
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
@@ -44,6 +44,17 @@ impl GrowthSettings {
     }
 }
 
+/// What a call of [`grow`] came to.
+#[derive(Clone, Debug)]
+pub struct GrowthRun {
+    /// The outcome.
+    pub outcome: Growth,
+    /// The rounds that were taken, in their order.
+    pub rounds: Vec<RoundRecord>,
+    /// Starts of the last round that are kept.
+    pub samples: Vec<SampleRecord>,
+}
+
 /// What one round showed.
 struct Round {
     record: RoundRecord,
@@ -58,7 +69,7 @@ pub fn grow(
     boundary: &Boundary,
     band: f64,
     call: u32,
-) -> Result<(Growth, Vec<RoundRecord>, Vec<SampleRecord>)> {
+) -> Result<GrowthRun> {
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let mut ball = Ball {
@@ -76,14 +87,18 @@ pub fn grow(
         let nearest = round.record.nearest_failure;
         rounds.push(round.record);
         match nearest {
-            None => return Ok((Growth::Verified(ball), rounds, samples)),
+            None => {
+                let outcome = Growth::Verified(ball);
+                return Ok(GrowthRun { outcome, rounds, samples });
+            }
             Some(distance) => match next_radius(asked, number, distance) {
                 Some(radius) => ball.radius = radius,
                 None => break,
             },
         }
     }
-    Ok((Growth::Exhausted { last_radius: ball.radius }, rounds, samples))
+    let outcome = Growth::Exhausted { last_radius: ball.radius };
+    Ok(GrowthRun { outcome, rounds, samples })
 }
 
 /// The radius of the round after `number`, whose nearest failure was that far; none after the
@@ -236,11 +251,11 @@ pub(super) fn record(
     };
     record.center = Some(boundary.point.clone());
     record.distance = Some(boundary.distance);
-    let (growth, rounds, samples) = grow(context, settings, &boundary, band, 0)?;
+    let GrowthRun { outcome, rounds, samples } = grow(context, settings, &boundary, band, 0)?;
     record.rounds = rounds;
     record.samples = samples;
     record.outcome = GrowthOutcome::Exhausted;
-    if let Growth::Verified(ball) = growth {
+    if let Growth::Verified(ball) = outcome {
         verified(&mut record, context.model(), settings, ball)?;
     }
     Ok(record)
@@ -250,7 +265,7 @@ pub(super) fn record(
 fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
     let asked = &settings.growth;
     let (beta_used, states) = (asked.round_beta(), model.states.len());
-    let (dimension, frozen) = coordinates(model, &asked.varies);
+    let Coordinates { dimension, frozen } = coordinates(model, &asked.varies);
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(

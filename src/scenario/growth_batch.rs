@@ -116,7 +116,7 @@ fn round(
     let mut nearest: Vec<Option<f64>> = vec![None; balls.len()];
     for first in (0..total).step_by(LISTED) {
         let range = first..total.min(first + LISTED as u64);
-        piece(context, settings, requests, (balls, range), (&mut nearest, band))?;
+        piece(context, settings, requests, balls, range, &mut nearest, band)?;
     }
     balls.iter_mut().for_each(|open| open.rounds += 1);
     Ok(nearest)
@@ -127,8 +127,10 @@ fn piece(
     context: Context<'_>,
     settings: &Settings,
     requests: &[Request],
-    (balls, range): (&mut [Open], Range<u64>),
-    (nearest, band): (&mut [Option<f64>], f64),
+    balls: &mut [Open],
+    range: Range<u64>,
+    nearest: &mut [Option<f64>],
+    band: f64,
 ) -> Result<()> {
     let count = settings.growth.scenarios;
     let draw = |(place, open): (usize, &Open)| {
@@ -188,7 +190,7 @@ mod tests {
     use crate::rollout::RolloutSpec;
     use crate::scenario::Unwatched;
     use crate::scenario::boundary::Boundary;
-    use crate::scenario::growth::grow;
+    use crate::scenario::growth::{GrowthRun, grow};
     use crate::scenario::record::RoundRecord;
     use crate::system::{BangBang, DoubleIntegrator};
 
@@ -228,7 +230,7 @@ mod tests {
         for (request, grown) in requests().into_iter().zip(&grown) {
             let settings = Settings { seed: request.seed, ..asked.clone() };
             let boundary = Boundary { point: request.center.clone(), distance: 0.0 };
-            let (outcome, rounds, _) =
+            let GrowthRun { outcome, rounds, .. } =
                 grow(context, &settings, &boundary, band, request.call).unwrap();
             let reruns = |round: &RoundRecord| round.f64_reruns;
             assert_eq!(grown.outcome, outcome, "{request:?}");

@@ -33,9 +33,9 @@ mod verify;
 
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
-pub use origin::hashes;
 #[cfg(feature = "cli")]
 pub(crate) use origin::provenance;
+pub use origin::{Hashes, hashes};
 pub use tightened::{Tightened, tightened};
 pub use verify::{QueryRow, check, query};
 

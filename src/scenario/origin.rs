@@ -15,7 +15,7 @@ pub(crate) fn provenance(
     config: serde_json::Value,
 ) -> Provenance {
     let (plant, backend) = (program.plant(), program.backend());
-    let (physics_sha256, policy_sha256) = hashes(plant);
+    let Hashes { physics_sha256, policy_sha256 } = hashes(plant);
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed,
@@ -29,12 +29,22 @@ pub(crate) fn provenance(
     }
 }
 
+/// What tells plants apart, in hexadecimal digits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Hashes {
+    /// SHA-256 of the recorded physics.
+    pub physics_sha256: String,
+    /// SHA-256 of the policy.
+    pub policy_sha256: String,
+}
+
 /// SHA-256 of the recorded physics and of the policy.
-pub fn hashes(plant: &Plant) -> (String, String) {
-    let physics = digest::sha256([plant.text().as_bytes()]);
+pub fn hashes(plant: &Plant) -> Hashes {
+    let physics_sha256 = digest::sha256([plant.text().as_bytes()]);
     // A formula is part of the recorded text.
-    let policy = plant.controller.network().map_or_else(|| physics.clone(), Mlp::digest);
-    (physics, policy)
+    let network = plant.controller.network();
+    let policy_sha256 = network.map_or_else(|| physics_sha256.clone(), Mlp::digest);
+    Hashes { physics_sha256, policy_sha256 }
 }
 
 /// Names, boxes and bodies of the system, with the box of starts that `settings` ask for.

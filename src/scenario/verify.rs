@@ -7,7 +7,7 @@ use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
-use super::origin::{hashes, provenance};
+use super::origin::{Hashes, hashes, provenance};
 use super::purpose;
 use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
@@ -65,7 +65,7 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
             "{field} is {stored} in the record, {found} here; certify again"
         )))
     };
-    let (physics, policy) = hashes(plant);
+    let Hashes { physics_sha256: physics, policy_sha256: policy } = hashes(plant);
     let stored = &record.provenance;
     if record.schema > SCHEMA {
         return refuse("schema", &record.schema.to_string(), &SCHEMA.to_string());

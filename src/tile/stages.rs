@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::compiled::{Blocks, load, store};
 use super::{Frame, GRANULE};
-use crate::cost::{Cost, CostMap};
+use crate::cost::{Cost, CostMap, Lookup};
 use crate::real::Vector;
 use crate::real::simd::{Formulas, Instructions};
 use crate::system::System;
@@ -161,7 +161,7 @@ where
                     if let Some(penalty) = penalty {
                         total = total + noise_cost(penalty, nominal, |i| u[i]);
                     }
-                    if let Some((map, place)) = cost.map(x) {
+                    if let Some(Lookup { map, place }) = cost.map(x) {
                         total = total + cell_cost(map, map.cell(place));
                     }
                     x = system.step(x, u);

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use nalgebra::DMatrix;
-use reachcast::cost::{Cost, CostMap};
+use reachcast::cost::{Cost, CostMap, Lookup};
 use reachcast::rollout::{MppiProblem, MppiResult, MppiSettings, Planning, Sigma};
 use reachcast::system::System;
 
@@ -69,7 +69,7 @@ where
         let value = planning.value.as_ref().map(|term| term.network.forward(&x)[0]);
         let push = planning.disturbance.as_ref().map(|asked| asked.network.forward(&x));
         total += cost.stage(x, u, from_fn(|i| f64::from(problem.context[t * NC + i])));
-        if let Some((map, place)) = cost.map(x) {
+        if let Some(Lookup { map, place }) = cost.map(x) {
             total += charged(map, place);
         }
         if let Some(penalty) = &penalty {

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::io::Cursor;
 
-use super::kind::{Cast, Kind};
-use super::pickle;
+use super::kind::{Cast, FloatReader, Kind};
+use super::pickle::{self, Unpickled};
 use super::value::{Pickle, Value, View};
 use crate::files::Archive;
 
@@ -23,6 +23,13 @@ pub(super) struct Checkpoint<'a> {
     folder: String,
 }
 
+/// A checkpoint and what is in it.
+pub(super) struct Opened<'a> {
+    pub(super) checkpoint: Checkpoint<'a>,
+    /// Its tensors in the order of the file, which is that of the modules in a state dict.
+    pub(super) tensors: Vec<Tensor>,
+}
+
 /// A tensor of a checkpoint.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tensor {
@@ -37,13 +44,12 @@ pub(super) struct Tensor {
 }
 
 impl<'a> Checkpoint<'a> {
-    /// The checkpoint in the archive `bytes`, and its tensors in the order of the file, which is
-    /// that of the modules in a state dict.
+    /// The checkpoint in the archive `bytes`, with its tensors.
     ///
     /// # Errors
     /// A sentence about damage, a checkpoint of another sort, or a pickle that asks for more than
     /// tensors.
-    pub(super) fn open(bytes: &'a [u8]) -> Result<(Self, Vec<Tensor>), String> {
+    pub(super) fn open(bytes: &'a [u8]) -> Result<Opened<'a>, String> {
         let damaged = |e| format!("not a whole checkpoint ({e})");
         let archive = Archive::open(Cursor::new(bytes), bytes.len() as u64).map_err(damaged)?;
         let entries = archive.names().map_err(damaged)?;
@@ -61,9 +67,9 @@ impl<'a> Checkpoint<'a> {
                 .to_owned());
         }
         let text = checkpoint.read("data.pkl")?;
-        let (pickle, root) = pickle::read(&text)?;
+        let Unpickled { pickle, root } = pickle::read(&text)?;
         let tensors = tensors(&pickle, root)?;
-        Ok((checkpoint, tensors))
+        Ok(Opened { checkpoint, tensors })
     }
 
     /// The numbers of `tensor`, its last index the fastest.
@@ -71,7 +77,7 @@ impl<'a> Checkpoint<'a> {
     /// # Errors
     /// A sentence about numbers that are missing, damaged, or no f32 if `cast` does not allow it.
     pub(super) fn numbers(&mut self, tensor: &Tensor, cast: Cast) -> Result<Vec<f32>, String> {
-        let (size, number) = tensor.kind.reader(cast)?;
+        let FloatReader { size, number } = tensor.kind.reader(cast)?;
         let bytes = self.read(&format!("data/{}", tensor.key))?;
         let elements = bytes.len() / size;
         if !tensor.fits(elements) {

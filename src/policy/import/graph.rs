@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::kind::Cast;
 use super::layers::MOST_LAYERS;
-use super::onnx::{Graph, Node, Tensor};
+use super::onnx::{Ends, Graph, Node, Shaped, Tensor};
 use crate::policy::{Activation, Layer, Mlp, OutputActivation};
 
 /// A step from the input to the output.
@@ -26,13 +26,20 @@ struct Dense {
     outputs: usize,
 }
 
-/// The network of an ONNX file, and the names of its weights.
+/// The network of a graph.
+pub(super) struct GraphNetwork {
+    pub(super) network: Mlp,
+    /// Names of the weights of its layers.
+    pub(super) layers: Vec<String>,
+}
+
+/// The network of an ONNX file.
 ///
 /// # Errors
 /// A sentence about damage, or the operation that no dense network has.
-pub(super) fn read(bytes: &[u8], cast: Cast) -> Result<(Mlp, Vec<String>), String> {
+pub(super) fn read(bytes: &[u8], cast: Cast) -> Result<GraphNetwork, String> {
     let graph = Graph::decode(bytes)?;
-    let (input, output) = graph.ends()?;
+    let Ends { input, output } = graph.ends()?;
     let walk = Walk { tensors: graph.tensors(), users: users(&graph), cast };
     let mut steps = Vec::new();
     let mut at = input;
@@ -155,7 +162,7 @@ impl<'a> Walk<'a> {
                 return Err(format!("a `{}` of which `{at}` is not the left side", node.operation));
             }
         };
-        let (shape, numbers) = self.numbers(name)?;
+        let Shaped { shape, numbers } = self.numbers(name)?;
         let &[rows, columns] = shape.as_slice() else {
             return Err(format!("`{name}` has shape {shape:?}; a weight has two dimensions"));
         };
@@ -171,14 +178,15 @@ impl<'a> Walk<'a> {
 
     /// The bias `name` of a layer with so many outputs.
     fn bias(&self, name: &str, outputs: usize) -> Result<Vec<f32>, String> {
-        match self.numbers(name)? {
-            (shape, numbers) if shape == [outputs] || shape == [1, outputs] => Ok(numbers),
-            (shape, _) => Err(format!("`{name}` has shape {shape:?}, its layer {outputs} outputs")),
+        let Shaped { shape, numbers } = self.numbers(name)?;
+        match shape == [outputs] || shape == [1, outputs] {
+            true => Ok(numbers),
+            false => Err(format!("`{name}` has shape {shape:?}, its layer {outputs} outputs")),
         }
     }
 
-    /// Shape and numbers of the tensor `name`.
-    fn numbers(&self, name: &str) -> Result<(Vec<usize>, Vec<f32>), String> {
+    /// The numbers of the tensor `name`.
+    fn numbers(&self, name: &str) -> Result<Shaped, String> {
         let tensor = self.tensors.get(name);
         let tensor = tensor.ok_or_else(|| format!("`{name}` is no tensor that the file holds"))?;
         tensor.numbers(self.cast).map_err(|problem| format!("`{name}`: {problem}"))
@@ -204,7 +212,7 @@ fn unknown(node: &Node) -> String {
 }
 
 /// The network of these steps: layers with the same activation between all of them.
-fn network(mut steps: Vec<Step>) -> Result<(Mlp, Vec<String>), String> {
+fn network(mut steps: Vec<Step>) -> Result<GraphNetwork, String> {
     let output = match steps.pop() {
         Some(Step::Activation(Activation::Tanh)) => OutputActivation::Tanh,
         Some(last @ Step::Dense(_)) => {
@@ -238,5 +246,5 @@ fn network(mut steps: Vec<Step>) -> Result<(Mlp, Vec<String>), String> {
         }
     }
     let network = Mlp::new(layers, hidden.unwrap_or(Activation::Relu), output);
-    Ok((network.map_err(|e| e.to_string())?, names))
+    Ok(GraphNetwork { network: network.map_err(|e| e.to_string())?, layers: names })
 }

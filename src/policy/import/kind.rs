@@ -15,6 +15,14 @@ pub enum Cast {
 /// The f32 that the first bytes stand for.
 pub(super) type Number = fn(&[u8]) -> f32;
 
+/// How floats of a kind are read.
+pub(super) struct FloatReader {
+    /// Bytes of one.
+    pub(super) size: usize,
+    /// It as an f32.
+    pub(super) number: Number,
+}
+
 /// A kind of number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -51,11 +59,11 @@ impl Kind {
         }
     }
 
-    /// Bytes of a float, and how it is read as an f32.
+    /// How floats of the kind are read.
     ///
     /// # Errors
     /// A sentence with the remedy, for numbers that are no f32 if `cast` does not allow them.
-    pub(super) fn reader(self, cast: Cast) -> Result<(usize, Number), String> {
+    pub(super) fn reader(self, cast: Cast) -> Result<FloatReader, String> {
         let (name, size, number): (&str, usize, Number) = match self {
             Self::F32 => ("float32", 4, |bytes| f32::from_le_bytes(array(bytes))),
             Self::F64 => ("float64", 8, |bytes| f64::from_le_bytes(array(bytes)) as f32),
@@ -68,7 +76,7 @@ impl Kind {
                 "its numbers are {name}, a policy's float32; --cast converts them"
             ));
         }
-        Ok((size, number))
+        Ok(FloatReader { size, number })
     }
 }
 

@@ -17,7 +17,8 @@ use serde::Serialize;
 use super::{Activation, Layer, Mlp, OutputActivation};
 use crate::error::{Error, Result};
 use crate::files;
-use checkpoint::Checkpoint;
+use checkpoint::{Checkpoint, Opened};
+use graph::GraphNetwork;
 pub use kind::Cast;
 
 /// First bytes of a zip archive.
@@ -103,7 +104,7 @@ pub fn from_bytes(path: &Path, bytes: &[u8], request: &Request) -> Result<Import
 
 /// The network of a checkpoint.
 fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Imported, String> {
-    let (mut checkpoint, tensors) = Checkpoint::open(bytes)?;
+    let Opened { mut checkpoint, tensors } = Checkpoint::open(bytes)?;
     let chosen = layers::choose(&tensors, &request.networks)?;
     let left_out = layers::left_out(&tensors, &chosen);
     let mut numbers = |tensor: &checkpoint::Tensor| {
@@ -142,7 +143,8 @@ fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Impor
 }
 
 /// The network of a graph, which a request may repeat but not change.
-fn as_stated((network, layers): (Mlp, Vec<String>), request: &Request) -> Result<Imported> {
+fn as_stated(found: GraphNetwork, request: &Request) -> Result<Imported> {
+    let GraphNetwork { network, layers } = found;
     if !request.networks.is_empty() {
         return Err(Error::invalid("network", "an ONNX graph is one network; leave it out"));
     }

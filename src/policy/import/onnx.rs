@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use prost::Message;
 
-use super::kind::{Cast, Kind};
+use super::kind::{Cast, FloatReader, Kind};
 
 /// `ModelProto`.
 #[derive(Clone, PartialEq, Message)]
@@ -82,6 +82,22 @@ struct Named {
     name: String,
 }
 
+/// The values that a graph begins and ends with.
+pub(super) struct Ends<'a> {
+    /// Name of the input.
+    pub(super) input: &'a str,
+    /// Name of the output.
+    pub(super) output: &'a str,
+}
+
+/// The numbers of a tensor.
+pub(super) struct Shaped {
+    /// Length of each dimension.
+    pub(super) shape: Vec<usize>,
+    /// The numbers, the last index the fastest.
+    pub(super) numbers: Vec<f32>,
+}
+
 impl Graph {
     /// The graph of an ONNX file.
     ///
@@ -103,13 +119,13 @@ impl Graph {
     ///
     /// # Errors
     /// A sentence with the names of all of them.
-    pub(super) fn ends(&self) -> Result<(&str, &str), String> {
+    pub(super) fn ends(&self) -> Result<Ends<'_>, String> {
         let tensors = self.tensors();
         let inputs = self.inputs.iter().map(|input| input.name.as_str());
         let inputs: Vec<&str> = inputs.filter(|name| !tensors.contains_key(name)).collect();
         let outputs: Vec<&str> = self.outputs.iter().map(|output| output.name.as_str()).collect();
         match (inputs.as_slice(), outputs.as_slice()) {
-            ([input], [output]) => Ok((input, output)),
+            ([input], [output]) => Ok(Ends { input, output }),
             _ => Err(format!(
                 "inputs `{}` and outputs `{}`; a policy has one of each",
                 inputs.join(", "),
@@ -159,19 +175,19 @@ impl Node {
 }
 
 impl Tensor {
-    /// Shape and numbers, the last index the fastest.
+    /// The numbers in their shape.
     ///
     /// # Errors
     /// A sentence about numbers that are elsewhere, do not fill the shape, or are no f32 if `cast`
     /// does not allow it.
-    pub(super) fn numbers(&self, cast: Cast) -> Result<(Vec<usize>, Vec<f32>), String> {
+    pub(super) fn numbers(&self, cast: Cast) -> Result<Shaped, String> {
         if self.location != 0 {
             return Err(
                 "its numbers are in another file; export with external_data=False".to_owned()
             );
         }
         let kind = Kind::of_onnx(self.data_type);
-        let (size, number) = kind.reader(cast)?;
+        let FloatReader { size, number } = kind.reader(cast)?;
         let numbers: Vec<f32> = match kind {
             Kind::F32 if self.raw.is_empty() => self.floats.clone(),
             _ => self.raw.chunks_exact(size).map(number).collect(),
@@ -180,7 +196,7 @@ impl Tensor {
             self.lengths.iter().map(|&length| usize::try_from(length).ok()).collect();
         let count = |shape: &Vec<usize>| shape.iter().try_fold(1, |n: usize, &l| n.checked_mul(l));
         match shape {
-            Some(shape) if count(&shape) == Some(numbers.len()) => Ok((shape, numbers)),
+            Some(shape) if count(&shape) == Some(numbers.len()) => Ok(Shaped { shape, numbers }),
             _ => Err(format!("{} numbers do not fill the shape {:?}", numbers.len(), self.lengths)),
         }
     }

@@ -18,11 +18,19 @@ const MOST_DIMENSIONS: usize = 64;
 /// What is wrong where an instruction finds too little on the stack.
 const EMPTY: &str = "a value is needed where there is none";
 
-/// Reads a pickle: its containers, and the value that it stands for.
+/// A pickle that was read.
+pub(super) struct Unpickled<'a> {
+    /// Its containers.
+    pub(super) pickle: Pickle<'a>,
+    /// The value that it stands for.
+    pub(super) root: Value<'a>,
+}
+
+/// Reads a pickle.
 ///
 /// # Errors
 /// A sentence with the byte at which the pickle is damaged, or asks for what is not allowed.
-pub(super) fn read(bytes: &[u8]) -> Result<(Pickle<'_>, Value<'_>), String> {
+pub(super) fn read(bytes: &[u8]) -> Result<Unpickled<'_>, String> {
     if bytes.len() > LONGEST {
         let length = bytes.len();
         return Err(format!("{length} bytes of pickle; no state dict has more than {LONGEST}"));
@@ -32,7 +40,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Pickle<'_>, Value<'_>), String> {
         let at = machine.at;
         match machine.step() {
             Ok(None) => {}
-            Ok(Some(value)) => return Ok((machine.pickle, value)),
+            Ok(Some(root)) => return Ok(Unpickled { pickle: machine.pickle, root }),
             Err(problem) => return Err(format!("pickle, byte {at}: {problem}")),
         }
     }

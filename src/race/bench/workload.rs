@@ -72,13 +72,13 @@ pub(super) fn all(data: &Data) -> Result<Vec<Workload>> {
 /// Measures of the first `count` starts in feedback with `network`.
 fn rollouts(name: String, data: &Data, network: &Arc<Mlp>, count: u64) -> Result<Workload> {
     let steps = f64::from(data::HORIZON);
-    reach_avoid(name, data, network, count, (Query::Measure, steps))
+    reach_avoid(name, data, network, count, Query::Measure, steps)
 }
 
 /// Their signs alone.
 fn signs(name: String, data: &Data, policy: &Arc<Mlp>, count: u64) -> Result<Workload> {
     let steps = decided_steps(data, policy)?;
-    reach_avoid(name, data, policy, count, (Query::Sign, steps))
+    reach_avoid(name, data, policy, count, Query::Sign, steps)
 }
 
 fn reach_avoid(
@@ -86,7 +86,8 @@ fn reach_avoid(
     data: &Data,
     policy: &Arc<Mlp>,
     count: u64,
-    (query, steps): (Query, f64),
+    query: Query,
+    steps: f64,
 ) -> Result<Workload> {
     let rollouts = driven(data, policy, count)?;
     let flops = flops::rollout(&rollouts.plant, steps);

@@ -25,6 +25,14 @@ const MOST_STARTS: u64 = 1_000_000;
 /// Most noise seeds.
 const MOST_SEEDS: u64 = 1000;
 
+/// Starts of races.
+pub(super) struct RaceStarts {
+    /// The joint states, `[starts, 12]`.
+    pub(super) states: Vec<[f32; 12]>,
+    /// Where they come from, in words.
+    pub(super) source: String,
+}
+
 /// A configuration that has races, with everything that it names.
 pub(super) struct RaceInput {
     /// The configuration.
@@ -98,17 +106,17 @@ impl RaceInput {
         })
     }
 
-    /// The starts: drawn, of a file, or those of the configuration; and where they come from.
-    pub(super) fn starts(&self, asked: Option<&str>) -> Result<(Vec<[f32; 12]>, String)> {
+    /// The starts: drawn, of a file, or those of the configuration.
+    pub(super) fn starts(&self, asked: Option<&str>) -> Result<RaceStarts> {
         if let Some(count) = asked.and_then(|text| text.parse::<u64>().ok()) {
             return drawn(&self.race, count, self.config.seed);
         }
         let path = asked.map_or_else(|| self.folder.join(&self.race.starts), PathBuf::from);
         let names = DroneRace::default().states().map(|axis| axis.name);
-        let starts = StateReader::open(&path, names.to_vec())?.rest()?.arrays();
+        let states = StateReader::open(&path, names.to_vec())?.rest()?.arrays();
         // Its name alone: the same starts elsewhere are the same experiment.
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok((starts, name))
+        let source = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(RaceStarts { states, source })
     }
 }
 
@@ -204,7 +212,7 @@ impl Networks {
 }
 
 /// `count` starts drawn from the box of the configuration.
-fn drawn(race: &RaceSettings, count: u64, seed: u64) -> Result<(Vec<[f32; 12]>, String)> {
+fn drawn(race: &RaceSettings, count: u64, seed: u64) -> Result<RaceStarts> {
     if !(1..=MOST_STARTS).contains(&count) {
         let problem = format!("{count} is not within 1..={MOST_STARTS}");
         return Err(Error::invalid("--starts", problem));
@@ -219,5 +227,5 @@ fn drawn(race: &RaceSettings, count: u64, seed: u64) -> Result<(Vec<[f32; 12]>, 
     let region = region.map_err(|error| Error::invalid(place, error.to_string()))?;
     let starts = Starts::Drawn { region, stream: Stream::new(seed, RACE_START, 0) };
     let source = format!("{count} drawn from the start box with seed {seed}");
-    Ok(((0..count).map(|i| starts.start_array(i)).collect(), source))
+    Ok(RaceStarts { states: (0..count).map(|i| starts.start_array(i)).collect(), source })
 }

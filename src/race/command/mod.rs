@@ -5,12 +5,10 @@ mod input;
 mod race;
 mod sweep;
 
-use std::path::PathBuf;
-
 use clap::Subcommand;
 
 use crate::cli::Outcome;
-use crate::cli::options::{Changes, Global, Replace};
+use crate::cli::options::{Global, Own};
 use crate::error::Result;
 use arguments::RaceArguments;
 use sweep::SweepArguments;
@@ -62,11 +60,12 @@ Examples:
 
 impl StudyCommand {
     /// What lies over the configuration, where the results go and whether they may replace others.
-    pub(crate) fn options(&self) -> (Changes, Option<&PathBuf>, Replace) {
-        match self {
-            Self::Race(asked) => (asked.changes.clone(), asked.out.as_ref(), asked.replace),
-            Self::Sweep(asked) => (asked.changes.clone(), asked.out.as_ref(), asked.replace),
-        }
+    pub(crate) fn options(&self) -> Own {
+        let (changes, out, replace) = match self {
+            Self::Race(asked) => (&asked.changes, &asked.out, asked.replace),
+            Self::Sweep(asked) => (&asked.changes, &asked.out, asked.replace),
+        };
+        Own { changes: changes.clone(), out: out.clone(), replace }
     }
 
     /// Runs the command.

@@ -8,7 +8,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::arguments::RaceArguments;
-use super::input::{RaceInput, names, noise_seeds};
+use super::input::{RaceInput, RaceStarts, names, noise_seeds};
 use crate::cli::options::Global;
 use crate::cli::progress::Progress;
 use crate::cli::{Outcome, devices, document, report};
@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::files::{Existing, Staged, json};
 use crate::race::page::race_html;
 use crate::race::record::{ControllerRecord, JudgedRecord, RaceRecord};
-use crate::race::run::{Experiment, TimingRecord};
+use crate::race::run::{Experiment, RaceResults, TimingRecord};
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-race";
@@ -47,7 +47,7 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let input = RaceInput::load(&asked.config, &global.overrides())?;
     let names = names(&asked.controllers)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.noise_seeds)?;
-    let (starts, source) = input.starts(asked.starts.as_deref())?;
+    let RaceStarts { states, source } = input.starts(asked.starts.as_deref())?;
     let out = global.folder(DEFAULT_OUT);
     input.inputs(&asked.config, asked.starts.as_deref()).spare_folder(&out)?;
     let progress = Progress::new(global);
@@ -57,7 +57,7 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
     let experiment = Experiment {
         world: input.world(&backend, &program)?,
         names,
-        starts,
+        starts: states,
         source,
         noise_seeds,
         config: input.config.to_json()?,
@@ -68,11 +68,11 @@ pub(super) fn run(global: &Global, asked: &RaceArguments) -> Result<Outcome> {
         experiment.make_way().map_err(placed)?;
     }
     estimate(global, &experiment);
-    let (record, controllers) = experiment.run(&progress).map_err(placed)?;
+    let RaceResults { record, timings } = experiment.run(&progress).map_err(placed)?;
     progress.finish();
     devices::note_events(global, &backend);
     let wall_seconds = begun.elapsed().as_secs_f64();
-    let timing = Timing { wall_seconds, threads: devices::threads(global), controllers };
+    let timing = Timing { wall_seconds, threads: devices::threads(global), controllers: timings };
     let files = write(&out, &record, &timing)?;
     report(global, &record, || text(&record, &timing, &files))?;
     Ok(Outcome::Done)

@@ -73,7 +73,8 @@ impl<'a> MppiController<'a> {
     /// MPPI by the `settings` of `section` for `races` races.
     pub(in crate::race) fn new(
         world: World<'a>,
-        (section, settings): (&str, &PlanSettings),
+        section: &str,
+        settings: &PlanSettings,
         races: usize,
         paths: Paths,
     ) -> Result<Self> {

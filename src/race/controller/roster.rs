@@ -97,7 +97,7 @@ pub(in crate::race) fn controller<'a>(
     paths: Paths,
 ) -> Result<Box<dyn Controller + 'a>> {
     let race = world.race;
-    let mppi = |key: &str, settings| MppiController::new(world, (key, settings), races, paths);
+    let mppi = |key: &str, settings| MppiController::new(world, key, settings, races, paths);
     Ok(match name {
         Name::HybridNoPolicy => Box::new(NoPolicy::new(world, races, paths)?),
         Name::Mppi => Box::new(mppi("race.mppi", &race.mppi)?),

@@ -1,5 +1,6 @@
 //! Sentences computed from the record: what was found, and what that does not say.
 
+use super::verdicts::Ceiling;
 use super::words::{self, points};
 use crate::race::judge::Judge;
 use crate::race::record::{ControllerRecord, JudgedRecord, RaceRecord};
@@ -35,7 +36,7 @@ fn details(record: &RaceRecord, judged: &JudgedRecord) -> Vec<String> {
         let rate = percent(published.rate);
         details.push(format!("Published: {rate} ({}).", percents(published.interval)));
     }
-    if let Some((safe, share)) = words::ceiling(record, judged.judge) {
+    if let Some(Ceiling { safe, share }) = words::ceiling(record, judged.judge) {
         let starts = count(record.starts.count);
         details.push(format!(
             "Ceiling: {}; {} of {starts} starts are safe before anyone moves.",

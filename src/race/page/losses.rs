@@ -1,6 +1,6 @@
 //! How races were lost: a stacked bar per row, each class in its colour, pattern and letter.
 
-use super::verdicts::{self, CLASSES};
+use super::verdicts::{self, CLASSES, Mark};
 use crate::race::record::JudgedRecord;
 use crate::report::figure::Swatch;
 use crate::report::sheet::{Anchor, Sheet, WIDTH};
@@ -30,7 +30,7 @@ pub(in crate::race) struct Row<'a> {
 /// The classes, as a legend shows them.
 pub(in crate::race) fn legend() -> Vec<(Swatch, String)> {
     let classes = CLASSES.iter().map(|&class| {
-        let (letter, style) = verdicts::mark(class);
+        let Mark { letter, style } = verdicts::mark(class);
         let swatch = format!(
             "<path class=\"part {style}\" d=\"M-14-7H14V7H-14Z\"/>\
              <path class=\"weave {style}\" d=\"M-14-7H14V7H-14Z\"/>\
@@ -81,7 +81,7 @@ fn stack(sheet: &mut Sheet, top: f64, judged: &JudgedRecord, races: f64) {
         lost += verdicts::failures(judged, class);
         let after = LEFT + SCALE * (lost as f64 / races).min(1.0);
         if after > before {
-            let (letter, style) = verdicts::mark(class);
+            let Mark { letter, style } = verdicts::mark(class);
             sheet.area(&format!("part {style}"), [before, top, after, bottom]);
             sheet.area(&format!("weave {style}"), [before, top, after, bottom]);
             if after - before >= LETTER {

@@ -75,8 +75,8 @@ fn shifted(drawing: &str) -> String {
 
 fn caption(record: &RaceRecord, judges: &[Judge]) -> String {
     let rules = judges.iter().map(|&judge| {
-        let ceiling = words::ceiling(record, judge).map_or_else(String::new, |(_, share)| {
-            format!(", under which at most {} of the races can be won", percent(share))
+        let ceiling = words::ceiling(record, judge).map_or_else(String::new, |ceiling| {
+            format!(", under which at most {} of the races can be won", percent(ceiling.share))
         });
         format!("The {} judge applies {}{ceiling}.", judge.name(), verdicts::rules(judge))
     });
@@ -85,7 +85,7 @@ fn caption(record: &RaceRecord, judges: &[Judge]) -> String {
 
 fn panel(record: &RaceRecord, judge: Judge) -> String {
     let mut sheet = Sheet::default();
-    let ceiling = words::ceiling(record, judge).map(|(_, share)| share);
+    let ceiling = words::ceiling(record, judge).map(|ceiling| ceiling.share);
     // One height for all judges, so that a controller's bars stand side by side.
     let height = ROWS[usize::from(any_published(record))];
     let mut top = 4.0;

@@ -1,7 +1,7 @@
 //! The tables of the race page: every number of the record but the moments of the picture.
 
 use super::provenance::provenance;
-use super::verdicts::{self, CLASSES};
+use super::verdicts::{self, CLASSES, Ceiling};
 use super::words::{self, points};
 use crate::race::judge::Judge;
 use crate::race::record::{
@@ -199,7 +199,7 @@ fn starts(record: &RaceRecord) -> String {
         ("control step", format!("{} s", number(record.step_seconds))),
     ];
     for judge in words::judges(record) {
-        if let Some((safe, share)) = words::ceiling(record, judge) {
+        if let Some(Ceiling { safe, share }) = words::ceiling(record, judge) {
             let name = match judge {
                 Judge::Study => "safe at t = 0, study judge",
                 Judge::Paper => "safe at t = 0, paper judge",

@@ -30,9 +30,17 @@ pub(in crate::race) fn class(class: FailureClass) -> &'static str {
     }
 }
 
-/// The letter and the style class of a failure class; no two share a letter.
-pub(in crate::race) fn mark(class: FailureClass) -> (&'static str, &'static str) {
-    match class {
+/// How figures show a failure class.
+pub(in crate::race) struct Mark {
+    /// Its letter; no two share one.
+    pub(in crate::race) letter: &'static str,
+    /// Its style class.
+    pub(in crate::race) style: &'static str,
+}
+
+/// The letter and the style class of a failure class.
+pub(in crate::race) fn mark(class: FailureClass) -> Mark {
+    let (letter, style) = match class {
         FailureClass::UnsafeStart => ("U", "unsafe"),
         FailureClass::NotFinite => ("N", "infinite"),
         FailureClass::Collision => ("C", "collision"),
@@ -40,13 +48,23 @@ pub(in crate::race) fn mark(class: FailureClass) -> (&'static str, &'static str)
         FailureClass::MissedGate => ("M", "missed"),
         FailureClass::Overtaken => ("O", "overtaken"),
         FailureClass::Timeout => ("T", "timeout"),
-    }
+    };
+    Mark { letter, style }
 }
 
-/// Starts that `judge` finds safe before anyone moves, and their share.
-pub(in crate::race) fn ceiling(starts: &StartsRecord, judge: Judge) -> Option<(u64, f64)> {
-    let ceiling = starts.ceilings.iter().find(|ceiling| ceiling.judge == judge)?;
-    (starts.count > 0).then(|| (ceiling.safe, ceiling.safe as f64 / starts.count as f64))
+/// Most races that can be won.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::race) struct Ceiling {
+    /// Starts that are safe before anyone moves.
+    pub(in crate::race) safe: u64,
+    /// Their share of all starts.
+    pub(in crate::race) share: f64,
+}
+
+/// The ceiling under `judge`; none without starts.
+pub(in crate::race) fn ceiling(starts: &StartsRecord, judge: Judge) -> Option<Ceiling> {
+    let safe = starts.ceilings.iter().find(|ceiling| ceiling.judge == judge)?.safe;
+    (starts.count > 0).then(|| Ceiling { safe, share: safe as f64 / starts.count as f64 })
 }
 
 /// Failures of one class, over all seeds.

@@ -1,6 +1,6 @@
 //! Words and numbers shared by the figures and tables of the race page.
 
-use super::verdicts;
+use super::verdicts::{self, Ceiling};
 use crate::race::judge::Judge;
 use crate::race::record::{ControllerRecord, JudgedRecord, RaceRecord};
 use crate::report::text::{interval, minus, number, ordinary};
@@ -62,8 +62,8 @@ pub(super) fn lead(record: &RaceRecord) -> Option<&ControllerRecord> {
     controllers.find(|controller| controller.name == HYBRID).or(record.controllers.first())
 }
 
-/// Starts that `judge` finds safe before anyone moves, and their share.
-pub(super) fn ceiling(record: &RaceRecord, judge: Judge) -> Option<(u64, f64)> {
+/// Most races that can be won under `judge`.
+pub(super) fn ceiling(record: &RaceRecord, judge: Judge) -> Option<Ceiling> {
     verdicts::ceiling(&record.starts, judge)
 }
 

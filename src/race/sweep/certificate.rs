@@ -14,7 +14,8 @@ pub fn certificate_sweep(
     program: &Program<'_>,
     seed: u64,
     config: serde_json::Value,
-    (axes, total): (Vec<AxisRecord>, u64),
+    axes: Vec<AxisRecord>,
+    total: u64,
 ) -> SweepRecord {
     SweepRecord {
         schema: SWEEP_SCHEMA,

@@ -8,5 +8,5 @@ mod store;
 mod table;
 
 pub use certificate::{certificate_point, certificate_sha256, certificate_sweep};
-pub use store::Store;
+pub use store::{Computed, Store};
 pub use table::table;

@@ -31,6 +31,15 @@ struct StoredPoint {
     point: PointRecord,
 }
 
+/// What a point came to.
+#[derive(Clone, Debug)]
+pub struct Computed {
+    /// Its result.
+    pub result: PointResult,
+    /// What failed on the adapter until then.
+    pub events: Vec<Event>,
+}
+
 /// A sweep whose points are stored as they come.
 #[derive(Debug)]
 pub struct Store {
@@ -79,13 +88,13 @@ impl Store {
         &mut self,
         sha256: String,
         values: Vec<String>,
-        compute: impl FnOnce() -> Result<(PointResult, Vec<Event>)>,
+        compute: impl FnOnce() -> Result<Computed>,
     ) -> Result<()> {
         let file = format!("{sha256}.json");
         let path = self.folder.join(POINTS).join(&file);
         let found = stored(&path, &sha256)?;
         let is_new = found.is_none();
-        let (result, events) = match found.map_or_else(compute, Ok) {
+        let Computed { result, events } = match found.map_or_else(compute, Ok) {
             Ok(done) => done,
             Err(error) if self.record.points.is_empty() => return Err(error),
             Err(error) => {
@@ -165,7 +174,7 @@ fn manifest(identity: &serde_json::Value, record: &SweepRecord) -> String {
 }
 
 /// The result that the file at `path` holds; none where there is no file.
-fn stored(path: &Path, sha256: &str) -> Result<Option<(PointResult, Vec<Event>)>> {
+fn stored(path: &Path, sha256: &str) -> Result<Option<Computed>> {
     let damaged = |problem: &dyn std::fmt::Display| {
         let text = format!("{problem}; remove the file, and the point is computed again");
         Error::file(path, text)
@@ -181,7 +190,7 @@ fn stored(path: &Path, sha256: &str) -> Result<Option<(PointResult, Vec<Event>)>
         return Err(damaged(&"it is of another point"));
     }
     match digest_of(&point)? == content_sha256 {
-        true => Ok(Some((point.result, point.events))),
+        true => Ok(Some(Computed { result: point.result, events: point.events })),
         false => Err(damaged(&"it was edited after it was stored")),
     }
 }

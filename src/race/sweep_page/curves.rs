@@ -40,7 +40,7 @@ pub(super) fn panel(chart: &Chart<'_, '_, '_>, panel: Option<usize>, number: usi
         let curve = Curve { chart, index, points: places.zip(readings).collect() };
         curve.draw(&mut plot);
         if let (Some(name), Some(end)) = (names.get(index), curve.end()) {
-            ends.push((plot.down(end), index, name.as_str()));
+            ends.push(End { down: plot.down(end), index, name });
         }
     }
     ceiling(chart, &mut plot, x.span());
@@ -157,20 +157,29 @@ fn ceiling(chart: &Chart<'_, '_, '_>, plot: &mut Plot, Span { low, high }: Span)
     }
 }
 
+/// Where a line ends, which is named there.
+struct End<'a> {
+    /// How far down.
+    down: f64,
+    /// Number of the line.
+    index: usize,
+    name: &'a str,
+}
+
 /// Names beside the ends of their lines, apart from each other.
-fn beside(plot: &mut Plot, mut ends: Vec<(f64, usize, &str)>, height: f64) {
-    ends.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+fn beside(plot: &mut Plot, mut ends: Vec<End<'_>>, height: f64) {
+    ends.sort_by(|a, b| a.down.total_cmp(&b.down));
     let mut free = f64::NEG_INFINITY;
-    for (down, ..) in &mut ends {
+    for End { down, .. } in &mut ends {
         *down = down.max(free);
         free = *down + APART;
     }
     let mut free = height + APART;
-    for (down, ..) in ends.iter_mut().rev() {
+    for End { down, .. } in ends.iter_mut().rev() {
         *down = down.min(free);
         free = *down - APART;
     }
-    for (down, index, name) in ends {
+    for End { down, index, name } in ends {
         let name = escape(name);
         plot.beside(down + 4.0, &format!("<text class=\"end hue-{index}\">{name}</text>"));
     }

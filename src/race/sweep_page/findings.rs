@@ -171,24 +171,27 @@ fn race_limits(grid: &Grid<'_>) -> Vec<String> {
 }
 
 /// A point with its certificate.
-type Certified<'p, 'a> = (&'p Point<'a>, &'a CertificatePoint);
+struct Certified<'p, 'a> {
+    point: &'p Point<'a>,
+    certificate: &'a CertificatePoint,
+}
 
 /// The findings of a sweep of certificates.
 pub(super) fn certificates(grid: &Grid<'_>) -> Findings {
     let all: Vec<Certified<'_, '_>> = grid.points.iter().filter_map(certified).collect();
     let best = grid.best.and_then(|best| certified(&grid.points[best]));
-    let parts = [best.map(|best| largest_share(grid, best)), largest_ball(grid, &all), held(&all)];
+    let parts = [best.map(|best| largest_share(grid, &best)), largest_ball(grid, &all), held(&all)];
     let (headlines, found) = parts.into_iter().flatten().unzip();
     Findings { headlines, found, limits: certificate_limits(&all) }
 }
 
 fn certified<'p, 'a>(point: &'p Point<'a>) -> Option<Certified<'p, 'a>> {
-    Some((point, certificate(point.record)?))
+    Some(Certified { point, certificate: certificate(point.record)? })
 }
 
-fn largest_share(grid: &Grid<'_>, (point, best): Certified<'_, '_>) -> (Headline, String) {
-    let (name, value) = (grid.name(point), percent(share(best)));
-    let interval = percents(best.share_interval);
+fn largest_share(grid: &Grid<'_>, best: &Certified<'_, '_>) -> (Headline, String) {
+    let (name, value) = (grid.name(best.point), percent(share(best.certificate)));
+    let interval = percents(best.certificate.share_interval);
     let found =
         format!("The largest share of the box is certified at {name}: {value} ({interval}).");
     let details = vec![format!("At {name}."), format!("Interval: {interval}.")];
@@ -196,22 +199,23 @@ fn largest_share(grid: &Grid<'_>, (point, best): Certified<'_, '_>) -> (Headline
 }
 
 fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
-    let balls = all.iter().filter(|(_, one)| one.radius > 0.0);
-    let largest = balls.max_by(|(_, a), (_, b)| a.radius.total_cmp(&b.radius));
+    let balls = all.iter().filter(|one| one.certificate.radius > 0.0);
+    let radius = |one: &Certified<'_, '_>| one.certificate.radius;
+    let largest = balls.max_by(|a, b| radius(a).total_cmp(&radius(b)));
     let title = "Largest verified ball".to_owned();
-    let Some((point, one)) = largest else {
+    let Some(largest) = largest else {
         let found = "Local growth verified no ball at any point.".to_owned();
         let headline = Headline { title, value: "none".to_owned(), details: Vec::new() };
         return (!all.is_empty()).then_some((headline, found));
     };
-    let (name, radius) = (grid.name(point), lower(one.radius));
+    let (name, radius) = (grid.name(largest.point), lower(radius(largest)));
     let found = format!("The largest verified ball has radius {radius}, at {name}.");
     let details = vec![format!("At {name}.")];
     Some((Headline { title, value: format!("radius {radius}"), details }, found))
 }
 
 fn held(all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
-    let (held, count) = (all.iter().filter(|(_, one)| one.holds).count(), all.len());
+    let (held, count) = (all.iter().filter(|one| one.certificate.holds).count(), all.len());
     let found = format!("At {held} of {count} points every claim that was asked for was obtained.");
     let headline = Headline {
         title: "Every claim obtained".to_owned(),
@@ -222,7 +226,7 @@ fn held(all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
 }
 
 fn certificate_limits(all: &[Certified<'_, '_>]) -> Vec<String> {
-    let total: f64 = all.iter().map(|(_, one)| one.beta_total).sum();
+    let total: f64 = all.iter().map(|one| one.certificate.beta_total).sum();
     let together = if total < 1.0 {
         format!(
             "Each certificate has its own confidence. All {} hold together with confidence at \

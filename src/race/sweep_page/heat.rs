@@ -5,7 +5,7 @@ use super::readings::Measure;
 use crate::report::figure::{Figure, Swatch};
 use crate::report::palette::{self, LEVELS};
 use crate::report::plot::{self, Labels, Plot, coordinate};
-use crate::report::span::Span;
+use crate::report::span::{RoundValues, Span};
 use crate::report::text::shorten;
 
 /// Width of the drawing.
@@ -112,7 +112,7 @@ fn outward(span: Span) -> Span {
     if span.width() < EQUAL {
         return Span { low: (span.low - 1.0).max(0.0), high: span.low.max(1.0) };
     }
-    let (ticks, _) = span.ticks(5.0);
+    let ticks = span.ticks(5.0).values;
     let step = ticks.windows(2).next().map_or(span.width(), |pair| pair[1] - pair[0]);
     Span { low: (span.low / step).floor() * step, high: (span.high / step).ceil() * step }
 }
@@ -139,8 +139,8 @@ fn bar(width: f64, limits: Span, label: &str) -> String {
         let (from, wide) = (coordinate((level - 1) as f64 * step), coordinate(step + 0.3));
         bar += &format!("<path class=\"cell p{level}\" d=\"M{from} 4h{wide}v{BAR}h-{wide}Z\"/>");
     }
-    let (ticks, decimals) = limits.ticks(5.0);
-    for value in ticks {
+    let RoundValues { values, decimals } = limits.ticks(5.0);
+    for value in values {
         let at = coordinate(width * (value - limits.low) / limits.width());
         let (text, low) = (plot::label(value, decimals), 4.0 + BAR);
         bar += &format!(

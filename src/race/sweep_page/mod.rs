@@ -13,6 +13,7 @@ mod readings;
 mod rows;
 mod table;
 
+use crate::race::page::verdicts::Ceiling;
 use crate::race::sweep::record::{AxisRecord, SweepRecord};
 use crate::report::figure::Figure;
 use crate::report::palette;
@@ -62,7 +63,7 @@ fn of_certificates(record: &SweepRecord) -> bool {
 }
 
 fn race_figures(grid: &Grid<'_>, front: Option<&Front>) -> Vec<Figure> {
-    let ceiling = readings::ceiling(grid.record).map(|(_, share)| share);
+    let ceiling = readings::ceiling(grid.record).map(|ceiling| ceiling.share);
     let mut figures = vec![
         chart::figure(grid, &readings::SUCCESS, ceiling),
         chart::figure(grid, &readings::LATENCY, None),
@@ -144,10 +145,14 @@ fn setting(record: &SweepRecord) -> String {
         format!("Every point flies the same {starts}{seeds}. ")
     });
     let judge = record.judge.map_or_else(String::new, |judge| {
-        let ceiling = readings::ceiling(record).map_or_else(String::new, |(safe, share)| {
-            let starts = counted(safe as usize, "start is", "starts are");
-            format!(", under which {starts} safe before anyone moves: at most {}", percent(share))
-        });
+        let ceiling =
+            readings::ceiling(record).map_or_else(String::new, |Ceiling { safe, share }| {
+                let starts = counted(safe as usize, "start is", "starts are");
+                format!(
+                    ", under which {starts} safe before anyone moves: at most {}",
+                    percent(share)
+                )
+            });
         format!("The judge is {}{ceiling}. ", judge.name())
     });
     format!(

@@ -1,6 +1,6 @@
 //! What is read off a point: the measures that figures show, and what points are compared by.
 
-use crate::race::page::verdicts;
+use crate::race::page::verdicts::{self, Ceiling};
 use crate::race::record::JudgedRecord;
 use crate::race::sweep::record::{
     CertificatePoint, PointRecord, PointResult, RacePoint, SweepRecord,
@@ -173,7 +173,7 @@ pub(super) fn score(record: &SweepRecord, point: &PointRecord) -> Option<f64> {
     ordinary(score).then_some(score)
 }
 
-/// Most races that can be won under the judge of the sweep: starts and their share.
-pub(super) fn ceiling(record: &SweepRecord) -> Option<(u64, f64)> {
+/// Most races that can be won under the judge of the sweep.
+pub(super) fn ceiling(record: &SweepRecord) -> Option<Ceiling> {
     verdicts::ceiling(record.starts.as_ref()?, record.judge?)
 }

@@ -4,7 +4,7 @@ use super::grid::Grid;
 use super::readings::{certificate, judged, race, share};
 use crate::race::judge::{FailureClass, Judge};
 use crate::race::page::provenance::provenance;
-use crate::race::page::verdicts;
+use crate::race::page::verdicts::{self, Ceiling};
 use crate::race::sweep::record::{CertificatePoint, RacePoint, SweepRecord};
 use crate::report::sortable::{Cell, Column, Order, sortable};
 use crate::report::table::pairs;
@@ -185,8 +185,8 @@ fn starts(record: &SweepRecord) -> String {
         ("noise seeds", seeds.join(", ")),
         ("judge", or_dash(record.judge.map(Judge::name))),
     ];
-    let safe = record.judge.and_then(|judge| verdicts::ceiling(starts, judge));
-    if let Some((safe, share)) = safe {
+    let ceiling = record.judge.and_then(|judge| verdicts::ceiling(starts, judge));
+    if let Some(Ceiling { safe, share }) = ceiling {
         values.push(("safe at t = 0", format!("{}, {}", count(safe), percent(share))));
     }
     pairs("Starts and noise", &values)

@@ -12,8 +12,35 @@ const COUNTS: &[&str] = &["simple", "exact", "config"];
 /// Keys whose values every point shares.
 const SHARED: [&str; 3] = ["seed", "race.starts", "race.start_box"];
 
-/// An option with a list: its name, what was given, the name of its axis, and what it changes.
-type Listed<'a> = (&'static str, &'a Option<String>, &'static str, (Target, Kind));
+/// An option with a list.
+struct Listed<'a> {
+    /// Name of the axis, and of the option after its dashes.
+    name: &'static str,
+    /// What was given.
+    text: &'a Option<String>,
+    /// What its values change.
+    target: Target,
+    /// What they are written as.
+    kind: Kind,
+}
+
+impl<'a> Listed<'a> {
+    fn new(name: &'static str, text: &'a Option<String>, target: Target, kind: Kind) -> Self {
+        Self { name, text, target, kind }
+    }
+
+    /// The option as it is written.
+    fn option(&self) -> String {
+        format!("--{}", self.name)
+    }
+
+    /// Its axis, if it was given.
+    fn axis(&self) -> Option<Result<Axis>> {
+        let (option, target) = (self.option(), self.target.clone());
+        let text = self.text.as_ref()?;
+        Some(Axis::new(&option, self.name, target, self.kind, text))
+    }
+}
 
 /// The grid that was asked for.
 ///
@@ -53,23 +80,20 @@ fn vary(text: &str) -> Result<Axis> {
 fn controllers(asked: &RaceAxes) -> Result<Axis> {
     let list = asked.controllers.as_deref().unwrap_or("mppi");
     let option = "--controllers";
-    let axis = Axis::new(option, "controller", (Target::Controller, Kind::Any), list)?;
+    let axis = Axis::new(option, "controller", Target::Controller, Kind::Any, list)?;
     let values = names(&axis.values)?.iter().map(|name| name.text().to_owned()).collect();
     Ok(Axis { values, ..axis })
 }
 
 /// The axes that were given.
 fn listed(options: &[Listed<'_>]) -> Result<Vec<Axis>> {
-    let given = |(option, text, name, of): &Listed<'_>| {
-        text.as_ref().map(|text| Axis::new(option, name, of.clone(), text))
-    };
-    options.iter().filter_map(given).collect()
+    options.iter().filter_map(Listed::axis).collect()
 }
 
 /// Refuses an option that only sweeps `of` have.
 fn refuse(options: &[Listed<'_>], of: &str) -> Result<()> {
-    match options.iter().find(|(_, text, ..)| text.is_some()) {
-        Some((option, ..)) => Err(other_kind(option, of)),
+    match options.iter().find(|option| option.text.is_some()) {
+        Some(option) => Err(other_kind(&option.option(), of)),
         None => Ok(()),
     }
 }
@@ -95,14 +119,14 @@ fn other_kind(option: &str, of: &str) -> Error {
 
 /// The axes of plans.
 fn race_axes<'a>(asked: &'a RaceAxes, horizon: &'a Option<String>) -> Vec<Listed<'a>> {
-    let plan = |key, kind| (Target::Plan(key), kind);
+    let plan = |key, text, kind| Listed::new(key, text, Target::Plan(key), kind);
     vec![
-        ("--samples", &asked.samples, "samples", plan("samples", Kind::Whole)),
-        ("--horizon", horizon, "horizon", plan("horizon", Kind::Whole)),
-        ("--temperature", &asked.temperature, "temperature", plan("temperature", Kind::Number)),
-        ("--sigma", &asked.sigma, "sigma", plan("sigma", Kind::Numbers)),
-        ("--noise", &asked.noise, "noise", plan("noise", Kind::Noise)),
-        ("--iterations", &asked.iterations, "iterations", plan("iterations", Kind::Whole)),
+        plan("samples", &asked.samples, Kind::Whole),
+        plan("horizon", horizon, Kind::Whole),
+        plan("temperature", &asked.temperature, Kind::Number),
+        plan("sigma", &asked.sigma, Kind::Numbers),
+        plan("noise", &asked.noise, Kind::Noise),
+        plan("iterations", &asked.iterations, Kind::Whole),
     ]
 }
 
@@ -112,16 +136,16 @@ fn certificate_axes(asked: &CertificateAxes) -> Vec<Listed<'_>> {
     let epsilon = keys(&["deviation.epsilon", "growth.epsilon"]);
     let beta = keys(&["deviation.beta", "global.beta", "growth.beta"]);
     vec![
-        ("--epsilon", &asked.epsilon, "epsilon", (epsilon, Kind::Number)),
-        ("--beta", &asked.beta, "beta", (beta, Kind::Number)),
-        ("--radius", &asked.radius, "radius", (keys(&["deviation.radius"]), Kind::Number)),
-        ("--bound", &asked.bound, "bound", (Target::Bound, Kind::Word(BOUNDS))),
-        ("--count", &asked.count, "count", (Target::Count, Kind::Word(COUNTS))),
+        Listed::new("epsilon", &asked.epsilon, epsilon, Kind::Number),
+        Listed::new("beta", &asked.beta, beta, Kind::Number),
+        Listed::new("radius", &asked.radius, keys(&["deviation.radius"]), Kind::Number),
+        Listed::new("bound", &asked.bound, Target::Bound, Kind::Word(BOUNDS)),
+        Listed::new("count", &asked.count, Target::Count, Kind::Word(COUNTS)),
     ]
 }
 
 /// The axis of the rollouts' length.
 fn rollout_horizon(text: &Option<String>) -> Listed<'_> {
     let target = Target::Keys(vec!["rollout.horizon".to_owned()]);
-    ("--horizon", text, "horizon", (target, Kind::Whole))
+    Listed::new("horizon", text, target, Kind::Whole)
 }

@@ -14,7 +14,9 @@ use crate::error::{Error, Result};
 use crate::files::Existing;
 use crate::model::Plant;
 use crate::race::sweep::record::PointResult;
-use crate::race::sweep::{Store, certificate_point, certificate_sha256, certificate_sweep};
+use crate::race::sweep::{
+    Computed, Store, certificate_point, certificate_sha256, certificate_sweep,
+};
 use crate::scenario::bound::CountRule;
 use crate::scenario::check_settings;
 use crate::scenario::settings::Settings;
@@ -35,17 +37,19 @@ pub(super) fn run(
     global: &Global,
     asked: &SweepArguments,
     grid: &Grid,
-    (backend, progress, out): (&Backend, &Progress, &Path),
+    backend: &Backend,
+    progress: &Progress,
+    out: &Path,
 ) -> Result<Store> {
     let sweep = Sweep { config: &asked.config, base: global.overrides(), grid, backend };
     let points = grid.points();
-    let axes = (grid.records(), points.len() as u64);
+    let (axes, total) = (grid.records(), points.len() as u64);
     let base = Config::load(&asked.config, &sweep.base)?;
     let policy = base.policy_source(folder_of(&asked.config))?;
     inputs(&asked.config, &policy, networks(&base)).spare_folder(out)?;
     let plant = base.plant(&policy)?;
     let program = backend.prepare(&plant)?;
-    let record = certificate_sweep(&program, base.seed, base.to_json()?, axes);
+    let record = certificate_sweep(&program, base.seed, base.to_json()?, axes, total);
     let hashes = points.iter().map(|values| sweep.checked(values)).collect::<Result<Vec<_>>>()?;
     let identity = serde_json::json!({
         "sweep_of": "certificates",
@@ -58,7 +62,8 @@ pub(super) fn run(
     let mut store = Store::open(out, &identity, record)?;
     for (values, sha256) in points.into_iter().zip(hashes) {
         store.point(sha256, values.clone(), || {
-            sweep.certify(&values, progress).map(|point| (point, backend.events()))
+            let result = sweep.certify(&values, progress)?;
+            Ok(Computed { result, events: backend.events() })
         })?;
     }
     Ok(store)

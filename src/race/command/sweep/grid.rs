@@ -56,7 +56,8 @@ impl Axis {
     pub(super) fn new(
         option: &str,
         name: &str,
-        (target, kind): (Target, Kind),
+        target: Target,
+        kind: Kind,
         text: &str,
     ) -> Result<Self> {
         let values: Vec<String> = split(text).into_iter().map(str::to_owned).collect();
@@ -179,7 +180,7 @@ pub(super) fn varied(text: &str) -> Result<Axis> {
     let (key, values) =
         text.split_once('=').ok_or_else(|| Error::invalid(option.as_str(), problem))?;
     let key = key.trim();
-    Axis::new(&option, key, (Target::Keys(vec![key.to_owned()]), Kind::Any), values)
+    Axis::new(&option, key, Target::Keys(vec![key.to_owned()]), Kind::Any, values)
 }
 
 /// The axes of a sweep.

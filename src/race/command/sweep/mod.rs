@@ -35,10 +35,9 @@ pub(super) fn run(global: &Global, asked: &SweepArguments) -> Result<Outcome> {
     let out = global.folder(DEFAULT_OUT);
     let progress = Progress::new(global);
     let backend = devices::open(global)?;
-    let work = (&backend, &progress, out.as_path());
     let mut store = match asked.of {
-        Of::Race => race::run(global, asked, &grid, work)?,
-        Of::Certificate => certificate::run(global, asked, &grid, work)?,
+        Of::Race => race::run(global, asked, &grid, &backend, &progress, &out)?,
+        Of::Certificate => certificate::run(global, asked, &grid, &backend, &progress, &out)?,
     };
     progress.finish();
     devices::note_events(global, &backend);

@@ -10,11 +10,11 @@ use crate::cli::progress::Progress;
 use crate::config::Overrides;
 use crate::error::Result;
 use crate::files::Existing;
-use crate::race::command::input::{RaceInput, name, noise_seeds};
+use crate::race::command::input::{RaceInput, RaceStarts, name, noise_seeds};
 use crate::race::controller::Name;
 use crate::race::run::Experiment;
-use crate::race::sweep::Store;
 use crate::race::sweep::record::PointResult;
+use crate::race::sweep::{Computed, Store};
 use crate::scenario::Watch;
 
 /// What every point has.
@@ -34,11 +34,13 @@ pub(super) fn run(
     global: &Global,
     asked: &SweepArguments,
     grid: &Grid,
-    (backend, progress, out): (&Backend, &Progress, &Path),
+    backend: &Backend,
+    progress: &Progress,
+    out: &Path,
 ) -> Result<Store> {
     let base = global.overrides();
     let input = RaceInput::load(&asked.config, &base)?;
-    let (starts, source) = input.starts(asked.race.starts.as_deref())?;
+    let RaceStarts { states: starts, source } = input.starts(asked.race.starts.as_deref())?;
     input.inputs(&asked.config, asked.race.starts.as_deref()).spare_folder(out)?;
     let noise_seeds = noise_seeds(input.config.seed, asked.race.noise_seeds.unwrap_or(1))?;
     let config = asked.config.as_path();
@@ -60,7 +62,8 @@ pub(super) fn run(
     for (i, (values, sha256)) in points.into_iter().zip(hashes).enumerate() {
         let label = grid.label(i, total, &values);
         store.point(sha256, values.clone(), || {
-            sweep.race(&values, &label, progress).map(|point| (point, backend.events()))
+            let result = sweep.race(&values, &label, progress)?;
+            Ok(Computed { result, events: backend.events() })
         })?;
     }
     Ok(store)
