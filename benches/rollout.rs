@@ -211,9 +211,9 @@ fn growth_round(criterion: &mut Criterion) {
             b.iter(|| {
                 let slice = global::slice(context, &settings, &bench.tightening, 0.0);
                 black_box(slice.expect("a slice"));
-                let (outcome, rounds, _) =
-                    growth::grow(context, &settings, &boundary, 0.0, 0).expect("a growth");
-                assert_eq!(rounds.len(), 5, "{outcome:?}: every round has a failure");
+                let run = growth::grow(context, &settings, &boundary, 0.0, 0).expect("a growth");
+                let outcome = run.outcome;
+                assert_eq!(run.rounds.len(), 5, "{outcome:?}: every round has a failure");
             });
         });
     }

@@ -136,7 +136,7 @@ fn along_rays(
 struct Cone<'a> {
     /// The unit direction in its middle.
     axis: &'a [f32],
-    /// Length of the longest offset from it, before all is scaled to length one.
+    /// Length of the offsets from it, before their sums are scaled to length one.
     spread: f32,
 }
 
