@@ -149,7 +149,7 @@ impl StateList {
 
     /// All of them.
     pub fn view(&self) -> States<'_> {
-        States { size: self.size, numbers: &self.numbers }
+        States::of(&self.numbers, self.size)
     }
 }
 

@@ -131,7 +131,8 @@ impl Noise {
     #[inline(always)]
     pub(crate) fn fill<V: Vector, const N: usize>(
         &self,
-        (stream, iteration): (Stream, u32),
+        stream: Stream,
+        iteration: u32,
         first: u32,
         normals: &mut [Lanes<N>],
         noise: &mut [[f32; N]],
@@ -244,7 +245,7 @@ impl Noise {
     pub fn sample(&self, stream: Stream, iteration: u32, sample: u32) -> Vec<f32> {
         let mut normals = vec![Lanes([0.0; 1]); self.room()];
         let mut noise = vec![[0.0; 1]; self.horizon * self.controls];
-        self.fill::<Lanes<1>, 1>((stream, iteration), sample, &mut normals, &mut noise);
+        self.fill::<Lanes<1>, 1>(stream, iteration, sample, &mut normals, &mut noise);
         noise.into_flattened()
     }
 }

@@ -118,7 +118,8 @@ impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
             self.kernel.call(Draw::<K, N> {
                 kernel: PhantomData,
                 noise: self.prepared.planning.spec.noise(),
-                source: (problem.stream, iteration),
+                stream: problem.stream,
+                iteration,
                 first: first + (group * N) as u32,
                 normals: &mut self.normals,
                 out,
@@ -187,7 +188,8 @@ impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
 struct Draw<'a, K, const N: usize> {
     kernel: PhantomData<K>,
     noise: &'a Noise,
-    source: (Stream, u32),
+    stream: Stream,
+    iteration: u32,
     first: u32,
     normals: &'a mut [Lanes<N>],
     out: &'a mut [[f32; N]],
@@ -198,7 +200,13 @@ impl<K: Kernel, const N: usize> Body for Draw<'_, K, N> {
 
     #[inline(always)]
     fn run(self) {
-        self.noise.fill::<K::Vector, N>(self.source, self.first, self.normals, self.out);
+        self.noise.fill::<K::Vector, N>(
+            self.stream,
+            self.iteration,
+            self.first,
+            self.normals,
+            self.out,
+        );
     }
 }
 

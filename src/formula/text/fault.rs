@@ -59,6 +59,7 @@ pub(crate) fn shown(text: &str) -> String {
 }
 
 /// Of `candidates` the one that is meant by `name`, whatever its letters.
+#[cfg(feature = "cli")]
 pub(crate) fn meant<'a>(
     name: &str,
     mut candidates: impl Iterator<Item = &'a str>,

@@ -11,7 +11,9 @@ mod term;
 mod token;
 
 pub use fault::Fault;
-pub(crate) use fault::{meant, nearest, shown};
+#[cfg(feature = "cli")]
+pub(crate) use fault::meant;
+pub(crate) use fault::{nearest, shown};
 pub use formula::{Formula, MOST_NODES, NetworkCall, Use};
 pub use function::Function;
 pub use names::Names;
