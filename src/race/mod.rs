@@ -44,6 +44,8 @@ pub mod system;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "cli")]
+pub mod timing;
+#[cfg(feature = "cli")]
 mod weights;
 
 #[cfg(feature = "cli")]

@@ -4,8 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use serde::Serialize;
-
 use super::controller::plan::Paths;
 use super::controller::roster::{absent, certifies, controller, settings, values};
 use super::controller::{Name, World};
@@ -19,6 +17,7 @@ use super::record::{
 };
 use super::settings::RaceSettings;
 use super::summary::Summary;
+use super::timing::TimingRecord;
 use super::weights::{note, sample_steps};
 use crate::backend::{Event, add_events};
 use crate::control::tier::{Asked, Certifier, Domain};
@@ -61,25 +60,6 @@ pub struct Experiment<'a> {
     pub folder: PathBuf,
 }
 
-/// Compute time of a controller: the races of a batch step together, so a time is that of the batch
-/// divided by the races under way, not the latency of a step.
-#[derive(Clone, Debug, Serialize)]
-pub struct TimingRecord {
-    /// The controller.
-    pub name: String,
-    /// Control steps, over all races and seeds.
-    pub steps: u64,
-    /// Mean share of a race in the wall time of a step, s.
-    #[serde(with = "crate::files::number")]
-    pub mean_seconds: f64,
-    /// The share that 99 % of the steps stay below, s.
-    #[serde(with = "crate::files::number")]
-    pub p99_seconds: f64,
-    /// The largest share, s.
-    #[serde(with = "crate::files::number")]
-    pub most_seconds: f64,
-}
-
 /// What an experiment came to.
 #[derive(Clone, Debug)]
 pub struct RaceResults {
@@ -118,7 +98,7 @@ impl Experiment<'_> {
         let (mut summaries, mut timings) = (Vec::new(), Vec::new());
         for name in names {
             let mut summary = self.controller(name, watch)?;
-            timings.push(timing(name, std::mem::take(&mut summary.seconds)));
+            timings.push(TimingRecord::new(name, std::mem::take(&mut summary.seconds)));
             summaries.push((name, summary));
         }
         let record = self.record(&summaries, absent, watch)?;
@@ -425,28 +405,4 @@ pub(super) fn flown(
     let steps = world.race.steps;
     let flights = fly(controller.as_mut(), world.system, starts, seeds, steps, watch)?;
     Ok(flights.iter().map(RaceLog::from).collect())
-}
-
-/// Mean of compute times; 0 without any.
-pub(super) fn mean_seconds(seconds: &[f32]) -> f64 {
-    seconds.iter().map(|s| f64::from(*s)).sum::<f64>() / seconds.len().max(1) as f64
-}
-
-/// The number that `share` of `sorted` stays below; 0 without any.
-pub(super) fn quantile(sorted: &[f32], share: f64) -> f64 {
-    let place = (share * sorted.len() as f64) as usize;
-    sorted.get(place.min(sorted.len().saturating_sub(1))).map_or(0.0, |s| f64::from(*s))
-}
-
-/// Compute time from that of each step.
-fn timing(name: Name, mut sorted: Vec<f32>) -> TimingRecord {
-    sorted.sort_by(f32::total_cmp);
-    let at = |share: f64| quantile(&sorted, share);
-    TimingRecord {
-        name: name.text().to_owned(),
-        steps: sorted.len() as u64,
-        mean_seconds: mean_seconds(&sorted),
-        p99_seconds: at(0.99),
-        most_seconds: at(1.0),
-    }
 }

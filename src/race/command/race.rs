@@ -16,7 +16,8 @@ use crate::error::Result;
 use crate::files::{Existing, Staged, json};
 use crate::race::page::race_html;
 use crate::race::record::{ControllerRecord, JudgedRecord, RaceRecord};
-use crate::race::run::{Experiment, RaceResults, TimingRecord};
+use crate::race::run::{Experiment, RaceResults};
+use crate::race::timing::TimingRecord;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-race";

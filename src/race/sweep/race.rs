@@ -7,8 +7,9 @@ use crate::race::controller::plan::Paths;
 use crate::race::controller::roster::{absent, controller, settings};
 use crate::race::controller::{Name, World};
 use crate::race::flight::{fly, race_seed};
-use crate::race::run::{BATCH, Experiment, flown, mean_seconds, quantile};
+use crate::race::run::{BATCH, Experiment, flown};
 use crate::race::summary::Summary;
+use crate::race::timing::{mean_seconds, quantile};
 use crate::scenario::{Unwatched, Watch, provenance};
 
 /// Control steps that are timed, if they fit into [`LATENCY_BUDGET`].
