@@ -21,6 +21,7 @@ const FLOORS: [&str; 22] = [
     "record",
     "metrics",
     "statistics",
+    "timing",
     "weights",
     "summary",
     "folder",
