@@ -302,7 +302,7 @@ fn training_improves_and_ends_early() {
     };
     let backend = cpu(1);
     let bang = BangBang { acceleration: 1.0 };
-    let ceiling = share(measures(&backend, &Plant::of(system.clone(), bang), &held_out, &config));
+    let ceiling = share(measures(&backend, &Plant::of(system, bang), &held_out, &config));
     let kept = share(measures(&backend, &Plant::of(system, policy), &held_out, &config));
     println!("from {:.3} to {best:.3} of {ceiling:.3} in {} scores", scores[0], scores.len());
     assert_eq!(kept, best);
@@ -352,7 +352,7 @@ fn samples_are_measures_in_f64() {
     // Few steps, so that the last one matters.
     let config = config("double-integrator", "analytic", &["rollout.horizon=6"]);
     let policy = BangBang { acceleration: 1.0 };
-    let plant = Plant::of(system.clone(), policy.clone());
+    let plant = Plant::of(system, policy);
     let source = Source {
         program: &backend.prepare(&plant).unwrap(),
         spec: config.spec().unwrap(),
@@ -394,7 +394,7 @@ fn samples_are_measures_in_f64() {
 fn a_value_network_learns_the_measure() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(2));
     let config = config("double-integrator", "analytic", &["train.value.iterations=400"]);
-    let plant = Plant::of(system.clone(), BangBang { acceleration: 1.0 });
+    let plant = Plant::of(system, BangBang { acceleration: 1.0 });
     let source = Source {
         program: &backend.prepare(&plant).unwrap(),
         spec: config.spec().unwrap(),

@@ -254,7 +254,7 @@ fn a_policy_through_the_dynamics_is_updated_as_on_the_cpu() {
 fn a_value_is_updated_as_on_the_cpu() {
     let (system, backend) = (DoubleIntegrator::default(), cpu(1));
     let config = config("double-integrator", "analytic", &[]);
-    let plant = Plant::of(system.clone(), BangBang { acceleration: 1.0 });
+    let plant = Plant::of(system, BangBang { acceleration: 1.0 });
     let source = Source {
         program: &backend.prepare(&plant).unwrap(),
         spec: config.spec().unwrap(),

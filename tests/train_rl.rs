@@ -214,7 +214,7 @@ fn both_players_come_near_the_solution_of_the_game() {
     let after = learner.scores().unwrap();
     let starts = config.mixture(&system.states()).unwrap().draw(5, purpose::HELD_OUT, 0, 2048);
     let reached = |system: &DoubleIntegrator| {
-        let plant = Plant::of(system.clone(), BangBang { acceleration: system.acceleration });
+        let plant = Plant::of(*system, BangBang { acceleration: system.acceleration });
         let spec = config.spec().unwrap();
         let found = successes(&backend, &plant, spec, starts.view()).unwrap();
         share(found.into_iter())
@@ -306,7 +306,7 @@ fn a_disturbed_system_is_pushed_after_its_step() {
     let network = Mlp::new(vec![layer.clone()], Activation::Relu, OutputActivation::Tanh).unwrap();
     let (system, entries) = (DroneRace::default(), [(7, 0.01_f32), (9, 0.02), (11, 0.03)]);
     let x: [f64; 12] = std::array::from_fn(|i| 0.1 * i as f64 - 0.4);
-    let model = disturbed(&Model::of(system.clone()), &network.into(), &entries);
+    let model = disturbed(&Model::of(system), &network.into(), &entries);
     let found = model.next(&x, &[0.3, -2.0, 0.1], 0);
     let calm = system.step(x, [0.3, -2.0, 0.1]);
     for i in 0..12 {

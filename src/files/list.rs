@@ -176,7 +176,7 @@ mod tests {
         }
         // What has no numbers is no state.
         let nothing = [States::one(&[]), States::new(&[], 0).expect("none"), (&[[]; 3]).into()];
-        assert!(nothing.iter().all(|none| none.len() == 0 && none.iter().len() == 0));
+        assert!(nothing.iter().all(|none| none.is_empty() && none.iter().len() == 0));
         assert_eq!(StateList::new(0).with([[]; 2]).len(), 0);
     }
 }
