@@ -160,7 +160,7 @@ fn drift_parity(gpu: Gpu) -> bool {
     let list: Vec<f32> = (0..BATCH).flat_map(|index| drawn.start(index)).collect();
     let task = DeviationTask {
         pairs: Pairs {
-            nominal: Starts::Listed(States::new(&list, 3).unwrap()),
+            nominal: Starts::Listed(States::new(&list, 3).expect("states of 3")),
             radius: 0.2,
             stream: Stream::new(3, Purpose::USER, 9),
         },
