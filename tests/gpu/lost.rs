@@ -12,7 +12,7 @@ use crate::gpu;
 
 /// Formulas that have no value, or only an infinite one on the way, at some of the starts: domains that
 /// are left, 0/0, infinities that cancel; and behind them all that may hide it.
-const FORMULAS: [&str; 42] = [
+const FORMULAS: [&str; 46] = [
     "0*sqrt(x)",
     "sqrt(x)*0",
     "0*log(x)",
@@ -55,6 +55,10 @@ const FORMULAS: [&str; 42] = [
     "x^0.5*0",
     "log(y)-log(y)",
     "sqrt(y*y+z) - sqrt(y*y+z)",
+    "0*(y*1e30*1e30)",
+    "(y*1e30*1e30)-(y*1e30*1e30)",
+    "(y*1e30*1e30)/(y*1e30*1e30)",
+    "0*sin(y*1e30*1e30)",
 ];
 
 /// Where a formula stands: both margins, the dynamics, the policy.

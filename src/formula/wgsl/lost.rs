@@ -2,8 +2,8 @@
 //!
 //! A driver may take `a - a` for 0 whatever `a` is, and a product with 0 likewise. Where a formula can
 //! give birth to a NaN, so that one could be lost, each value that may be one has a flag, computed from
-//! numbers that a driver cannot know; the outputs are marked by it. An infinity is followed where a
-//! quotient or a literal makes it; one from the overflow of a sum or a product is not.
+//! numbers that a driver cannot know; the outputs are marked by it. An infinity is followed from where a
+//! quotient or a literal makes it; one from an overflow is met where a driver could hide it.
 
 use crate::formula::Node;
 
@@ -41,15 +41,26 @@ impl<'a> Flags<'a> {
 
     /// Whether value `i` may be the first NaN, or hide one.
     fn loses(&self, i: usize) -> bool {
-        let zero =
-            |at: u32| matches!(self.nodes[at as usize], Node::Literal(bits) if bits << 1 == 0);
-        let hides = match self.nodes[i] {
-            Node::Sub(a, b) => a == b,
-            Node::Mul(a, b) => zero(a) || zero(b),
-            Node::Div(a, b) => a == b || zero(a),
-            _ => self.known[i].nan,
+        self.known[i].nan || self.birth(self.nodes[i]).is_some()
+    }
+
+    /// Whether `node` has no value though a driver that reckons with numbers knows one, by the operand
+    /// that it then does not look at.
+    fn hidden(&self, node: Node) -> Option<String> {
+        let literal = |at: u32| match self.nodes[at as usize] {
+            Node::Literal(bits) => Some(f32::from_bits(bits)),
+            _ => None,
         };
-        hides || self.birth(self.nodes[i]).is_some()
+        let zero = |at: u32| literal(at) == Some(0.0);
+        let (at, than) = match node {
+            Node::Sub(a, b) | Node::Div(a, b) if a == b => (a, ">="),
+            Node::Mul(a, b) if zero(b) => (a, ">="),
+            Node::Mul(a, b) if zero(a) => (b, ">="),
+            // By infinity it is 0 indeed.
+            Node::Div(a, b) if zero(a) => (b, ">"),
+            _ => return None,
+        };
+        literal(at).is_none().then(|| format!("size_of(v{at}) {than} INFINITE"))
     }
 
     /// The flag of value `i`, if it has one.
@@ -122,8 +133,13 @@ impl<'a> Flags<'a> {
         if numbers.is_empty() { less } else { format!("({less}){numbers}") }
     }
 
-    /// Whether operands that are numbers make a NaN; `None` where they cannot.
+    /// Whether operands that are no NaN make one, or one could be hidden; `None` where neither can be.
     fn birth(&self, node: Node) -> Option<String> {
+        joined([self.hidden(node), self.exception(node)])
+    }
+
+    /// Whether finite or infinite operands make a NaN, as far as quotients and literals are infinite.
+    fn exception(&self, node: Node) -> Option<String> {
         let known = |at: u32| self.known[at as usize];
         let infinite = |at: u32| known(at).infinite.then(|| format!("size_of(v{at}) == INFINITE"));
         let both = |a: u32, b: u32| Some(format!("({}) & ({})", infinite(a)?, infinite(b)?));
