@@ -55,10 +55,10 @@ const FORMULAS: [&str; 46] = [
     "x^0.5*0",
     "log(y)-log(y)",
     "sqrt(y*y+z) - sqrt(y*y+z)",
-    "0*(y*1e30*1e30)",
-    "(y*1e30*1e30)-(y*1e30*1e30)",
-    "(y*1e30*1e30)/(y*1e30*1e30)",
-    "0*sin(y*1e30*1e30)",
+    "0*exp(400*abs(y))",
+    "exp(400*abs(y))-exp(400*abs(y))",
+    "exp(400*abs(y))/exp(400*abs(y))",
+    "0*sin(exp(400*abs(y)))",
 ];
 
 /// Where a formula stands: both margins, the dynamics, the policy.
