@@ -88,9 +88,7 @@ impl PairTally {
 
     /// Adds the farthest pair of each step, `[T + 1]`, among pairs whose measures were added.
     pub(crate) fn reach(&mut self, farthest: &[Farthest]) {
-        for (mine, other) in self.farthest.iter_mut().zip(farthest) {
-            *mine = mine.merge(*other);
-        }
+        Farthest::merge_steps(&mut self.farthest, farthest);
     }
 
     /// Adds the pairs of `other`.

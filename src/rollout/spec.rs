@@ -140,4 +140,9 @@ impl Farthest {
         let before = other.distance == self.distance && other.pair < self.pair;
         if other.distance > self.distance || before { other } else { self }
     }
+
+    /// Merges what others found into `all`, step by step.
+    pub(crate) fn merge_steps(all: &mut [Self], found: &[Self]) {
+        all.iter_mut().zip(found).for_each(|(mine, other)| *mine = mine.merge(*other));
+    }
 }

@@ -166,10 +166,7 @@ impl Cpu {
                 let width = schedule.width;
                 run(self.instructions, Deviation { plant, task, width, first, out })
             });
-            for found in found {
-                let steps = farthest.iter_mut().zip(found);
-                steps.for_each(|(farthest, found)| *farthest = farthest.merge(found));
-            }
+            found.iter().for_each(|found| Farthest::merge_steps(&mut farthest, found));
             sink(chunk.first, &measures)?;
         }
         Ok(farthest)

@@ -220,19 +220,8 @@ fn too_large(adapter: &Adapter, columns: u64, parameters: u64, binding: u64) -> 
 #[cfg(test)]
 mod tests {
     use super::super::attempt::WORK_FLOPS;
+    use super::super::fusing::tests::network;
     use super::*;
-    use crate::policy::{Activation, Layer, OutputActivation};
-
-    fn network(widths: &[usize]) -> Mlp {
-        let layer = |pair: &[usize]| Layer {
-            weight: vec![0.0; pair[0] * pair[1]],
-            bias: vec![0.0; pair[1]],
-            inputs: pair[0],
-            outputs: pair[1],
-        };
-        let layers = widths.windows(2).map(layer).collect();
-        Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
-    }
 
     fn size<'a>(
         states: usize,

@@ -63,11 +63,12 @@ pub(super) fn step_trips(fused: &Fused, sides: u32) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::policy::{Activation, Layer, OutputActivation};
 
-    fn network(widths: &[usize]) -> Mlp {
+    /// A network of these widths, all of it 0.
+    pub(in crate::backend::gpu) fn network(widths: &[usize]) -> Mlp {
         let layer = |pair: &[usize]| Layer {
             weight: vec![0.0; pair[0] * pair[1]],
             bias: vec![0.0; pair[1]],

@@ -86,8 +86,7 @@ pub(super) fn deviation(
             }
             Runner::Cpu(cpu) => {
                 let rest = cpu.prepare(plant)?.deviation(cpu, &task, sink)?;
-                let steps = farthest.iter_mut().zip(rest);
-                steps.for_each(|(farthest, found)| *farthest = farthest.merge(found));
+                Farthest::merge_steps(&mut farthest, &rest);
                 Ok(())
             }
         }

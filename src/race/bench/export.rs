@@ -12,7 +12,7 @@ use crate::model::Plant;
 use crate::policy::Mlp;
 use crate::race::cost::RaceCost;
 use crate::race::system::DroneRace;
-use crate::rollout::{CostQuery, MppiTask, Planning, Query, ReachAvoidTask, Starts, Tightening};
+use crate::rollout::{CostQuery, MppiTask, Planning};
 
 /// Starts whose measures are exported.
 const MEASURES: usize = 4096;
@@ -110,21 +110,8 @@ fn settings(seed: u64, networks: Vec<String>) -> Settings {
 
 /// The measures of the first [`MEASURES`] starts.
 fn measures(backend: &Backend, data: &Data, network: &Mlp) -> Result<Vec<f32>> {
-    let spec = data::rollout_spec()?;
     let plant = Plant::of(DroneRace::default(), network.clone());
-    let task = ReachAvoidTask {
-        starts: Starts::listed(&*data.starts),
-        range: 0..MEASURES as u64,
-        spec,
-        tightening: &Tightening::none(&spec),
-        query: Query::Measure,
-    };
-    let mut measures = Vec::with_capacity(MEASURES);
-    backend.prepare(&plant)?.reach_avoid(&task, &mut |_, values| {
-        measures.extend_from_slice(values);
-        Ok(())
-    })?;
-    Ok(measures)
+    backend.prepare(&plant)?.measures(&data.starts[..MEASURES], &data::rollout_spec()?)
 }
 
 /// Samples, costs and the improved plan of one problem.
