@@ -8,7 +8,7 @@ use super::options::{BackendName, Global};
 use super::{Outcome, document, report};
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
-use crate::backend::gpu::{Adapter, Choice, Gpu, adapters, has_hardware};
+use crate::backend::gpu::{Adapter, Choice, Gpu, Listing, has_hardware, listing};
 use crate::error::{Error, Result};
 
 /// Opens the backend that the flags ask for; with `--fallback`, the CPU where no adapter opens, and
@@ -35,7 +35,7 @@ fn choice(global: &Global) -> Result<Option<Choice>> {
             let problem = "names a GPU adapter; leave it out, or leave out --backend cpu";
             return Err(Error::invalid(format!("--device {name}"), problem));
         }
-        return Ok(Some(Choice::Named(name.clone())));
+        return Choice::parse(name).map(Some);
     }
     Ok(match global.common.backend {
         BackendName::Gpu => Some(Choice::Any),
@@ -84,32 +84,46 @@ pub(crate) fn threads(global: &Global) -> usize {
 
 /// What `devices --json` prints.
 #[derive(Serialize)]
-struct Listing {
+struct Devices {
     cpu: String,
+    /// In the order that `--device` counts them in.
     adapters: Vec<Adapter>,
     /// What `--backend auto` takes.
     auto: String,
+    /// What the environment hides.
+    notes: Vec<String>,
+    /// Why cards that are there are not listed.
+    diagnosis: Vec<String>,
 }
 
 /// Lists the processor and the adapters, and which one `--backend auto` takes.
 pub(crate) fn list(global: &Global) -> Result<Outcome> {
-    let adapters = adapters();
+    let Listing { adapters, notes, diagnosis } = listing();
     let count = threads(global);
     let plural = if count == 1 { "" } else { "s" };
     let cpu = format!("{}, {count} thread{plural}", cpu(global)?.device());
     let chosen = adapters.iter().find(|adapter| adapter.is_hardware());
     let auto = chosen.map_or("cpu".to_owned(), |adapter| adapter.name.clone());
-    let listing = Listing { cpu, adapters, auto };
-    report(global, &document(&listing), || {
-        let mut text = format!("cpu  {}\n", listing.cpu);
-        for adapter in &listing.adapters {
-            text += &format!("gpu  {adapter}\n");
+    let devices = Devices { cpu, adapters, auto, notes, diagnosis };
+    report(global, &document(&devices), || devices.in_words())?;
+    Ok(Outcome::Done)
+}
+
+impl Devices {
+    /// A line for each device, then what is to be said of them.
+    fn in_words(&self) -> String {
+        let mut text = format!("cpu    {}\n", self.cpu);
+        for (place, adapter) in self.adapters.iter().enumerate() {
+            let pci = adapter.pci.map_or_else(String::new, |pci| format!(", pci:{pci}"));
+            text += &format!("gpu {place:<2} {adapter}{pci}\n");
         }
-        if listing.adapters.is_empty() {
-            text += "gpu  none found (needs a Vulkan, Metal or DX12 driver; on Debian the package \
+        if self.adapters.is_empty() {
+            text += "gpu    none found (needs a Vulkan, Metal or DX12 driver; on Debian the package \
                      mesa-vulkan-drivers has a software one)\n";
         }
-        text + &format!("--backend auto takes: {}\n", listing.auto)
-    })?;
-    Ok(Outcome::Done)
+        for line in self.notes.iter().chain(&self.diagnosis) {
+            text += &format!("note: {line}\n");
+        }
+        text + &format!("--backend auto takes: {}\n", self.auto)
+    }
 }

@@ -16,7 +16,7 @@ pub(crate) struct Common {
     /// Who runs the rollouts; `auto` takes a hardware GPU if there is one, else the CPU
     #[arg(long, global = true, value_enum, default_value_t = BackendName::Auto)]
     pub(crate) backend: BackendName,
-    /// The GPU adapter whose name contains this, as `devices` lists them
+    /// The GPU adapter: a part of its name, its number, or pci:0000:01:00.0, as `devices` lists them
     #[arg(long, global = true, value_name = "NAME")]
     pub(crate) device: Option<String>,
     /// Go on on the CPU where no adapter opens, or where it fails for good; it is reported

@@ -4,10 +4,11 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::device::{Adapter, Choice, Device};
+use super::device::Device;
 use super::fault::Injection;
 use super::fusing::NetworkKernels;
 use super::limits::{self, DeviceLimits};
+use super::listing::{Adapter, Choice};
 use super::opened::{Opened, Setup};
 use super::source::Sources;
 use super::state::State;

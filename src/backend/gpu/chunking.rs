@@ -3,8 +3,8 @@
 use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS};
 use super::chain_load::ChainLoad;
 use super::compose::{Fused, WORKGROUP, input_quads, output_quads, parameter_quads};
-use super::device::Adapter;
 use super::fusing::step_trips;
+use super::listing::Adapter;
 use super::network::network_flops;
 use crate::error::{Error, Result};
 use crate::policy::Mlp;

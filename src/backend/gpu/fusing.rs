@@ -2,7 +2,7 @@
 
 use super::attempt::MAX_TRIPS;
 use super::compose::Fused;
-use super::device::{Adapter, AdapterKind};
+use super::listing::{Adapter, AdapterKind};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
 

@@ -1,6 +1,6 @@
 //! An adapter opened for a library with kernels of its own.
 
-use super::device::{Adapter, found_again, instance};
+use super::listing::{Adapter, found_again, instance};
 use crate::error::{Error, Result};
 
 /// What such a library takes over, failures of the device included.

@@ -22,6 +22,7 @@ mod kernel;
 #[cfg(feature = "train-gpu")]
 mod lent;
 mod limits;
+mod listing;
 mod mppi;
 mod mppi_chunking;
 mod mppi_compiled;
@@ -49,10 +50,10 @@ mod workspace;
 pub use adapter::Gpu;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
-pub use device::{Adapter, AdapterKind, Choice, adapters};
 pub use fault::Injection;
 pub use fusing::NetworkKernels;
 pub use limits::DeviceLimits;
+pub use listing::{Adapter, AdapterKind, Choice, Listing, PciAddress, adapters, listing};
 pub use params::Params;
 pub(super) use prepared::Prepared;
 pub(super) use prepared_plans::PreparedPlanning;

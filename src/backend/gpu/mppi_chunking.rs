@@ -6,7 +6,7 @@ use super::chunking::{MEMORY_BYTES, NETWORK_COLUMNS};
 use super::compose::{
     PARTIAL_HEADER, WORKGROUP, input_quads, output_quads, parameter_quads, tile_steps,
 };
-use super::device::Adapter;
+use super::listing::Adapter;
 use super::network::network_flops;
 use crate::error::{Error, Result};
 use crate::policy::Mlp;

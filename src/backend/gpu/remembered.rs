@@ -3,30 +3,29 @@
 //! Asking loads every driver, which takes longer than many a command. A machine that has an adapter
 //! is asked each time, since the adapter is opened then.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::cache::folder as cache_folder;
-use super::device::{Adapter, AdapterKind, adapters};
+use super::listing::{Adapter, AdapterKind, adapters, layer_folders, manifest_folders, names};
 use crate::digest::sha256;
 use crate::files::{CONFIG_BYTES, Staged, read_text};
 
 /// Name of the file whose content is the key of the machine that was found to have none.
 const FILE: &str = "no-hardware-adapter";
-/// Where drivers say that they are there.
-const MANIFESTS: [&str; 5] = [
-    "/usr/share/vulkan/icd.d",
-    "/usr/local/share/vulkan/icd.d",
-    "/etc/vulkan/icd.d",
-    "/usr/share/vulkan/implicit_layer.d",
-    "/etc/vulkan/implicit_layer.d",
-];
-/// The same in the folder of the user, below its home.
-const OWN_MANIFESTS: [&str; 2] = [".local/share/vulkan/icd.d", ".config/vulkan/icd.d"];
 /// Names of devices in `/dev` that are graphics, as they begin.
 const GRAPHICS: [&str; 6] = ["dri", "nvidia", "kfd", "dxg", "mali", "card"];
-/// Variables that change which drivers are found, as they begin.
-const VARIABLES: [&str; 7] =
-    ["VK_", "VULKAN_", "WGPU_", "MESA_", "LD_LIBRARY_PATH", "CUDA_VISIBLE", "XDG_DATA"];
+/// Variables that change which cards are found, as they begin.
+const VARIABLES: [&str; 9] = [
+    "VK_",
+    "VULKAN_",
+    "WGPU_",
+    "MESA_",
+    "LD_LIBRARY_PATH",
+    "CUDA_",
+    "ROCR_VISIBLE",
+    "HIP_VISIBLE",
+    "XDG_DATA",
+];
 
 /// Whether this machine has an adapter that is a GPU and not a program.
 ///
@@ -69,8 +68,8 @@ fn remembered(folder: &Path, key: &str, ask: impl FnOnce() -> bool) -> bool {
 fn key() -> Option<String> {
     let boot = read_text(Path::new("/proc/sys/kernel/random/boot_id"), CONFIG_BYTES).ok()?;
     let mut parts = vec![env!("CARGO_PKG_VERSION").to_owned(), boot];
-    let own = std::env::home_dir().map(|home| OWN_MANIFESTS.map(|inner| home.join(inner)));
-    let folders = MANIFESTS.iter().map(PathBuf::from).chain(own.into_iter().flatten());
+    let root = Path::new("/");
+    let folders = manifest_folders(root).into_iter().chain(layer_folders(root));
     folders.for_each(|folder| parts.extend(drivers(&folder)));
     parts.extend(names(Path::new("/dev/dri")));
     let graphics = |name: &String| GRAPHICS.iter().any(|begin| name.starts_with(begin));
@@ -81,15 +80,6 @@ fn key() -> Option<String> {
     variables.sort();
     parts.extend(variables);
     Some(sha256([parts.join("\n").as_bytes()]))
-}
-
-/// The names of what is in a folder, in order.
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> =
-        entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
 }
 
 /// The files in a folder of drivers, each with its size and the time of its last change.
