@@ -137,9 +137,10 @@ fn count(context: Context<'_>, settings: &Settings, purpose: Purpose, band: f64)
                 count.f64_reruns += 1;
             }
             // A measure that is no number is no success.
-            let failed = !(sign > 0.0);
+            let succeeded = sign > 0.0;
+            let failed = !succeeded;
             count.failures += u64::from(failed);
-            count.non_finite += u64::from(failed && !(*measure > NON_FINITE));
+            count.non_finite += u64::from(failed && (measure.is_nan() || *measure <= NON_FINITE));
             if failed {
                 count.worst.add(*measure, index);
             }

@@ -141,7 +141,7 @@ impl<'a> Trials<'a> {
     fn judge(&mut self, index: u64, x: Vec<f32>, measure: f32) -> Candidate {
         let mut value = f64::from(measure);
         // A measure that is no number is no success.
-        if !(measure > 0.0) {
+        if measure.is_nan() || measure <= 0.0 {
             let (plant, spec) = (self.context.plant(), &self.settings.spec);
             value = replay::measure(plant, &x, spec, &Tightening::none(spec));
             if value > 0.0 {
