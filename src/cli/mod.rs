@@ -4,11 +4,13 @@ mod args;
 mod bench;
 mod certify;
 pub(crate) mod devices;
+mod falsify;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
 mod policy;
 pub(crate) mod progress;
+mod replayed;
 mod rollout;
 mod scenarios;
 mod stored;
@@ -70,6 +72,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
+        Command::Falsify(asked) => falsify::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

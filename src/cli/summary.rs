@@ -53,7 +53,9 @@ fn headline(record: &Record) -> String {
         false => "NOT all claims obtained",
     };
     let (system, policy) = (&record.system.name, &record.provenance.policy);
-    format!("{system} under {policy}, T = {}: {verdict}", record.horizon)
+    let whole = record.whole_box.as_ref().map(|found| format!("; {}", found.verdict));
+    let whole = whole.unwrap_or_default();
+    format!("{system} under {policy}, T = {}: {verdict}{whole}", record.horizon)
 }
 
 /// The counts behind each claim, a row each.
@@ -63,7 +65,8 @@ fn table(record: &Record) -> Vec<String> {
         "claim", "N", "failed", "d", "epsilon", "beta", "simple", "exact", "risk"
     )];
     let claims = [&record.deviation.claim, &record.global.claim];
-    rows.extend(claims.into_iter().chain(&record.growth.claim).map(row));
+    let whole_box = record.whole_box.as_ref().map(|found| &found.claim);
+    rows.extend(claims.into_iter().chain(whole_box).chain(&record.growth.claim).map(row));
     rows
 }
 

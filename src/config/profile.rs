@@ -91,7 +91,7 @@ pub(crate) fn common(
             control: PairControl::Replay,
             source: DeviationSource::Scenario,
         },
-        global: GlobalSection { draws: 20_000, beta },
+        global: GlobalSection { draws: 20_000, beta, box_risk: None },
         slice,
         state: by_name(states, |_, i| state[i]),
         growth: GrowthSection {

@@ -179,8 +179,11 @@ pub struct DeviationSection {
 pub struct GlobalSection {
     /// Pairs drawn from the box.
     pub draws: u64,
-    /// One minus the confidence of each of the two statements.
+    /// One minus the confidence of each of the statements, that about the whole box among them.
     pub beta: f64,
+    /// Largest risk that a start of the whole box may fail with, where that is asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_risk: Option<f64>,
 }
 
 /// The two coordinates of the slice.

@@ -42,11 +42,16 @@ fn header(record: &Record) -> String {
     } else {
         ("bad", "✗", missing(&verdicts))
     };
+    let whole = record
+        .whole_box
+        .as_ref()
+        .map(|found| escape(&format!(" What is said of the box: {}.", found.verdict)));
+    let whole = whole.unwrap_or_default();
     let cards: String = verdicts.iter().map(card).collect();
     format!(
         "<header>\n<p class=\"brand\">Reachcast certificate</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">Policy: {}</p>\n\
-         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}</p>\n\
+         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}{whole}</p>\n\
          <div class=\"cards\">\n{cards}</div>\n</header>\n",
         escape(&record.system.name),
         escape(&record.provenance.policy),

@@ -48,7 +48,12 @@ pub fn pair_measures(
 
 /// Folds the margins of `states`; a state that is not finite, or a margin that is no number, fails
 /// the rollout from there on.
-fn fold(model: &Model, states: &[Vec<f64>], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
+pub(crate) fn fold(
+    model: &Model,
+    states: &[Vec<f64>],
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f64 {
     let mut fold = Fold::new();
     for (t, x) in states.iter().enumerate() {
         let step = t as u32;

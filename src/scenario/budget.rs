@@ -10,7 +10,12 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
     let rounds = f64::from(growth.rounds);
     let global = settings.global.beta;
-    let budget = settings.deviation.beta + 2.0 * global + rounds * growth.round_beta();
+    let whole_box =
+        settings.whole_box.map(|asked| ("box", "interval of the failing share", asked.beta));
+    let budget = settings.deviation.beta
+        + 2.0 * global
+        + whole_box.map_or(0.0, |(.., beta)| beta)
+        + rounds * growth.round_beta();
     let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
     let claims = [
         ("deviation", "bound", settings.deviation.beta),
@@ -18,7 +23,8 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
         ("global", "interval of the certified share", global),
     ];
     let rounds = (0..growth.rounds).map(|round| ("growth", "round", round, growth.round_beta()));
-    let once = claims.into_iter().map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
+    let once =
+        claims.into_iter().chain(whole_box).map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
     for (claim, purpose, round, beta) in once.chain(rounds) {
         let entry =
             Entry { claim: claim.to_owned(), purpose: purpose.to_owned(), call: 0, round, beta };

@@ -14,7 +14,7 @@ use super::record::{
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
-use super::{Context, Watch, boundary, claims, deviation, global, growth};
+use super::{Context, Watch, boundary, claims, deviation, global, growth, whole_box};
 use crate::backend::Program;
 use crate::error::Result;
 use crate::model::Plant;
@@ -44,20 +44,23 @@ pub fn certify(
     let Tightened { constants, deviation, tightening } = tightened(context, settings)?;
     let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
     let global = global::conditional(context, settings, &tightening, purposes)?;
+    let whole_box = whole_box::record(context, settings, &tightening, &global)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
     let mut statements = claims::statements(settings, &deviation, &global, &growth);
+    statements.extend(claims::of_the_box(whole_box.as_ref()));
     statements.extend(claims::of_samples(plant, settings, &picture));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
+        + whole_box.as_ref().map_or(0, |found| found.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
     Ok(Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
-        holds: claims::holds(&deviation, &global, &growth),
+        holds: claims::holds(&deviation, &global, &growth) && claims::box_holds(whole_box.as_ref()),
         statements,
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),
@@ -66,6 +69,7 @@ pub fn certify(
         constants,
         deviation,
         global,
+        whole_box,
         state,
         slice,
         growth,

@@ -1,5 +1,6 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
+use super::box_record::BoxRecord;
 use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
 use super::sampling;
 use super::settings::Settings;
@@ -16,6 +17,23 @@ pub(super) fn holds(
         && global.accepted > 0
         && deviation.claim.epsilon.is_some_and(|asked| global.claim.certified_risk <= asked)
         && growth.outcome == GrowthOutcome::Verified
+}
+
+/// Whether the risk of the whole box is at most the one asked for, where one was.
+pub(super) fn box_holds(found: Option<&BoxRecord>) -> bool {
+    found.is_none_or(|found| found.claim.is_obtained())
+}
+
+/// What is said of the whole box: its claim, and whether that is more than was asked for.
+pub(super) fn of_the_box(found: Option<&BoxRecord>) -> Option<String> {
+    found.map(|found| match box_holds(Some(found)) {
+        true => found.claim.statement.clone(),
+        false => format!(
+            "{} That is above the risk of {} that was asked for.",
+            found.claim.statement,
+            found.claim.stated_risk()
+        ),
+    })
 }
 
 /// The claims in words.

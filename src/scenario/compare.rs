@@ -20,8 +20,17 @@ const FREE: [&str; 6] = [
     "provenance.version",
 ];
 /// Fields that are measured on the device, or that put its numbers into words.
-const OF_THE_DEVICE: [&str; 5] =
-    ["statements", "global.f32_error", "global.band", "global.f64_reruns", "growth.rounds"];
+const OF_THE_DEVICE: [&str; 9] = [
+    "statements",
+    "global.f32_error",
+    "global.band",
+    "global.f64_reruns",
+    "growth.rounds",
+    "whole_box.verdict",
+    "whole_box.f64_reruns",
+    "whole_box.starts",
+    "whole_box.pairs",
+];
 /// Fields that each version of the record has its own way of.
 const OF_THE_VERSION: [&str; 3] =
     ["schema", "provenance.physics_sha256", "provenance.policy_sha256"];

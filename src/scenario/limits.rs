@@ -127,6 +127,7 @@ impl Settings {
         self.constants.check()?;
         self.deviation.check()?;
         self.global.check()?;
+        self.whole_box.map_or(Ok(()), |asked| asked.check())?;
         self.growth.check()
     }
 }
@@ -157,6 +158,7 @@ mod tests {
                 source: DeviationSource::Scenario,
             },
             global: GlobalSettings { draws: 100, beta: 1e-3 },
+            whole_box: None,
             slice: Some([axis(0), axis(1)]),
             state: vec![0.0; 2],
             growth: GrowthSettings {

@@ -2,6 +2,8 @@
 
 pub mod bound;
 pub mod boundary;
+mod box_record;
+mod box_settings;
 mod budget;
 mod certify;
 mod claim;
@@ -9,8 +11,10 @@ mod claims;
 mod compare;
 mod constants;
 mod coordinates;
+pub mod counterexamples;
 mod derived;
 pub mod deviation;
+pub mod falsify;
 mod finding;
 pub(crate) mod fit;
 pub mod global;
@@ -29,8 +33,12 @@ mod stored;
 pub(crate) mod tail;
 pub mod tier;
 mod tightened;
+mod verdict;
 mod verify;
+mod whole_box;
 
+pub use box_record::BoxRecord;
+pub use box_settings::BoxSettings;
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
 #[cfg(feature = "cli")]

@@ -24,3 +24,5 @@ pub const CHECK: Purpose = Purpose::numbered(10);
 pub const CHECK_PERTURBATION: Purpose = Purpose::numbered(11);
 /// The rollouts drawn in a report.
 pub const PICTURE: Purpose = Purpose::numbered(12);
+/// Starts that a search for failures tries.
+pub const FALSIFY: Purpose = Purpose::numbered(22);

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::box_record::BoxRecord;
 pub use super::claim::Claim;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
@@ -11,7 +12,7 @@ use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 /// The oldest version that is read. Its physics were hashed with parameters as literals, which no
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
@@ -58,6 +59,9 @@ pub struct Record {
     pub deviation: DeviationRecord,
     /// The certified set.
     pub global: GlobalRecord,
+    /// The whole box, certified or not; older records say nothing of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub whole_box: Option<BoxRecord>,
     /// The state that slice and growth start from.
     pub state: StateRecord,
     /// The slice through that state.

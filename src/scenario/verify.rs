@@ -13,7 +13,7 @@ use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier, verified_ball};
 use super::tightened::tightening;
-use super::{Context, Unwatched, Watch, compare, global};
+use super::{Context, Unwatched, Watch, compare, global, whole_box};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
@@ -120,6 +120,7 @@ pub fn query(
     let plant = program.plant();
     check_identity(plant, record)?;
     check_sizes(settings, &plant.model)?;
+    let settings = &whole_box::as_recorded(settings, record);
     check_derived(program, record, settings)?;
     let spec = settings.spec;
     let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
@@ -155,6 +156,7 @@ pub fn check(
     watch: &dyn Watch,
 ) -> Result<CheckReport> {
     check_identity(program.plant(), record)?;
+    let settings = &whole_box::as_recorded(settings, record);
     let again = certify(program, settings, record.provenance.config.clone(), watch)?;
     let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
@@ -171,6 +173,11 @@ pub fn check(
     ));
     let share = global::share_overlaps(&record.global, &fresh);
     findings.push(share);
+    if let Some(stored) = &record.whole_box {
+        let band = record.global.band;
+        let found = whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?;
+        findings.push(found);
+    }
     if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
         let failures = fresh_failures(context, settings, ball)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
