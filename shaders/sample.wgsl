@@ -19,9 +19,9 @@ fn sample_index(column: u32) -> vec2<u32> {
     return vec2<u32>(low, params.first_high + select(0u, 1u, low < column));
 }
 
-fn box_start(index: vec2<u32>) -> State {
+fn box_start(index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.key_low, params.key_high);
-    var x: State;
+    var x: array<f32, NX>;
     var words: vec4<u32>;
     for (var i = 0u; i < NX; i += 1u) {
         if i % BLOCK_WORDS == 0u {
@@ -34,8 +34,13 @@ fn box_start(index: vec2<u32>) -> State {
 
 // Uniform offset in the unit ball: z / sqrt(|z|^2 + 2 E), see rollout/sample.rs. `everywhere`
 // lets all coordinates vary, else only those that the region marks.
-fn ball_offset(key: vec2<u32>, stream: u32, index: vec2<u32>, everywhere: bool) -> State {
-    var normal: State;
+fn ball_offset(
+    key: vec2<u32>,
+    stream: u32,
+    index: vec2<u32>,
+    everywhere: bool,
+) -> array<f32, NX> {
+    var normal: array<f32, NX>;
     var square = 0.0;
     var words: vec4<u32>;
     for (var pair = 0u; pair < NORMAL_PAIRS; pair += 1u) {
@@ -65,7 +70,7 @@ fn ball_offset(key: vec2<u32>, stream: u32, index: vec2<u32>, everywhere: bool) 
     return normal;
 }
 
-fn ball_start(index: vec2<u32>) -> State {
+fn ball_start(index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.key_low, params.key_high);
     var x = ball_offset(key, params.stream, index, false);
     for (var i = 0u; i < NX; i += 1u) {
@@ -74,7 +79,7 @@ fn ball_start(index: vec2<u32>) -> State {
     return x;
 }
 
-fn perturb(nominal: State, index: vec2<u32>) -> State {
+fn perturb(nominal: array<f32, NX>, index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.pair_key_low, params.pair_key_high);
     var x = ball_offset(key, params.pair_stream, index, true);
     var center = nominal;
@@ -91,7 +96,7 @@ fn sample(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let index = sample_index(column);
-    var start: State;
+    var start: array<f32, NX>;
     if params.region_kind == REGION_BOX {
         start = box_start(index);
     } else if params.region_kind == REGION_BALL {

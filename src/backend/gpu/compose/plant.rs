@@ -201,7 +201,7 @@ impl PlantText {
         };
         let (recorded, a, b) = (recorded_distance(states), passed("a"), passed("b"));
         format!(
-            "{recorded}\nfn state_distance(a: State, b: State) -> f32 {{\n    \
+            "{recorded}\nfn state_distance(a: array<f32, NX>, b: array<f32, NX>) -> f32 {{\n    \
              return distance_of({a}, {b});\n}}\n"
         )
     }
@@ -209,7 +209,7 @@ impl PlantText {
     /// What evaluates the inputs of a network.
     fn observation(&self) -> String {
         let quads = self.outline.driving.as_ref().map_or(0, |driving| driving.inputs.div_ceil(4));
-        let mut store = String::from("fn store_seen(column: u32, seen: Inputs) {\n");
+        let mut store = String::from("fn store_seen(column: u32, seen: array<f32, SEEN>) {\n");
         for quad in 0..quads {
             let entries = super::glue::padded("seen", quad, self.seen());
             store += &format!("    sink[{quad}u * params.stride + column] = {entries};\n");
@@ -256,7 +256,8 @@ impl PlantText {
     /// network that the rollout runs itself.
     fn drive(&self) -> String {
         let Some(driving) = &self.outline.driving else {
-            return "fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {\n    \
+            return "fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) \
+                    -> array<f32, NU> {\n    \
                     return control_of(x, t);\n}\n"
                 .to_owned();
         };
@@ -267,14 +268,14 @@ impl PlantText {
         let slot = Slot::Control as u32;
         let mut text = format!(
             "@group(0) @binding({slot}) var<storage, read> control: array<vec4<f32>>;\n\
-             fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {{\n    \
+             fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) -> array<f32, NU> {{\n    \
              let stride = params.stride * (1u + params.paired);\n"
         );
         for quad in 0..driving.outputs.div_ceil(4) {
             text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
         }
         let all: Vec<String> = (0..driving.outputs).map(component).collect();
-        text + &format!("    return acted(x, Outputs({}), t);\n}}\n", all.join(", "))
+        text + &format!("    return acted(x, array<f32, SAID>({}), t);\n}}\n", all.join(", "))
     }
 }
 
