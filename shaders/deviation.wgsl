@@ -11,7 +11,7 @@
 @group(0) @binding(8) var<storage, read_write> distances: array<f32>;
 
 // Distance of two states; HUGE where something is not finite.
-fn gap(nominal: State, perturbed: State) -> f32 {
+fn gap(nominal: array<f32, NX>, perturbed: array<f32, NX>) -> f32 {
     let distance = state_distance(nominal, perturbed);
     let sound = state_finite(nominal) && state_finite(perturbed) && finite(distance);
     return select(HUGE, distance, sound);

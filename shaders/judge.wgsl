@@ -12,7 +12,7 @@ fn bounded(margin: f32) -> f32 {
 
 // Adds the margins at `x`, the state at step `t`, to a fold. `row` of the schedule: discount, then
 // what the target margin and the constraint margin lose.
-fn judge(fold: Fold, x: State, t: u32, row: vec3<f32>) -> Fold {
+fn judge(fold: Fold, x: array<f32, NX>, t: u32, row: vec3<f32>) -> Fold {
     let target_margin = bounded(target_at(x, t) - row.y);
     let constraint_margin = bounded(constraint_at(x, t) - row.z);
     if !(state_finite(x) && finite(target_margin) && finite(constraint_margin)) {

@@ -30,7 +30,7 @@ fn dense(layer: Layer, lane: u32) {
 
 // Controls at `x`, the state of trajectory `lane` of the workgroup at step `t`; further threads only
 // help.
-fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {
+fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) -> array<f32, NU> {
     // The outputs of the step before are read before they are replaced.
     workgroupBarrier();
     if lane < WORKGROUP {

@@ -534,7 +534,7 @@ mutants! {
 mutants! {
     map_parity:
     map_forgotten: " + map_cost(x, t)" => "";
-    rows_and_columns_swapped: "cells[min(u32(cell_at(x, t))" => "cells[min(u32(cell_at(State(x[1], x[0], x[2]), t))";
+    rows_and_columns_swapped: "cells[min(u32(cell_at(x, t))" => "cells[min(u32(cell_at(array<f32, NX>(x[1], x[0], x[2]), t))";
     rows_of_the_map_without_border: "= 15.0f;" => "= 13.0f;";
     one_cell_off: "min(u32(cell_at(x, t)), CELLS - 1u)" => "min(u32(cell_at(x, t)) + 1u, CELLS - 1u)";
     columns_not_clamped: "= 14.0f;" => "= 1000.0f;";

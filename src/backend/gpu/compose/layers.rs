@@ -150,16 +150,16 @@ fn layer_table(layers: &[LayerShape]) -> String {
 
 /// `put_inputs` and `outputs_at`, free of loops.
 pub(super) fn activation_glue(inputs: usize, outputs: usize) -> String {
-    let mut text = String::from("fn put_inputs(column: u32, seen: Inputs) {\n");
+    let mut text = String::from("fn put_inputs(column: u32, seen: array<f32, SEEN>) {\n");
     for quad in 0..inputs.div_ceil(4) {
         text += &format!("    put({quad}u, column, {});\n", padded("seen", quad, inputs));
     }
-    text += "}\nfn outputs_at(column: u32) -> Outputs {\n";
+    text += "}\nfn outputs_at(column: u32) -> array<f32, SAID> {\n";
     for quad in 0..outputs.div_ceil(4) {
         text += &format!("    let v{quad} = input_at({quad}u, column);\n");
     }
     let all: Vec<String> = (0..outputs).map(component).collect();
-    text + &format!("    return Outputs({});\n}}\n", all.join(", "))
+    text + &format!("    return array<f32, SAID>({});\n}}\n", all.join(", "))
 }
 
 /// `hidden_activation` and `output_activation`; the identity where there is no network.
