@@ -9,6 +9,7 @@ use crate::scenario::global::{band, check_margins, slice_through};
 use crate::scenario::growth::{Growth, check_scenarios};
 use crate::scenario::growth_batch::{Request, grow_each};
 use crate::scenario::ledger::{Entry, Ledger, Spend};
+use crate::scenario::sets::chosen;
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, Tightened, Unwatched, tightened};
 
@@ -97,9 +98,12 @@ impl<'a> Certifier<'a> {
         }
         check_sizes(settings, &program.plant().model)?;
         let context = Context { program, watch: &Unwatched };
-        let tightened = tightened(context, settings)?;
+        let mut tightened = tightened(context, settings)?;
+        if let (Some(drops), Some(bound)) = (&settings.drops, &tightened.drops) {
+            (tightened.tightening, _) = chosen(context, settings, drops, bound)?;
+        }
         let lost = tightened.deviation.non_finite;
-        if lost > 0 {
+        if lost > 0 && tightened.drops.is_none() {
             let problem = format!("{lost} rollouts of the deviation bound are not finite");
             return Err(Error::Refused(problem));
         }

@@ -1,6 +1,6 @@
 //! Margin drops of pairs, and the score of starts: the tightening that a start just bears.
 
-use super::fold::HUGE;
+use super::fold::{HUGE, reach_avoid};
 use super::replay::{Margins, PairMargins};
 use super::spec::{Effect, Tightening};
 
@@ -17,8 +17,8 @@ impl Shapes {
     /// What the margins lose at `level`: `level rho_t` and `level kappa_t`, rounded up to f32.
     pub fn tightening(&self, level: f64) -> Tightening {
         let lost = |shape: &Vec<f64>| -> Vec<f32> {
-            let lost = shape.iter().map(|unit| (level * unit).min(f64::from(HUGE)) as f32);
-            lost.map(|lost| if lost == 0.0 { lost } else { lost.next_up() }).collect()
+            let lost = shape.iter().map(|unit| (level * unit).min(f64::from(HUGE)));
+            lost.map(|lost| if lost == 0.0 { 0.0 } else { (lost as f32).next_up() }).collect()
         };
         Tightening::losing(lost(&self.target), lost(&self.constraint))
     }
@@ -32,6 +32,19 @@ impl Shapes {
             constraint: self.constraint.iter().map(factor).collect(),
             effect: Effect::Multiplied,
         }
+    }
+
+    /// The score of a nominal rollout: the least level at which it is not certified any more, in f64.
+    /// Minus [`HUGE`] where its first state violates the constraint.
+    pub fn score(&self, margins: &[Margins]) -> f64 {
+        let units = self.target.iter().zip(&self.constraint);
+        let scaled = margins.iter().zip(units).map_while(|(margins, (target, constraint))| {
+            let number = !margins.target.is_nan() && !margins.constraint.is_nan();
+            number.then(|| (margins.target / target, margins.constraint / constraint))
+        });
+        let huge = f64::from(HUGE);
+        let bounded = |x: f64| x.clamp(-huge, huge);
+        reach_avoid(scaled.map(|(target, constraint)| (bounded(target), bounded(constraint))), 1.0)
     }
 
     /// The largest drop of a pair in these units, section 3 of `docs/method.md`: over both margins and the
@@ -120,9 +133,8 @@ mod tests {
         ] {
             let margins = rollout(&margins);
             let score = replay::measure_of(&margins, &plain, &shapes.units());
-            let certified = |level: f64| {
-                replay::measure_of(&margins, &spec, &shapes.tightening(level)) > 0.0
-            };
+            let certified =
+                |level: f64| replay::measure_of(&margins, &spec, &shapes.tightening(level)) > 0.0;
             assert_eq!(score > 0.0, certified(0.0), "{margins:?}: {score}");
             if score > 0.0 {
                 assert!(certified(score * (1.0 - 1e-6)) && !certified(score * (1.0 + 1e-6)));

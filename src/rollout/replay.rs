@@ -22,6 +22,12 @@ pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Ti
     fold(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
 }
 
+/// The margins of the rollout from `start` in f64, `[T + 1]`.
+pub fn states_margins(plant: &Plant, start: &[f32], spec: &RolloutSpec) -> Vec<Margins> {
+    let states = states::<f64>(plant, start, spec.horizon);
+    margins(&plant.model, states.iter().map(Vec::as_slice))
+}
+
 /// Measures `(nominal, perturbed)` of a pair in f64, as [`super::PairMeasure`] has them.
 pub fn pair_measures(
     plant: &Plant,

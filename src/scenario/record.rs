@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use super::claim::Claim;
+use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 /// The oldest version that is read. Its physics were hashed with parameters as literals, which no
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
@@ -58,6 +59,15 @@ pub struct Record {
     pub deviation: DeviationRecord,
     /// The certified set.
     pub global: GlobalRecord,
+    /// The bound on margin drops, where these tighten the margins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drops: Option<DropsRecord>,
+    /// The sequence of sets that the certified one was chosen from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<SequenceRecord>,
+    /// The calibration of the score.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationRecord>,
     /// The state that slice and growth start from.
     pub state: StateRecord,
     /// The slice through that state.
@@ -213,6 +223,10 @@ pub struct GlobalRecord {
     pub band: f64,
     /// How many were.
     pub f64_reruns: u64,
+    /// The fresh starts that the share is from, where the set was chosen among several; else it is from
+    /// the draws.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share: Option<ShareRecord>,
 }
 
 /// The state that slice and growth start from.

@@ -12,8 +12,7 @@ use super::purpose;
 use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier, verified_ball};
-use super::tightened::tightening;
-use super::{Context, Unwatched, Watch, compare, global};
+use super::{Context, Unwatched, Watch, compare, global, sets};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
@@ -122,7 +121,7 @@ pub fn query(
     check_sizes(settings, &plant.model)?;
     check_derived(program, record, settings)?;
     let spec = settings.spec;
-    let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
+    let tightening = sets::tightening(record, &spec);
     let context = Context { program, watch: &Unwatched };
     let margins = global::check_margins(
         context,
@@ -160,7 +159,7 @@ pub fn check(
     let mut findings = recomputed(record, &again);
     findings.push(compare::fields(record, &again));
     findings.extend(not_compared(record));
-    let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
+    let tightening = sets::tightening(record, &settings.spec);
     let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
     let fresh = global::conditional(context, settings, &tightening, purposes)?;
     findings.push(refuted(
