@@ -2,7 +2,7 @@
 
 use super::fold::{HUGE, reach_avoid};
 use super::replay::{Margins, PairMargins};
-use super::spec::{Effect, Tightening};
+use super::spec::{Effect, RolloutSpec, Tightening};
 
 /// What margins are measured in at each step: `rho_t` and `kappa_t`, `[T + 1]` each, above 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,14 @@ pub struct Shapes {
 }
 
 impl Shapes {
+    /// The units with which the score is the reach-avoid measure itself: `1 / gamma^t` at step t.
+    pub fn of_discount(spec: &RolloutSpec) -> Self {
+        let gamma = f64::from(spec.gamma);
+        let units: Vec<f64> =
+            (0..=spec.horizon).map(|t| gamma.powi(-(t as i32)).min(f64::from(HUGE))).collect();
+        Self { target: units.clone(), constraint: units }
+    }
+
     /// What the margins lose at `level`: `level rho_t` and `level kappa_t`, rounded up to f32.
     pub fn tightening(&self, level: f64) -> Tightening {
         let lost = |shape: &Vec<f64>| -> Vec<f32> {

@@ -1,4 +1,4 @@
-//! Calibration of the score: the level above which few failing pairs lie.
+//! Calibration of the reach-avoid measure: the level above which few failing pairs lie.
 
 use super::Context;
 use super::drops::{each_pair, level, sample_claim};
@@ -13,8 +13,8 @@ use crate::rollout::drops::Shapes;
 use crate::rollout::replay::{PairMargins, measure_of};
 use crate::rollout::{RolloutSpec, Tightening};
 
-/// Draws the pairs and finds the level alpha: the largest score of a failing pair that is not discarded,
-/// and never below 0 (Lin and Bansal 2023).
+/// Draws the pairs and finds the level alpha: the largest measure of the nominal rollout of a failing pair
+/// that is not discarded, and never below 0 (Lin and Bansal 2023).
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for an empty box, and [`crate::Error::Interrupted`] if the watch says so.
@@ -22,12 +22,12 @@ pub(super) fn calibrate(
     context: Context<'_>,
     settings: &Settings,
     asked: &SampleSettings,
-    shapes: &Shapes,
 ) -> Result<CalibrationRecord> {
+    let shapes = Shapes::of_discount(&settings.spec);
     let purposes = [purpose::CALIBRATION_NOMINAL, purpose::CALIBRATION_PERTURBATION];
     let count = asked.scenarios;
     let scores = each_pair(context, settings, "calibration", purposes, count, |_, pair| {
-        failing_score(shapes, pair, &settings.spec)
+        failing_score(&shapes, pair, &settings.spec)
     })?;
     Ok(CalibrationRecord {
         claim: claim(context.model(), settings, asked)?,
@@ -52,7 +52,7 @@ pub(super) fn derived(
     })
 }
 
-/// The score of the nominal rollout where the perturbed one fails; minus infinity where it does not.
+/// The measure of the nominal rollout where the perturbed one fails; minus infinity where it does not.
 fn failing_score(shapes: &Shapes, pair: &PairMargins, spec: &RolloutSpec) -> f64 {
     let reached = measure_of(&pair.perturbed, spec, &Tightening::none(spec)) > 0.0;
     if reached { f64::NEG_INFINITY } else { shapes.score(&pair.nominal) }
@@ -66,8 +66,8 @@ fn claim(model: &Model, settings: &Settings, asked: &SampleSettings) -> Result<C
         _ => format!(" ({discards} of {scenarios} pairs discarded)"),
     };
     let statement = format!(
-        "With confidence 1 - {beta}, the chance that a nominal start of the box has a score above \
-         alpha and its perturbed rollout fails is at most {epsilon}{discarded}."
+        "With confidence 1 - {beta}, the chance that a nominal start of the box has a reach-avoid \
+         measure above alpha and its perturbed rollout fails is at most {epsilon}{discarded}."
     );
     sample_claim(model, settings, asked, "calibration", statement)
 }

@@ -52,6 +52,7 @@ pub(super) fn bound(
         widest: widest.transpose()?,
         non_finite: drops.iter().filter(|drop| drop.size == f64::INFINITY).count() as u64,
         share: ShareRecord::default(),
+        by_constants: None,
         target_shape: shapes.target,
         constraint_shape: shapes.constraint,
     })

@@ -32,6 +32,19 @@ pub struct DropsRecord {
     pub non_finite: u64,
     /// How much of the box is certified at `level`, from fresh starts.
     pub share: ShareRecord,
+    /// How many of the first fresh starts constants times the deviation bound would certify; none where
+    /// there are no constants.
+    pub by_constants: Option<SeenRecord>,
+}
+
+/// A count without a claim, for comparison.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeenRecord {
+    /// Starts drawn from the box.
+    pub draws: u64,
+    /// Of which lie in the set, by signs in f32.
+    pub inside: u64,
 }
 
 impl DropsRecord {
@@ -146,13 +159,13 @@ pub struct LevelRecord {
     pub risk: Option<f64>,
 }
 
-/// Calibration of the score, `docs/method.md` section 4.
+/// Calibration of the reach-avoid measure, `docs/method.md` section 4.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationRecord {
     /// The joint claim; its failures are the failing pairs discarded.
     pub claim: Claim,
-    /// Alpha: the set is the starts with a score above it; never below 0.
+    /// Alpha: the set is the starts with a reach-avoid measure above it; never below 0.
     #[serde(with = "crate::files::number")]
     pub level: f64,
     /// Pairs of which the perturbed rollout failed.

@@ -16,6 +16,8 @@ pub const SCHEMA: u32 = 3;
 /// The oldest version that is read. Its physics were hashed with parameters as literals, which no
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
+/// The oldest version whose physics and policies were hashed as they are today.
+pub(crate) const HASHED_ALIKE: u32 = 2;
 
 /// A margin as a record has it: the largest number stands for infinity, as it does in a measure.
 pub(crate) fn finite_margin(margin: f32) -> f32 {
@@ -87,6 +89,16 @@ pub struct Record {
     pub events: Vec<Event>,
     /// Wall time and threads: the only part that a second run may change.
     pub timing: Timing,
+}
+
+impl Record {
+    /// The claims, in the order of the method.
+    pub fn claims(&self) -> Vec<&Claim> {
+        let drops = self.drops.iter().map(|drops| &drops.claim);
+        let calibration = self.calibration.iter().map(|calibration| &calibration.claim);
+        let first = [&self.deviation.claim, &self.global.claim].into_iter();
+        first.chain(drops).chain(calibration).chain(&self.growth.claim).collect()
+    }
 }
 
 /// Who computed what from which input.

@@ -2,7 +2,7 @@
 
 use super::drops::pairs;
 use super::drops_record::{
-    CalibrationRecord, DropsRecord, SequenceOutcome, SequenceRecord, ShareRecord,
+    CalibrationRecord, DropsRecord, SeenRecord, SequenceOutcome, SequenceRecord, ShareRecord,
 };
 use super::drops_settings::DropSettings;
 use super::record::{GlobalRecord, Record};
@@ -10,13 +10,13 @@ use super::sequence::{Counts, Failed, Levels, derived, test};
 use super::settings::Settings;
 use super::tightened::Tightened;
 use super::{Context, calibration, drops, global, purpose, tightened};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::{Model, Plant};
 use crate::rollout::drops::Shapes;
 use crate::rollout::replay::{measure_of, states_margins};
 use crate::rollout::{
-    DeviationTask, NON_FINITE, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
-    Stream, Tightening, replay,
+    DeviationTask, Keep, NON_FINITE, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec,
+    Starts, Stream, Tightening, replay,
 };
 
 /// Starts of the pilot that fixes the levels.
@@ -49,22 +49,25 @@ pub(super) fn sets(
     let level = sequence.level().unwrap_or(f64::INFINITY);
     tightened.tightening = shapes.tightening(level);
     let calibration = asked.calibration.as_ref();
+    let calibration =
+        calibration.map(|asked| calibration::calibrate(context, settings, asked)).transpose()?;
+    let draws = asked.share_draws;
+    bound.by_constants = by_constants(context, settings, tightened, draws)?;
+    let inside_both = inside(context, settings, &shapes, [bound.level, level], draws, tally.band)?;
+    bound.share = ShareRecord::new(inside_both[0], draws, asked.sample.beta);
+    let share = ShareRecord::new(inside_both[1], draws, settings.global.beta);
     let calibration = calibration
-        .map(|asked| calibration::calibrate(context, settings, asked, &shapes))
+        .map(|record| {
+            let (levels, units) = ([record.level], Shapes::of_discount(&settings.spec));
+            let [inside] = inside(context, settings, &units, levels, draws, tally.band)?;
+            let share = ShareRecord::new(inside, draws, record.claim.beta);
+            Ok::<_, Error>(CalibrationRecord { share, ..record })
+        })
         .transpose()?;
-    let alpha = calibration.as_ref().map_or(f64::INFINITY, |record| record.level);
-    let levels = [bound.level, level, alpha];
-    let inside = inside(context, settings, &shapes, levels, asked.share_draws, tally.band)?;
-    let share = |set: usize, beta| ShareRecord::new(inside[set], asked.share_draws, beta);
-    bound.share = share(0, asked.sample.beta);
-    let calibration = calibration.map(|record| {
-        let share = share(2, record.claim.beta);
-        CalibrationRecord { share, ..record }
-    });
     let error = global::measured_error(context, settings, &tightened.tightening)?;
     let chosen = global::ChosenSet {
         sequence: &sequence,
-        share: share(1, settings.global.beta),
+        share,
         reached: tally.reached,
         non_finite: tally.non_finite,
         f32_error: error,
@@ -150,7 +153,8 @@ pub(super) fn rollouts(record: &Record) -> u64 {
     let bound = drops.map_or(0, |drops| 2 * (drops.pilot + drops.claim.scenarios));
     let calibration = record.calibration.as_ref();
     let calibration = calibration.map_or(0, |calibration| 2 * calibration.claim.scenarios);
-    let share = record.global.share.map_or(0, |share| share.draws);
+    let sets = if record.calibration.is_some() { 2 } else { 1 };
+    let share = record.global.share.map_or(0, |share| sets * share.draws);
     bound + calibration + share + record.sequence.as_ref().map_or(0, |sequence| sequence.pilot)
 }
 
@@ -385,6 +389,32 @@ fn inside<const SETS: usize>(
         context.watch.advance(values.len() as u64)
     })?;
     Ok(inside)
+}
+
+/// How many of the first fresh starts constants times the deviation bound would certify: as many starts
+/// as the conditional sample has draws, and no more than `draws`.
+fn by_constants(
+    context: Context<'_>,
+    settings: &Settings,
+    tightened: &Tightened,
+    draws: u64,
+) -> Result<Option<SeenRecord>> {
+    let Tightened { constants, deviation, .. } = tightened;
+    if ![&constants.target, &constants.constraint].iter().all(|one| one.used.is_finite()) {
+        return Ok(None);
+    }
+    let lost = tightened::tightening(&deviation.bound, constants, &settings.spec);
+    let region = Region::new_box(&*settings.low, &*settings.high)?;
+    let stream = Stream::new(settings.seed, purpose::FRESH_SHARE, 0);
+    let task = ReachAvoidTask {
+        starts: Starts::Drawn { region, stream },
+        range: 0..draws.min(settings.global.draws),
+        spec: settings.spec,
+        tightening: &lost,
+        query: Query::Sign,
+    };
+    let tally = context.program.tally(&task, Keep::Counts)?;
+    Ok(Some(SeenRecord { draws: task.range.end, inside: tally.counts().successes }))
 }
 
 impl Judge<'_> {
