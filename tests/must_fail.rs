@@ -45,6 +45,7 @@ fn losses(spec: &RolloutSpec) -> Tightening {
     Tightening {
         target: steps.clone().map(|t| 0.05 + 0.01 * t as f32).collect(),
         constraint: steps.map(|t| 0.02 + 0.003 * t as f32).collect(),
+        ..Tightening::default()
     }
 }
 
@@ -449,7 +450,7 @@ mutants! {
     target_not_discounted: "discount * target_margin" => "target_margin";
     target_without_constraint: "min(safe, discount * target_margin)" => "discount * target_margin";
     constraint_forgotten: "min(fold.safe, discount * constraint_margin)" => "discount * constraint_margin";
-    losses_swapped: "target_at(x, t) - row.y" => "target_at(x, t) - row.z";
+    losses_swapped: "target_at(x, t), row.y" => "target_at(x, t), row.z";
     loss_added: "constraint_at(x, t) - row.z" => "constraint_at(x, t) + row.z";
     early_exit_on_safety: "fold.best > 0.0 || fold.safe <= 0.0" => "fold.best > 0.0 || fold.safe > 0.0";
     survivors_mixed_up: "kept_origin[place] = origin[column];" => "kept_origin[place] = origin[place];";

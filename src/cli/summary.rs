@@ -24,9 +24,12 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     lines.push(TABLE.to_owned());
     lines.push(String::new());
     let [low, high] = record.global.share_interval;
+    let (inside, draws, what) = match record.global.share {
+        Some(share) => (share.inside, share.draws, "fresh starts"),
+        None => (record.global.accepted, record.global.draws, "draws"),
+    };
     lines.push(format!(
-        "certified set   {} of {} draws, P(V_global) within {low:.4} to {high:.4}",
-        record.global.accepted, record.global.draws
+        "certified set   {inside} of {draws} {what}, P(V_global) within {low:.4} to {high:.4}"
     ));
     lines.push(format!(
         "conditional     failure inside it at most {:.5} ({} failed)",
@@ -64,9 +67,7 @@ fn table(record: &Record) -> Vec<String> {
         "{:<12} {:>10} {:>8} {:>3} {:>8} {:>9} {:>8} {:>8} {:>10}",
         "claim", "N", "failed", "d", "epsilon", "beta", "simple", "exact", "risk"
     )];
-    let claims = [&record.deviation.claim, &record.global.claim];
-    let whole_box = record.whole_box.as_ref().map(|found| &found.claim);
-    rows.extend(claims.into_iter().chain(whole_box).chain(&record.growth.claim).map(row));
+    rows.extend(record.claims().into_iter().map(row));
     rows
 }
 

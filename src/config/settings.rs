@@ -63,6 +63,7 @@ impl Config {
             deviation: self.deviation_settings()?,
             global: self.global_settings()?,
             whole_box: Some(self.box_settings()?),
+            drops: self.drop_settings()?,
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,

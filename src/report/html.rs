@@ -2,6 +2,7 @@
 
 use super::figures;
 use super::palette;
+use super::sets;
 use super::shell::{self, HATCH, Scripts, items};
 use super::table;
 use super::text::{escape, number, upper};
@@ -158,11 +159,13 @@ fn numbers(record: &Record) -> String {
          <p class=\"hint\">Risks and bounds are rounded up, radii down, intervals outwards. The \
          equations are in <code>docs/method.md</code>, every digit is in \
          <code>certificate.json</code>.</p>\n\
-         {}<div class=\"tables\">\n{}</div>\n{}\
+         {}{}<div class=\"tables\">\n{}{}</div>\n{}\
          <details><summary>Deviation bound at each step</summary>\n{}</details>\n\
          {}</section>\n",
         table::claims(record),
+        sets::sets(record),
         table::narrow(record),
+        sets::drops(record),
         table::wide(record),
         table::steps(record),
         shell::configuration(&record.provenance)

@@ -96,7 +96,7 @@ fn global(record: &Record) -> Verdict<'_> {
     let found = global.accepted > 0;
     Verdict {
         title: "Certified set",
-        obtained: found,
+        obtained: found && global.claim.is_obtained(),
         headline: if found {
             format!("risk ≤ {}", upper(global.claim.certified_risk))
         } else {

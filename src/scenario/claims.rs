@@ -15,7 +15,8 @@ pub(super) fn holds(
 ) -> bool {
     deviation.non_finite == 0
         && global.accepted > 0
-        && deviation.claim.epsilon.is_some_and(|asked| global.claim.certified_risk <= asked)
+        && (global.claim.epsilon.or(deviation.claim.epsilon))
+            .is_some_and(|asked| global.claim.certified_risk <= asked)
         && growth.outcome == GrowthOutcome::Verified
 }
 
@@ -69,14 +70,16 @@ pub(super) fn of_samples(
 /// The certified share of the box in words.
 fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
     let [low, high] = global.share_interval;
+    let (inside, draws) =
+        global.share.map_or((global.accepted, global.draws), |share| (share.inside, share.draws));
     format!(
         "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
          ({} of {} starts).",
         settings.global.beta,
         100.0 * low,
         100.0 * high,
-        global.accepted,
-        global.draws
+        inside,
+        draws
     )
 }
 

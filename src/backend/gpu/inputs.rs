@@ -5,7 +5,7 @@ use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
 use super::upload::Upload;
-use crate::rollout::{Region, RolloutSpec, Starts, Tightening};
+use crate::rollout::{Effect, Region, RolloutSpec, Starts, Tightening};
 
 /// Bytes of a vector of 4 numbers.
 const VECTOR_BYTES: usize = 16;
@@ -59,13 +59,17 @@ impl Inputs {
         self.0.put(VALUES, 0, values);
     }
 
-    /// Sets the schedule, per step: discount, and what both margins lose. The discount is multiplied
-    /// up step by step in f32, as the host's fold does.
+    /// Sets the schedule, per step: discount, what both margins lose, and 1 where they are multiplied
+    /// with it instead. The discount is multiplied up step by step in f32, as the host's fold does.
     pub(super) fn set_schedule(&mut self, spec: &RolloutSpec, tightening: &Tightening) {
         let losses = tightening.target.iter().zip(&tightening.constraint);
+        let multiplied = match tightening.effect {
+            Effect::Subtracted => 0.0,
+            Effect::Multiplied => 1.0,
+        };
         let mut discount = 1.0;
         for (step, (&target, &constraint)) in losses.enumerate() {
-            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, 0.0]);
+            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, multiplied]);
             discount *= spec.gamma;
         }
     }
