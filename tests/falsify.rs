@@ -49,7 +49,8 @@ fn search(
     budget: u64,
     seed: u64,
 ) -> FalsifyRecord {
-    let settings = FalsifySettings { region: region.clone(), spec: *spec, budget, seed };
+    let settings =
+        FalsifySettings { region: region.clone(), pairs: None, spec: *spec, budget, seed };
     falsify(&backend.prepare(plant).unwrap(), &settings, &Unwatched).unwrap()
 }
 
@@ -130,7 +131,8 @@ fn where_nothing_fails_it_says_what_was_tried() {
         assert!(budget < 1000 || tried.restarts > 1, "{tried:?}");
     }
     for budget in [0, u64::MAX] {
-        let settings = FalsifySettings { region: safe.1.clone(), spec: safe.2, budget, seed: 1 };
+        let settings =
+            FalsifySettings { region: safe.1.clone(), pairs: None, spec: safe.2, budget, seed: 1 };
         let backend = cpu(1);
         let program = backend.prepare(&safe.0).unwrap();
         assert!(falsify(&program, &settings, &Unwatched).is_err(), "{budget}");
@@ -327,6 +329,37 @@ fn a_risk_of_the_whole_box_that_is_asked_for_is_a_claim() {
     }
     let bad = ["certify", config, "--set", "global.box_risk=1.5", "--out", &folder.path("bad")];
     refused(&bad, &["global.box_risk", "1.5"]);
+}
+
+/// The perturbed starts of a certified set that is too large, under either control, and of a sound one.
+#[test]
+fn the_certified_set_is_searched_by_pairs() {
+    let folder = Folder::new();
+    let config = "configs/models/dubins.toml";
+    let wrong = ["constants.target=0.001", "constants.constraint=0.001", "deviation.radius=0.3"];
+    for (name, control, set) in
+        [("r", "replay", &wrong[..]), ("c", "closed-loop", &wrong[..]), ("s", "replay", &[])]
+    {
+        let (out, to) = (folder.path(name), folder.path(&format!("{name}-search")));
+        let control = format!("deviation.control={control}");
+        certify(config, &[set, &[control.as_str()]].concat(), &out, "cpu");
+        let asked = ["falsify", "--around", &out, "--within", "certified", "--budget", "20000"];
+        let asked = [&asked[..], &["--out", &to, "--backend", "cpu", "--json"]].concat();
+        let (code, said, message) = reachcast(&asked);
+        let said: Value = serde_json::from_str(&said).expect(&message);
+        assert_eq!(code, Some(if set.is_empty() { 0 } else { 3 }), "{name}: {said}");
+        assert!(said["rollouts"].as_u64().unwrap() <= 20_000 && said["uniform"].as_u64() > Some(0));
+        assert_eq!(said["against"]["claim"], "global");
+        if set.is_empty() {
+            continue;
+        }
+        let path = format!("{to}/counterexamples_replayed.csv");
+        let (rows, measures) = (table(&path), rolled_out(config, &path, "cpu", &[], &folder));
+        assert!(!rows.is_empty() && rows.len() == measures.len());
+        for (row, measure) in rows.iter().zip(measures) {
+            assert!(measure <= 0.0 && same(&row["measure:replay"], measure), "{row}");
+        }
+    }
 }
 
 /// Constants that are far too small certify pairs that fail: they are listed and replayed.
