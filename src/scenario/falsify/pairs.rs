@@ -50,7 +50,8 @@ pub(super) fn measures(
         }
         // No task of a backend has listed pairs.
         PairControl::Replay => {
-            let measure = |pair: &Vec<f32>| in_f64(context.plant(), settings, spec, pair) as f32;
+            let plant = context.plant();
+            let measure = |pair: &Vec<f32>| in_f64(plant, settings, spec, pair) as f32;
             let measures = pairs.par_iter().map(measure).collect();
             context.watch.advance(pairs.len() as u64)?;
             measures
