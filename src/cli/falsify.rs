@@ -17,8 +17,9 @@ use crate::error::{Error, Result};
 use crate::files::{Existing, MANIFEST, Staged, is_free, json, make_way};
 use crate::model::Plant;
 use crate::rollout::Region;
-use crate::scenario::counterexamples::{COUNTEREXAMPLES, starts_csv};
+use crate::scenario::counterexamples::{COUNTEREXAMPLES, REPLAYED, replayed_csv, starts_csv};
 use crate::scenario::falsify::{Against, FalsifyRecord, FalsifySettings, Target, falsify};
+use crate::system::Axis;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-falsify";
@@ -58,6 +59,8 @@ pub(super) enum Within {
     Ball,
     /// The whole box
     Box,
+    /// The perturbed starts whose nominal one is certified
+    Certified,
 }
 
 /// What `falsify --json` prints, and [`RECORD`] holds.
@@ -86,6 +89,7 @@ pub(super) fn run(global: &Global, asked: &FalsifyArguments) -> Result<Outcome> 
             config.seed = global.changes.seed.unwrap_or(config.seed);
             let target = match within {
                 Within::Ball => Target::ball(&stored.record, plant.model.states.len()),
+                Within::Certified => Target::certified(&stored.record, &config.spec()?),
                 Within::Box => Target::whole_box(&stored.record),
             };
             let target = target.map_err(|e| Error::file(folder, e))?;
@@ -98,7 +102,7 @@ pub(super) fn run(global: &Global, asked: &FalsifyArguments) -> Result<Outcome> 
             let plant = config.plant(&policy)?;
             let settings = config.settings(&plant.model.states)?;
             let region = Region::new_box(settings.low, settings.high)?;
-            let target = Target { region, words: "the box".to_owned(), claim: None };
+            let target = Target { region, words: "the box".to_owned(), pairs: None, claim: None };
             Work { global, asked, config: &config, policy: &policy, target }.run(&plant, path)
         }
         (None, None) => {
@@ -127,6 +131,7 @@ impl Work<'_> {
         }
         let settings = FalsifySettings {
             region: target.region.clone(),
+            pairs: target.pairs.clone(),
             spec: config.spec()?,
             budget: asked.budget,
             seed: config.seed,
@@ -187,6 +192,11 @@ fn stage(
     if !record.starts.is_empty() {
         let table = starts_csv(&model.states, &model.parameters, &record.starts);
         staged.add(COUNTEREXAMPLES, table.as_bytes())?;
+    }
+    if !record.pairs.is_empty() {
+        let axes: [&[Axis]; 2] = [&model.states, &model.controls];
+        let table = replayed_csv(axes, &model.parameters, &record.pairs);
+        staged.add(REPLAYED, table.as_bytes())?;
     }
     staged.add(RECORD, answer.as_bytes())
 }

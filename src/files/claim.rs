@@ -60,15 +60,15 @@ pub(crate) const NETWORK_COPIES: [&str; 8] = [
 ];
 
 /// Files of a certificate.
-const CERTIFICATE: [&str; 13] = {
+const CERTIFICATE: [&str; 12] = {
     let [a, b, c, d, e, f, g, h] = NETWORK_COPIES;
     let [record, policy] = ["certificate.json", "policy.safetensors"];
-    let replayed = "counterexamples_replayed.csv";
-    [record, policy, "deviation.csv", "slice.npy", replayed, a, b, c, d, e, f, g, h]
+    [record, policy, "deviation.csv", "slice.npy", a, b, c, d, e, f, g, h]
 };
 
 /// Files that several kinds have: the page, starts that fail, and at last the manifest.
-const SHARED: [&str; 3] = ["report.html", "counterexamples.csv", MANIFEST];
+const SHARED: [&str; 4] =
+    ["report.html", "counterexamples.csv", "counterexamples_replayed.csv", MANIFEST];
 
 /// A folder that says which work it holds.
 ///

@@ -5,7 +5,7 @@ mod pairs;
 mod worst;
 
 pub use csv::{COUNTEREXAMPLES, REPLAYED, is_replayed, read_replayed, replayed_csv, starts_csv};
-pub(super) use pairs::failing_pairs;
 pub use pairs::{FailingPair, Replayed};
+pub(super) use pairs::{failing_pair, failing_pairs};
 pub use worst::FailingStart;
 pub(super) use worst::Worst;

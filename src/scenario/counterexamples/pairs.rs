@@ -98,18 +98,28 @@ fn task<'a>(settings: &Settings, tightening: &'a Tightening) -> Result<Deviation
 
 /// Pair `index` of the task, with the controls that drive its perturbed rollout in f64.
 fn pair(plant: &Plant, task: &DeviationTask<'_>, index: u64) -> FailingPair {
-    let [nominal, perturbed] = task.pairs.pair(index);
-    let driver = match task.control {
+    failing_pair(plant, task.pairs.pair(index), &task.spec, task.control, index)
+}
+
+/// A pair of a nominal and a perturbed start, with the controls that drive the latter in f64.
+pub(in crate::scenario) fn failing_pair(
+    plant: &Plant,
+    [nominal, perturbed]: [Vec<f32>; 2],
+    spec: &RolloutSpec,
+    control: PairControl,
+    index: u64,
+) -> FailingPair {
+    let driver = match control {
         PairControl::Replay => &nominal,
         PairControl::ClosedLoop => &perturbed,
     };
-    let states = replay::states::<f64>(plant, driver, task.spec.horizon);
+    let states = replay::states::<f64>(plant, driver, spec.horizon);
     let control = |(step, x): (u32, &Vec<f64>)| {
         plant.control(x, step).into_iter().map(|control| control as f32).collect()
     };
-    let controls = (0..task.spec.horizon).zip(&states).map(control).collect();
+    let controls = (0..spec.horizon).zip(&states).map(control).collect();
     let perturbed = Replayed { x: perturbed, controls };
     // Rounding to f32 keeps the sign.
-    let measure = perturbed.measure(&plant.model, &task.spec) as f32;
+    let measure = perturbed.measure(&plant.model, spec) as f32;
     FailingPair { index, nominal, perturbed, measure }
 }

@@ -2,11 +2,13 @@
 
 use serde::Serialize;
 
+use super::pairs::PairSettings;
 use super::record::FalsifyRecord;
-use crate::rollout::Region;
+use crate::rollout::{Region, RolloutSpec};
 use crate::scenario::bound::lower_bound;
 use crate::scenario::record::{Claim, Record};
 use crate::scenario::tier::verified_ball;
+use crate::scenario::tightened::tightening;
 
 /// Chance that uniform draws call a true claim false.
 const FALSE_ALARM: f64 = 1e-6;
@@ -18,6 +20,8 @@ pub struct Target {
     pub region: Region,
     /// The same in words.
     pub words: String,
+    /// Pairs that are drawn with them, where the claim is about pairs.
+    pub pairs: Option<PairSettings>,
     /// What is claimed about a start drawn from there, if anything.
     pub claim: Option<Claim>,
 }
@@ -32,6 +36,7 @@ impl Target {
             Some(ball) => Ok(Self {
                 words: format!("the verified ball of radius {}", ball.radius),
                 region: Region::Ball(ball),
+                pairs: None,
                 claim: record.growth.claim.clone(),
             }),
             None => {
@@ -39,6 +44,24 @@ impl Target {
                     .to_owned())
             }
         }
+    }
+
+    /// The pairs of `record` whose nominal start is certified.
+    ///
+    /// # Errors
+    /// As [`Target::whole_box`].
+    pub fn certified(record: &Record, spec: &RolloutSpec) -> Result<Self, String> {
+        let pairs = PairSettings {
+            radius: record.deviation.radius as f32,
+            control: record.deviation.control,
+            tightening: tightening(&record.deviation.bound, &record.constants, spec),
+        };
+        Ok(Self {
+            words: "the perturbed starts of the certified set".to_owned(),
+            pairs: Some(pairs),
+            claim: Some(record.global.claim.clone()),
+            ..Self::whole_box(record)?
+        })
     }
 
     /// The box of `record`.
@@ -53,6 +76,7 @@ impl Target {
         Ok(Self {
             region: region.map_err(|error| error.to_string())?,
             words: "the box".to_owned(),
+            pairs: None,
             claim: record.whole_box.as_ref().map(|found| found.claim.clone()),
         })
     }

@@ -1,9 +1,10 @@
 //! Where a failing start is looked for, in coordinates from -1 to 1.
 
-use super::trials::Candidate;
+use super::pairs::halves;
+use super::settings::FalsifySettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::rollout::{Ball, Region};
+use crate::rollout::{Ball, Pairs, Region, Starts, Stream};
 
 /// What a start that rounding put outside of a ball is drawn in by, first; twice that next.
 const DRAWN_IN: f64 = 1e-7;
@@ -13,14 +14,17 @@ pub(super) struct Domain {
     region: Region,
     /// Indices of the states that vary.
     varying: Vec<usize>,
+    /// Radius of the perturbations of pairs, which have a coordinate for each state besides.
+    radius: Option<f32>,
 }
 
 impl Domain {
-    /// The coordinates of `region`, whose states are those of `model`.
+    /// The coordinates of the starts or pairs of a search for a plant of `model`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if it has another number of states, or none of them varies.
-    pub(super) fn new(region: &Region, model: &Model) -> Result<Self> {
+    pub(super) fn new(settings: &FalsifySettings, model: &Model) -> Result<Self> {
+        let region = &settings.region;
         if region.size() != model.states.len() {
             let (has, states) = (region.size(), model.states.len());
             let problem = format!("{has} coordinates; the model has {states} states");
@@ -31,16 +35,39 @@ impl Domain {
         if varying.is_empty() {
             return Err(Error::invalid("region", "no coordinate varies; one at least has to"));
         }
-        Ok(Self { region: region.clone(), varying })
+        let radius = settings.pairs.as_ref().map(|pairs| pairs.radius);
+        Ok(Self { region: region.clone(), varying, radius })
     }
 
     /// How many coordinates there are.
     pub(super) fn dimension(&self) -> usize {
-        self.varying.len()
+        let perturbed = self.radius.map_or(0, |_| self.region.size());
+        self.varying.len() + perturbed
     }
 
-    /// The start at `u`; what lies outside is moved to the rim.
+    /// The start number `index` of the uniform distribution, or the pair of it.
+    pub(super) fn point(&self, [stream, perturbation]: [Stream; 2], index: u64) -> Vec<f32> {
+        let Some(radius) = self.radius else { return self.region.point(stream, index) };
+        let nominal = Starts::Drawn { region: self.region.clone(), stream };
+        let [nominal, perturbed] = Pairs { nominal, radius, stream: perturbation }.pair(index);
+        [perturbed, nominal].concat()
+    }
+
+    /// The start or pair at `u`; what lies outside is moved to the rim.
     pub(super) fn start(&self, u: &[f64]) -> Vec<f32> {
+        let Some(radius) = self.radius else { return self.plain(u) };
+        let (at, by) = u.split_at(self.varying.len());
+        let nominal = self.plain(at);
+        let length = by.iter().map(|u| u * u).sum::<f64>().sqrt();
+        // Rounding to f32 leaves it in the ball.
+        let scale = (1.0 - DRAWN_IN) * f64::from(radius) / length.max(1.0);
+        let moved = |(x, by): (&f32, &f64)| (f64::from(*x) + scale * by) as f32;
+        let perturbed: Vec<f32> = nominal.iter().zip(by).map(moved).collect();
+        [perturbed, nominal].concat()
+    }
+
+    /// The start of the region at `u`.
+    fn plain(&self, u: &[f64]) -> Vec<f32> {
         match &self.region {
             Region::Box { low, high } => {
                 let mut x = low.clone();
@@ -73,8 +100,17 @@ impl Domain {
         }
     }
 
-    /// The coordinates of the start `x`.
+    /// The coordinates of the start or pair `x`.
     pub(super) fn coordinates(&self, x: &[f32]) -> Vec<f64> {
+        let Some(radius) = self.radius else { return self.of_plain(x) };
+        let [perturbed, nominal] = halves(x);
+        let by = |(p, n): (&f32, &f32)| (f64::from(*p) - f64::from(*n)) / f64::from(radius);
+        let perturbation = perturbed.iter().zip(nominal).map(by);
+        self.of_plain(nominal).into_iter().chain(perturbation).collect()
+    }
+
+    /// The coordinates of a start of the region.
+    fn of_plain(&self, x: &[f32]) -> Vec<f64> {
         let at = |&i: &usize| match &self.region {
             Region::Box { low, high } => {
                 let [middle, half] = middle_and_half(low[i], high[i]);
@@ -87,11 +123,15 @@ impl Domain {
         self.varying.iter().map(at).collect()
     }
 
-    /// The coordinates of those of `candidates` that lie `apart` from all before them, in the root mean
-    /// square over the coordinates.
-    pub(super) fn apart(&self, candidates: &[Candidate], apart: f64) -> Vec<Vec<f64>> {
+    /// Those of the places `all` that lie `apart` from the ones kept before them, in the root mean square
+    /// over the coordinates.
+    pub(super) fn apart<'a>(
+        &self,
+        all: impl IntoIterator<Item = &'a Vec<f64>>,
+        apart: f64,
+    ) -> Vec<Vec<f64>> {
         let mut kept: Vec<Vec<f64>> = Vec::new();
-        for Candidate { u, .. } in candidates {
+        for u in all {
             let far = |other: &Vec<f64>| {
                 let square: f64 = other.iter().zip(u).map(|(a, b)| (a - b).powi(2)).sum();
                 square > self.dimension() as f64 * apart * apart

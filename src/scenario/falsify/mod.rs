@@ -6,12 +6,14 @@
 mod against;
 mod descent;
 mod domain;
+mod pairs;
 mod record;
 mod rounds;
 mod settings;
 mod trials;
 
 pub use against::{Against, Target};
+pub use pairs::PairSettings;
 pub use record::{BestStart, FalsifyRecord};
 pub use settings::FalsifySettings;
 
@@ -49,12 +51,12 @@ pub fn falsify(
 ) -> Result<FalsifyRecord> {
     settings.check()?;
     let context = Context { program, watch };
-    let domain = Domain::new(&settings.region, &program.plant().model)?;
+    let domain = Domain::new(settings, &program.plant().model)?;
     watch.begin("search for a failure", settings.budget);
     let trials = Trials::new(context, settings, &domain);
     let mut search = Search { settings, domain: &domain, trials, streams: 0, restarts: 0 };
     let uniform = search.explore((settings.budget / UNIFORM_SHARE).clamp(1, MOST_UNIFORM))?;
-    let explored = search.trials.rollouts();
+    let explored = search.trials.counted();
     let explored_failures = search.trials.failures();
     search.restart_until_over(uniform)?;
     Ok(search.trials.record(explored, explored_failures, search.restarts))
@@ -80,8 +82,8 @@ impl Search<'_> {
 
     /// The best of so many uniform draws, the best first.
     fn explore(&mut self, draws: u64) -> Result<Vec<Candidate>> {
-        let (stream, region) = (self.stream(), &self.settings.region);
-        let starts = (0..draws).map(|index| region.point(stream, index)).collect();
+        let streams = [self.stream(), self.stream()];
+        let starts = (0..draws).map(|index| self.domain.point(streams, index)).collect();
         let mut tried = self.trials.run_starts(starts)?;
         tried.truncate(POOL);
         Ok(tried)
@@ -90,7 +92,7 @@ impl Search<'_> {
     /// Follows one cloud after the other until a failure is found or the budget is spent: that of the
     /// best uniform draws first, then one around each of them, then around fresh ones.
     fn restart_until_over(&mut self, pool: Vec<Candidate>) -> Result<()> {
-        let mut centres = self.domain.apart(&pool, CLOUD).into_iter();
+        let mut centres = self.domain.apart(pool.iter().map(|tried| &tried.u), CLOUD).into_iter();
         let mut cloud = pool;
         while !self.trials.is_over() {
             self.restarts += 1;

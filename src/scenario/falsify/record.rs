@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::scenario::counterexamples::FailingStart;
+use crate::scenario::counterexamples::{FailingPair, FailingStart};
 
 /// What a search for failures tried, and found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -20,7 +20,7 @@ pub struct FalsifyRecord {
     /// Discount per step.
     #[serde(with = "crate::files::number")]
     pub gamma: f32,
-    /// Uniform draws of the region at the beginning.
+    /// Uniform draws of the region at the beginning; of pairs those whose nominal start is certified.
     pub uniform: u64,
     /// Those of them that fail.
     pub uniform_failures: u64,
@@ -36,6 +36,9 @@ pub struct FalsifyRecord {
     pub unconfirmed: u64,
     /// The worst of those that fail.
     pub starts: Vec<FailingStart>,
+    /// The worst of the pairs that fail, where pairs were looked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<FailingPair>,
 }
 
 /// The start with the smallest measure that a search saw.

@@ -1,5 +1,6 @@
 //! What a search for failures is given.
 
+use super::pairs::PairSettings;
 use crate::error::{Error, Result};
 use crate::rollout::{Region, RolloutSpec};
 
@@ -9,8 +10,10 @@ const MOST_BUDGET: u64 = 1_000_000_000;
 /// What a search is given.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FalsifySettings {
-    /// Where starts may lie.
+    /// Where starts may lie; of pairs the nominal ones.
     pub region: Region,
+    /// Pairs of a certificate instead of starts: a failure is a perturbed start beside a certified one.
+    pub pairs: Option<PairSettings>,
     /// Horizon and discount.
     pub spec: RolloutSpec,
     /// Rollouts, at most.
