@@ -27,7 +27,7 @@ fn box_start(index: vec2<u32>) -> array<f32, NX> {
         if i % BLOCK_WORDS == 0u {
             words = philox(vec4<u32>(index, i / BLOCK_WORDS, params.stream), key);
         }
-        x[i] = region[i].x + product(unit(words[i % BLOCK_WORDS]), region[i].y);
+        x[i] = sum(region[i].x, product(unit(words[i % BLOCK_WORDS]), region[i].y));
     }
     return x;
 }
@@ -54,7 +54,7 @@ fn ball_offset(
             if everywhere || region[i].z > 0.0 {
                 let z = both[i - at];
                 normal[i] = z;
-                square += product(z, z);
+                square = sum(square, product(z, z));
             }
         }
     }
@@ -62,8 +62,8 @@ fn ball_offset(
     if last % BLOCK_WORDS == 0u {
         words = philox(vec4<u32>(index, last / BLOCK_WORDS, stream), key);
     }
-    square -= product(2.0, ln_unit(1.0 - unit(words[last % BLOCK_WORDS])));
-    let scale = 1.0 / sqrt(square);
+    square = sum(square, product(-2.0, ln_unit(1.0 - unit(words[last % BLOCK_WORDS]))));
+    let scale = quotient(1.0, root(square));
     for (var i = 0u; i < NX; i += 1u) {
         normal[i] = product(normal[i], scale);
     }
@@ -74,7 +74,7 @@ fn ball_start(index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.key_low, params.key_high);
     var x = ball_offset(key, params.stream, index, false);
     for (var i = 0u; i < NX; i += 1u) {
-        x[i] = region[i].x + product(region[i].y, x[i]);
+        x[i] = sum(region[i].x, product(region[i].y, x[i]));
     }
     return x;
 }
@@ -84,7 +84,7 @@ fn perturb(nominal: array<f32, NX>, index: vec2<u32>) -> array<f32, NX> {
     var x = ball_offset(key, params.pair_stream, index, true);
     var center = nominal;
     for (var i = 0u; i < NX; i += 1u) {
-        x[i] = center[i] + product(params.pair_radius, x[i]);
+        x[i] = sum(center[i], product(params.pair_radius, x[i]));
     }
     return x;
 }

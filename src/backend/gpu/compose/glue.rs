@@ -2,7 +2,7 @@
 
 use super::kernels::WORKGROUP;
 use crate::formula::record;
-use crate::formula::wgsl::{Product, function_with};
+use crate::formula::wgsl::{Arithmetic, function_with};
 use crate::rollout::{HUGE, NON_FINITE, normal_pair};
 
 pub(super) const PARAMS: &str = include_str!("../../../../shaders/params.wgsl");
@@ -113,9 +113,9 @@ pub(super) fn call(
     format!("fn {name}({}) -> {kind} {{\n    return {value};\n}}\n", declared.join(", "))
 }
 
-/// `normal_pair`, its products kept apart from sums.
-pub(super) fn recorded_pair() -> String {
+/// `normal_pair`, with arithmetic as `arithmetic` says.
+pub(super) fn recorded_pair(arithmetic: Arithmetic) -> String {
     let pair = record(2, |u| normal_pair(u[0], u[1]).to_vec());
     let arguments = [("magnitude", 1), ("turn", 1)];
-    function_with("normal_pair", &arguments, &pair, Product::Call("product"))
+    function_with("normal_pair", &arguments, &pair, arithmetic)
 }

@@ -6,7 +6,7 @@ use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
 use super::physics_glue::{Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Role};
-use crate::formula::wgsl::{CHOICES, careful_function, function};
+use crate::formula::wgsl::{Arithmetic, CHOICES, careful_function, function};
 use crate::formula::{Expr, Graph, record};
 use crate::model::StageCost;
 use crate::real::Real;
@@ -180,7 +180,8 @@ fn noise_text(spec: &MppiSpec, contexts: usize) -> String {
     [
         format!("const ANTITHETIC: bool = {antithetic};\n"),
         RNG.to_owned(),
-        recorded_pair(),
+        // A plan weighs the numbers that it drew: they need not have the bits of the host.
+        recorded_pair(Arithmetic::Apart),
         NOISE.to_owned(),
         draw(controls),
         recorded,

@@ -117,7 +117,9 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Role::Observe => ("observed", vec![STATE], "array<f32, SEEN>", true),
         Role::Act => ("acted", vec![STATE, "said: array<f32, SAID>"], "array<f32, NU>", true),
         Role::Stage if outline.contexts == 0 => ("staged", vec![STATE, CONTROL], "f32", false),
-        Role::Stage => ("staged", vec![STATE, CONTROL, "context: array<f32, CONTEXTS>"], "f32", false),
+        Role::Stage => {
+            ("staged", vec![STATE, CONTROL, "context: array<f32, CONTEXTS>"], "f32", false)
+        }
         Role::Cell => ("cell_at", vec![STATE], "f32", false),
     };
     let said = outline.driving.as_ref().map_or(0, |driving| driving.outputs);

@@ -8,7 +8,7 @@ use super::layers::{Fused, activation_glue, fused_text, layer_text};
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
-use crate::formula::wgsl::{CHOICES, Product, function, function_with};
+use crate::formula::wgsl::{Arithmetic, CHOICES, function, function_with};
 use crate::formula::{Expr, record};
 use crate::model::{Controller, Law, Model};
 use crate::policy::Mlp;
@@ -16,6 +16,7 @@ use crate::real::Real;
 
 const FOLD: &str = include_str!("../../../../shaders/fold.wgsl");
 const JUDGE: &str = include_str!("../../../../shaders/judge.wgsl");
+const EXACT: &str = include_str!("../../../../shaders/exact.wgsl");
 const SAMPLE: &str = include_str!("../../../../shaders/sample.wgsl");
 const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
@@ -168,7 +169,7 @@ impl PlantText {
     /// What draws starts and pairs.
     fn draw(&self) -> String {
         let glue = [state_glue(self.outline.states), listed_glue(self.outline.states)].concat();
-        [glue, RNG.to_owned(), recorded_normals()].join("\n")
+        [glue, RNG.to_owned(), EXACT.to_owned(), recorded_normals()].join("\n")
     }
 
     /// What judges and drives a rollout.
@@ -341,11 +342,11 @@ fn check_reads(physics: &Physics) -> Result<()> {
     }
 }
 
-/// `normal_pair` and `ln_unit`, their products kept apart from sums.
+/// `normal_pair` and `ln_unit`, with the bits of the host.
 fn recorded_normals() -> String {
     let logarithm = record(1, |u| vec![u[0].ln_unit()]);
-    let apart = Product::Call("product");
-    [function_with("ln_unit", &[("u", 1)], &logarithm, apart), recorded_pair()].join("\n")
+    let exact = Arithmetic::Exact;
+    [function_with("ln_unit", &[("u", 1)], &logarithm, exact), recorded_pair(exact)].join("\n")
 }
 
 /// `distance_of`, the Euclidean distance of two states.
