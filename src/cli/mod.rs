@@ -54,7 +54,9 @@ fn told(error: &Error) -> String {
         Error::DeviceFailed { .. } => {
             "; `--fallback` goes on on the CPU where an adapter fails, `--backend cpu` starts there"
         }
-        Error::Interrupted => " (what `race`, `sweep` and `train` have done is kept)",
+        Error::Interrupted => {
+            " (what `race`, `sweep`, `train` and `bench --out` have done is kept)"
+        }
         _ => "",
     };
     format!("{error}{remedy}")
