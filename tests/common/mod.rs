@@ -2,6 +2,9 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+#[path = "../pessimist/mod.rs"]
+pub(crate) mod pessimist;
+
 use nalgebra::DMatrix;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
@@ -26,11 +29,11 @@ pub(crate) fn cpu(threads: usize) -> Backend {
     Backend::Cpu(Cpu::new(Some(threads)).expect("threads start"))
 }
 
-/// An adapter, software included; where none opens this is said, and is a failure if
+/// An adapter, software included, as pessimistic as `REACHCAST_PESSIMIST` asks for; where none opens this is said, and is a failure if
 /// `REACHCAST_REQUIRE_GPU` is 1.
 pub(crate) fn adapter() -> Option<Gpu> {
     match Gpu::open(&Choice::Any) {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => Some(pessimist::as_asked(gpu)),
         Err(error) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
             panic!("REACHCAST_REQUIRE_GPU is 1: {error}")
         }

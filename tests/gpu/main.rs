@@ -42,10 +42,10 @@ use reachcast::rollout::{
 };
 use reachcast::system::System;
 
-/// An adapter of any kind; `None`, said aloud, where there is none.
+/// An adapter of any kind, as pessimistic as `REACHCAST_PESSIMIST` asks for; `None`, said aloud, where there is none.
 fn gpu() -> Option<Gpu> {
     match Gpu::open(&Choice::Any) {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => Some(common::pessimist::as_asked(gpu)),
         Err(e) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
             panic!("REACHCAST_REQUIRE_GPU is 1: {e}")
         }
