@@ -283,7 +283,7 @@ fn machine(host: &Cpu) -> MachineRecord {
     }
 }
 
-#[cfg(all(test, feature = "gpu"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
