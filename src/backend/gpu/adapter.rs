@@ -121,6 +121,12 @@ impl Gpu {
         self.opened().device.counters.so_far()
     }
 
+    /// Time that calls spent in the driver so far, submitting and waiting.
+    #[doc(hidden)]
+    pub fn driver_time(&self) -> Duration {
+        self.opened().device.counters.driver_time()
+    }
+
     /// Where calls run now.
     pub(super) fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)

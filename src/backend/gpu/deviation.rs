@@ -8,10 +8,13 @@ use super::compose::{Kernel, Slot};
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
 use super::params::Params;
-use super::workspace::{Buffers, Kernels, MEASURES_AT, Workspace};
+use super::workspace::{Buffers, Kernels, MEASURES_AT, Sent, Workspace};
 use crate::backend::PairSink;
 use crate::error::Result;
 use crate::rollout::{DeviationTask, Farthest, PairControl, PairMeasure};
+
+/// Bytes of the measures of a pair.
+const PAIR_BYTES: u64 = 8;
 
 /// See [`crate::backend::Program::deviation`]; the farthest pairs are merged into `farthest` chunk by
 /// chunk, as the measures go to the sink.
@@ -31,20 +34,16 @@ pub(super) fn deviation(
     let request = Request { work: Work::Pairs, starts, spec, tightening, count };
     let mut job = Job::new(opened, attempt, subject, request)?;
     let params = pair_params(task, job.chunking.stride);
+    let mut delivery = Delivery { farthest, sink };
     let mut first = task.range.start;
     while first < task.range.end {
         let columns = (task.range.end - first).min(u64::from(job.chunking.stride)) as u32;
         job.space.inputs.set_starts(starts, first, columns);
-        let Rolled { measures, found } = roll(&mut job, params.at(first, columns))?;
-        for (farthest, [bits, column]) in farthest.iter_mut().zip(found) {
-            *farthest = farthest.merge(Farthest {
-                distance: f32::from_bits(bits),
-                pair: first + u64::from(column),
-            });
-        }
-        sink(first, &measures)?;
+        roll(&mut job, params.at(first, columns), first, &mut delivery)?;
         first += u64::from(columns);
     }
+    let last = job.space.results.last(&job.flight, rolled)?;
+    last.map_or(Ok(()), |rolled| delivery.take(rolled))?;
     job.finish();
     Ok(())
 }
@@ -66,17 +65,49 @@ fn pair_params(task: &DeviationTask<'_>, stride: u32) -> Params {
 
 /// What a chunk of pairs comes to.
 struct Rolled {
+    first: u64,
     measures: Vec<PairMeasure>,
     /// Bits of the largest distance of each step, and the column that attains it.
     found: Vec<[u32; 2]>,
 }
 
-/// Rolls out the pairs of `params`.
-fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
-    let measures = 8 * u64::from(params.columns);
+/// What is read back: the measures of the pairs, then the largest distances.
+fn rolled(sent: Sent, bytes: &[u8]) -> Rolled {
+    let measures = PAIR_BYTES as usize * sent.columns as usize;
+    let (measured, found) = bytes[MEASURES_AT as usize..].split_at(measures);
+    Rolled {
+        first: sent.first,
+        measures: bytemuck::pod_collect_to_vec(measured),
+        found: bytemuck::pod_collect_to_vec(found),
+    }
+}
+
+/// Results in order of index.
+struct Delivery<'a> {
+    farthest: &'a mut [Farthest],
+    sink: PairSink<'a>,
+}
+
+impl Delivery<'_> {
+    /// Merges the farthest pairs of a chunk, and gives its measures to the sink.
+    fn take(&mut self, Rolled { first, measures, found }: Rolled) -> Result<()> {
+        for (farthest, [bits, column]) in self.farthest.iter_mut().zip(found) {
+            *farthest = farthest.merge(Farthest {
+                distance: f32::from_bits(bits),
+                pair: first + u64::from(column),
+            });
+        }
+        (self.sink)(first, &measures)
+    }
+}
+
+/// Sends the pairs of `params` off, the first of which has the index `first`; takes over what the chunk
+/// before came to.
+fn roll(job: &mut Job<'_>, params: Params, first: u64, delivery: &mut Delivery<'_>) -> Result<()> {
+    let measures = PAIR_BYTES * u64::from(params.columns);
     let farthest = 8 * (u64::from(params.horizon) + 1);
     let Job { flight, chunking, space, .. } = job;
-    let Workspace { inputs, readback, buffers, kernels, .. } = space;
+    let Workspace { inputs, results, buffers, kernels, .. } = space;
     let kernels = &kernels[0];
     let mut batch = Batch::default();
     batch.push_columns(Kernel::Sample, &kernels.sample, &params);
@@ -86,23 +117,24 @@ fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
         segment(&mut batch, kernels, buffers, *chunking, params, step, count);
         step += count;
         inputs.write(&flight.device, &batch);
+        let ended = step > params.horizon;
         let copy = |encoder: &mut _| {
-            if step > params.horizon {
+            if ended {
                 let [first, second] = [MEASURES_AT, MEASURES_AT + measures];
-                readback.copy(encoder, buffers.of(Slot::Measures), first, measures);
-                readback.copy(encoder, buffers.of(Slot::Farthest), second, farthest);
+                results.free().copy(encoder, buffers.of(Slot::Measures), first, measures);
+                results.free().copy(encoder, buffers.of(Slot::Farthest), second, farthest);
             }
         };
-        flight.submit(&batch, |_| {}, copy)?;
+        let ticket = flight.submit(&batch, |_| {}, copy)?;
         batch = Batch::default();
-    }
-    readback.read(flight, MEASURES_AT + measures + farthest, |bytes| {
-        let (measured, found) = bytes[MEASURES_AT as usize..].split_at(measures as usize);
-        Rolled {
-            measures: bytemuck::pod_collect_to_vec(measured),
-            found: bytemuck::pod_collect_to_vec(found),
+        if ended {
+            let sent = Sent { first, columns: params.columns, ended };
+            let bytes = MEASURES_AT + measures + farthest;
+            let earlier = results.send(flight, (ticket, bytes), sent, rolled)?;
+            earlier.map_or(Ok(()), |rolled| delivery.take(rolled))?;
         }
-    })
+    }
+    Ok(())
 }
 
 /// Adds the dispatches of `count` steps from `first` on, and the reduction of their distances.

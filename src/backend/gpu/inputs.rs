@@ -1,6 +1,6 @@
 //! What the host sends with a submission of rollouts.
 
-use super::batch::Batch;
+use super::batch::{Batch, Counted};
 use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
@@ -21,6 +21,8 @@ pub(super) struct InputSizes {
     pub(super) region: usize,
     /// Dispatches of a submission.
     pub(super) dispatches: usize,
+    /// Dispatches that the device narrows at a time.
+    pub(super) narrowed: usize,
 }
 
 /// Parts of the upload: the parameters of the model, the schedule, the region or listed starts.
@@ -35,18 +37,24 @@ impl Inputs {
     /// Room for `sizes`.
     pub(super) fn new(device: &Device, pool: &Pool, sizes: InputSizes) -> Self {
         let parts = [sizes.values, sizes.steps, sizes.region].map(|vectors| VECTOR_BYTES * vectors);
-        Self(Upload::new(device, pool, &parts, sizes.dispatches))
+        Self(Upload::new(device, pool, &parts, sizes.dispatches, sizes.narrowed))
     }
 
     /// What a kernel sees of it in `slot`; `None` for any other.
     pub(super) fn binding(&self, slot: Slot) -> Option<wgpu::BufferBinding<'_>> {
         match slot {
             Slot::Params => Some(self.0.params()),
+            Slot::Blocks => Some(self.0.narrowed()),
             Slot::Values => Some(self.0.part(VALUES)),
             Slot::Schedule => Some(self.0.part(SCHEDULE)),
             Slot::Region => Some(self.0.part(REGION)),
             _ => None,
         }
+    }
+
+    /// Where dispatches find the number of their workgroups that the device counts.
+    pub(super) fn counted(&self) -> Counted {
+        self.0.counted()
     }
 
     /// Bytes of it.

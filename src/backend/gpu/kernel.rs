@@ -162,11 +162,15 @@ impl Bound {
         self.pipeline.kernel.entry()
     }
 
-    /// Runs `groups` workgroups with the parameters at `offset`.
-    pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32, groups: [u32; 2]) {
+    /// Columns of a workgroup.
+    pub(super) fn columns(&self) -> u32 {
+        self.pipeline.kernel.workgroup()
+    }
+
+    /// Chooses the kernel, with the parameters at `offset`.
+    pub(super) fn choose(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32) {
         pass.set_pipeline(&self.pipeline.pipeline);
         pass.set_bind_group(0, &self.group, &[offset]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 }
 
@@ -174,6 +178,7 @@ impl Bound {
 fn layout_entry(&(slot, access): &(Slot, Access)) -> wgpu::BindGroupLayoutEntry {
     let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
     let block = access == Access::Uniform;
+    let written = access == Access::Blocks;
     wgpu::BindGroupLayoutEntry {
         binding: slot as u32,
         visibility: wgpu::ShaderStages::COMPUTE,
@@ -181,9 +186,9 @@ fn layout_entry(&(slot, access): &(Slot, Access)) -> wgpu::BindGroupLayoutEntry 
             ty: match access {
                 Access::Uniform | Access::Constant => wgpu::BufferBindingType::Uniform,
                 Access::Read => storage(true),
-                Access::ReadWrite => storage(false),
+                Access::ReadWrite | Access::Blocks => storage(false),
             },
-            has_dynamic_offset: block,
+            has_dynamic_offset: block || written,
             min_binding_size: block.then_some(Params::SIZE),
         },
         count: None,

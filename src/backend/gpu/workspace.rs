@@ -12,7 +12,7 @@ use super::inputs::{InputSizes, Inputs};
 use super::kernel::Bound;
 use super::network::Layers;
 use super::params::Params;
-use super::readback::Readback;
+use super::readback::Turns;
 use crate::error::Result;
 use crate::policy::Mlp;
 
@@ -32,11 +32,22 @@ pub(super) struct Shape {
 /// Offset of the measures in what is read back, bytes.
 pub(super) const MEASURES_AT: u64 = 8;
 
+/// Results on their way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent {
+    /// Index of their first start or pair.
+    pub(super) first: u64,
+    /// How many starts or pairs.
+    pub(super) columns: u32,
+    /// Whether none of their trajectories goes on.
+    pub(super) ended: bool,
+}
+
 /// Buffers and kernels for one call at a time.
 pub(super) struct Workspace {
     pub(super) shape: Shape,
     pub(super) inputs: Inputs,
-    pub(super) readback: Readback,
+    pub(super) results: Turns<Sent>,
     pub(super) buffers: Buffers,
     /// Bound to the first set of columns; for signs also to the second one.
     pub(super) kernels: Vec<Kernels>,
@@ -58,12 +69,15 @@ impl Workspace {
         let layers = network.map_or(0, |mlp| mlp.layers().len());
         let chain = compiled.text.chain().map(ChainLoad::new);
         let chained = chain.map_or(0, |load| load.dispatches);
+        // Each step with what its networks need; compaction or reduction.
+        let segment = chunking.segment as usize * (layers + chained + 2) + 1;
         let sizes = InputSizes {
             values: compiled.text.parameters().div_ceil(4),
             steps: shape.horizon as usize + 1,
             region: if shape.listed { quads * chunking.stride as usize } else { 4 * quads },
-            // The draw, compaction or reduction, and each step with what its networks need.
-            dispatches: 2 + chunking.segment as usize * (layers + chained + 2),
+            // The draw, and segments.
+            dispatches: 1 + chunking.rounds_of(shape.horizon) as usize * segment,
+            narrowed: if shape.work == Work::Sign { segment } else { 0 },
         };
         let inputs = Inputs::new(device, pool, sizes);
         let buffers = Buffers::new(flight, compiled, network, shape);
@@ -73,8 +87,8 @@ impl Workspace {
             (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(chunking.stride);
         let farthest = 8 * (u64::from(shape.horizon) + 1);
-        let readback = Readback::new(device, pool, MEASURES_AT + results + farthest);
-        Ok(Self { shape, inputs, readback, buffers, kernels })
+        let results = Turns::new(device, pool, MEASURES_AT + results + farthest);
+        Ok(Self { shape, inputs, results, buffers, kernels })
     }
 
     /// Bytes of its buffers, without those of the results.
@@ -122,7 +136,7 @@ impl Buffers {
 
     /// The buffer of `slot` for the set of columns number `set`: the kernels on the second one
     /// compact into the first.
-    fn of_set(&self, slot: Slot, set: usize) -> &Buffer {
+    pub(super) fn of_set(&self, slot: Slot, set: usize) -> &Buffer {
         let other = match slot {
             Slot::State => Slot::KeptState,
             Slot::Folds => Slot::KeptFolds,
@@ -130,6 +144,8 @@ impl Buffers {
             Slot::KeptState => Slot::State,
             Slot::KeptFolds => Slot::Folds,
             Slot::KeptOrigin => Slot::Origin,
+            Slot::Survivors => Slot::Left,
+            Slot::Left => Slot::Survivors,
             same => same,
         };
         self.of(if set == 0 { slot } else { other })
@@ -154,6 +170,7 @@ fn sizes(Shape { work, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Sl
             (Slot::KeptFolds, 8 * row),
             (Slot::KeptOrigin, 4 * stride),
             (Slot::Survivors, 4),
+            (Slot::Left, 4),
         ]),
         Work::Pairs => sizes.extend([
             (Slot::Distances, 4 * stride * u64::from(chunking.segment)),
@@ -169,6 +186,8 @@ pub(super) struct Kernels {
     pub(super) rollout: Bound,
     /// Compaction of signs, reduction of pairs, nothing for measures.
     pub(super) after: Option<Bound>,
+    /// Of signs: what sets dispatches on these columns to the trajectories that are left.
+    pub(super) narrow: Option<Bound>,
     observe: Option<Bound>,
     layers: Vec<Bound>,
     chain: Option<BoundChain>,
@@ -218,10 +237,12 @@ impl Binder<'_> {
             Work::Sign => (Kernel::ReachAvoid, Some(Kernel::Compact)),
             Work::Pairs => (Kernel::Deviation, Some(Kernel::Reduce)),
         };
+        let narrow = (work == Work::Sign).then_some(Kernel::Narrow);
         Ok(Kernels {
             sample: self.bind(Kernel::Sample, set, None)?,
             rollout: self.bind(rollout, set, None)?,
             after: after.map(|kernel| self.bind(kernel, set, None)).transpose()?,
+            narrow: narrow.map(|kernel| self.bind(kernel, set, None)).transpose()?,
             observe: self.observe(set)?,
             layers: self.layers(set)?,
             chain: self.chain(set)?,

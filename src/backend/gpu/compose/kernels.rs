@@ -20,6 +20,8 @@ pub enum Kernel {
     ReachAvoid,
     /// Keeps the trajectories whose sign is open.
     Compact,
+    /// Sets dispatches to the trajectories that are left.
+    Narrow,
     /// Rolls pairs side by side.
     Deviation,
     /// Finds the farthest pair of each step.
@@ -51,6 +53,8 @@ pub enum Access {
     Uniform,
     /// Uniform numbers that all dispatches of a call share.
     Constant,
+    /// Blocks of parameters that are written, at a dynamic offset.
+    Blocks,
     /// Storage that is read.
     Read,
     /// Storage that is read and written.
@@ -123,14 +127,19 @@ pub enum Slot {
     Asked = 31,
     /// `said`: vectors of 4 outputs of such networks.
     Said = 32,
+    /// `blocks`: parameters of the dispatches that follow.
+    Blocks = 33,
+    /// `left`: one number, the survivors of the other set of columns.
+    Left = 34,
 }
 
 impl Kernel {
     /// The kernels of measures, pairs and networks.
-    pub const ROLLOUT: [Self; 8] = [
+    pub const ROLLOUT: [Self; 9] = [
         Self::Sample,
         Self::ReachAvoid,
         Self::Compact,
+        Self::Narrow,
         Self::Deviation,
         Self::Reduce,
         Self::HiddenLayer,
@@ -150,6 +159,7 @@ impl Kernel {
             Self::Sample => "sample",
             Self::ReachAvoid => "reach_avoid",
             Self::Compact => "compact",
+            Self::Narrow => "narrow",
             Self::Deviation => "deviation",
             Self::Reduce => "reduce",
             Self::Observe => "observe",
@@ -165,7 +175,7 @@ impl Kernel {
 
     /// Threads of a workgroup.
     pub fn workgroup(self) -> u32 {
-        WORKGROUP
+        if self == Self::Narrow { 1 } else { WORKGROUP }
     }
 
     /// What the kernel binds, for a plant driven by a network or by a formula; for MPPI, where the
@@ -173,6 +183,9 @@ impl Kernel {
     pub fn bindings(self, network: bool) -> Vec<(Slot, Access)> {
         use Access::{Read, ReadWrite, Uniform};
         use Slot as S;
+        if self == Self::Narrow {
+            return vec![(S::Blocks, Access::Blocks), (S::Left, Read), (S::Survivors, ReadWrite)];
+        }
         let mut list = vec![(S::Params, Uniform)];
         let more: &[(Slot, Access)] = match self {
             Self::Sample => &[
@@ -204,6 +217,7 @@ impl Kernel {
                 (S::Measures, ReadWrite),
                 (S::Distances, ReadWrite),
             ],
+            Self::Narrow => &[],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
             Self::Link(_) => &[(S::State, Read), (S::Kept, ReadWrite)],

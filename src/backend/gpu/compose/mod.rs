@@ -6,6 +6,7 @@ mod kernels;
 mod layers;
 mod limits;
 mod mppi;
+mod narrowed;
 mod physics_glue;
 mod plant;
 
@@ -19,5 +20,6 @@ pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::tile_steps;
+pub(super) use narrowed::{BLOCK_WORDS, COLUMNS_WORD, GROUPS_WORD};
 pub use plant::PlantText;
 pub(super) use plant::layer_kernel;

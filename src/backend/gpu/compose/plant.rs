@@ -5,6 +5,7 @@ use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, fin
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
 use super::kernels::{Access, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
+use super::narrowed::block_constants;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
@@ -19,6 +20,7 @@ const JUDGE: &str = include_str!("../../../../shaders/judge.wgsl");
 const SAMPLE: &str = include_str!("../../../../shaders/sample.wgsl");
 const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
+const NARROW: &str = include_str!("../../../../shaders/narrow.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
 const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
@@ -134,6 +136,9 @@ impl PlantText {
     /// # Panics
     /// For any other kernel.
     pub fn compose(&self, kernel: Kernel) -> String {
+        if kernel == Kernel::Narrow {
+            return block_constants() + NARROW;
+        }
         let states = self.outline.states;
         let folds = || [FINITE, FOLD].concat();
         let parts = match kernel {
