@@ -297,6 +297,7 @@ fn declared_names(slot: Slot) -> &'static [&'static str] {
         Slot::Said => &["said"],
         Slot::Blocks => &["blocks"],
         Slot::Left => &["left"],
+        Slot::Counts => &["counts"],
     }
 }
 

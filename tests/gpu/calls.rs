@@ -161,11 +161,34 @@ fn a_call_is_one_write_one_submission_one_wait_and_one_read() {
         assert_eq!(second(backend, measures), expected, "measures of {}", plant.model.name);
         let sent = Traffic { writes: 0, ..read };
         assert_eq!(again(backend, measures), sent, "the same again of {}", plant.model.name);
+    });
+}
+
+/// A list lies on the device for the next call, and is sent again where a number of it has changed.
+#[test]
+fn a_list_is_sent_once() {
+    each(|backend, plant, _| {
+        let program = backend.prepare(plant).expect("it fits");
+        let drawn = starts(plant);
         let size = plant.model.states.len();
-        let list: Vec<f32> = (0..=STARTS).flat_map(|i| drawn.start(i)).collect();
-        let listed = Starts::Listed(States::new(&list, size).unwrap());
-        let measures = |first| roll_out_from(&program, &listed, Query::Measure, first).map(drop);
-        assert_eq!(again(backend, measures), sent, "the same list of {}", plant.model.name);
+        let mut list: Vec<f32> = (0..STARTS).flat_map(|i| drawn.start(i)).collect();
+        let roll = |list: &[f32]| {
+            let listed = Starts::Listed(States::new(list, size).unwrap());
+            let before = traffic(backend);
+            let found = roll_out(&program, &listed, Query::Measure).expect("it runs");
+            (found, traffic(backend).since(before))
+        };
+        let expected = roll_out(&program, &drawn, Query::Measure).expect("it runs");
+        assert_eq!(roll(&list).0, expected);
+        let read = Traffic { writes: 0, bytes_read: HEAD_BYTES + 4 * STARTS, ..ONE };
+        assert_eq!(roll(&list), (expected.clone(), read), "{}", plant.model.name);
+        list.swap(0, size);
+        let (found, cost) = roll(&list);
+        let bytes_written = 16 * size.div_ceil(4) as u64 * STARTS;
+        let (writes, buffers) = (1, cost.buffers);
+        assert_eq!(cost, Traffic { writes, bytes_written, buffers, ..read });
+        assert_ne!(found[..2], expected[..2]);
+        assert_eq!(found[2..], expected[2..]);
     });
 }
 

@@ -8,7 +8,9 @@ use super::device::{Adapter, Choice, Device};
 use super::fault::Injection;
 use super::fusing::NetworkKernels;
 use super::limits::{self, DeviceLimits};
+use super::mppi_source::PlanSource;
 use super::opened::{Opened, Setup};
+use super::recent::Recent;
 use super::source::Sources;
 use super::state::State;
 use super::timing::KernelTime;
@@ -16,6 +18,9 @@ use super::traffic::Traffic;
 use crate::backend::Event;
 use crate::backend::cpu::Cpu;
 use crate::error::Result;
+
+/// Plannings that are remembered.
+const PLANS: usize = 16;
 
 /// An adapter, and what becomes of the work where it fails.
 ///
@@ -29,6 +34,8 @@ pub struct Gpu {
     pub(super) fallback: Option<Cpu>,
     events: Mutex<Vec<Event>>,
     pub(super) sources: Sources,
+    /// What was planned for last.
+    pub(super) plans: Recent<Arc<PlanSource>>,
 }
 
 impl Gpu {
@@ -47,6 +54,7 @@ impl Gpu {
             fallback: None,
             events: Mutex::default(),
             sources: Sources::default(),
+            plans: Recent::new(PLANS),
         })
     }
 

@@ -10,8 +10,10 @@ use super::timing::Stamps;
 pub(super) struct Batch<'a> {
     blocks: Vec<u8>,
     calls: Vec<Dispatch<'a>>,
-    /// Where the device counts workgroups, and the dispatch that narrows those after it.
-    narrowing: Option<(Counted, usize)>,
+    /// Where the device counts workgroups, if it does.
+    counted: Option<Counted>,
+    /// The dispatch that narrows those that are added.
+    narrowing: Option<usize>,
 }
 
 /// A kernel, where its parameters begin, and its workgroups.
@@ -47,10 +49,10 @@ impl<'a> Batch<'a> {
         let behind = [groups[0], groups[1], 1, bound.columns()];
         self.blocks.extend_from_slice(bytemuck::bytes_of(&behind));
         self.blocks.resize(offset + Params::PITCH, 0);
-        let groups = match &self.narrowing {
+        let groups = match self.narrowing {
             None => Groups::Known(groups),
-            Some((_, at)) => {
-                self.calls[*at].widen();
+            Some(at) => {
+                self.calls[at].add_group();
                 Groups::Counted
             }
         };
@@ -60,14 +62,19 @@ impl<'a> Batch<'a> {
     /// Adds `narrow`, which sets the dispatches that are added from here on to the trajectories that are
     /// left by then; their parameters are in `counted`.
     pub(super) fn narrow(&mut self, narrow: &'a Bound, counted: Counted) {
-        self.narrowing = Some((counted, self.calls.len()));
+        (self.counted, self.narrowing) = (Some(counted), Some(self.calls.len()));
         let (offset, groups) = (self.blocks.len() as u32, Groups::Known([0, 1]));
         self.calls.push(Dispatch { bound: narrow, offset, groups });
     }
 
     /// Whether the device changes the parameters of some dispatches.
     pub(super) fn is_narrowed(&self) -> bool {
-        self.narrowing.is_some()
+        self.counted.is_some()
+    }
+
+    /// What is added from here on is not narrowed.
+    pub(super) fn widen(&mut self) {
+        self.narrowing = None;
     }
 
     /// Records the dispatches: in one pass, or in one each where they are timed. The number of passes.
@@ -92,8 +99,8 @@ impl<'a> Batch<'a> {
     /// Records a dispatch.
     fn run(&self, pass: &mut wgpu::ComputePass<'_>, call: &Dispatch<'a>) {
         call.bound.choose(pass, call.offset);
-        match (call.groups, &self.narrowing) {
-            (Groups::Counted, Some((counted, _))) => {
+        match (call.groups, &self.counted) {
+            (Groups::Counted, Some(counted)) => {
                 let words = u64::from(call.offset) + 4 * GROUPS_WORD as u64;
                 pass.dispatch_workgroups_indirect(&counted.buffer, counted.start + words);
             }
@@ -126,7 +133,7 @@ impl<'a> Batch<'a> {
 
 impl Dispatch<'_> {
     /// One workgroup more.
-    fn widen(&mut self) {
+    fn add_group(&mut self) {
         if let Groups::Known([x, _]) = &mut self.groups {
             *x += 1;
         }

@@ -17,7 +17,7 @@ pub(super) struct InputSizes {
     pub(super) values: usize,
     /// Of the schedule, one per step.
     pub(super) steps: usize,
-    /// Of the region or of the starts that are listed.
+    /// Of the region that starts are drawn from.
     pub(super) region: usize,
     /// Dispatches of a submission.
     pub(super) dispatches: usize,
@@ -25,7 +25,7 @@ pub(super) struct InputSizes {
     pub(super) narrowed: usize,
 }
 
-/// Parts of the upload: the parameters of the model, the schedule, the region or listed starts.
+/// Parts of the upload: the parameters of the model, the schedule, the region.
 const VALUES: usize = 0;
 const SCHEDULE: usize = 1;
 const REGION: usize = 2;
@@ -91,20 +91,6 @@ impl Inputs {
                 }
             };
             self.0.put(REGION, 4 * i, &vector);
-        }
-    }
-
-    /// Sets the listed starts `first..first + columns`, `[states / 4, columns]` vectors; nothing if
-    /// they are drawn.
-    pub(super) fn set_starts(&mut self, starts: &Starts<'_>, first: u64, columns: u32) {
-        let Starts::Listed(list) = starts else { return };
-        let columns = columns as usize;
-        for column in 0..columns {
-            // Past its end, a list repeats its last start.
-            let row = list.row((first as usize + column).min(list.len() - 1));
-            for (quad, numbers) in row.chunks(4).enumerate() {
-                self.0.put(REGION, 4 * (quad * columns + column), numbers);
-            }
         }
     }
 

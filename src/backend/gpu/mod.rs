@@ -11,6 +11,7 @@ mod chain_load;
 mod chunking;
 mod compiled;
 pub mod compose;
+mod counting;
 mod deviation;
 mod device;
 mod fault;
@@ -22,6 +23,7 @@ mod kernel;
 #[cfg(feature = "train-gpu")]
 mod lent;
 mod limits;
+mod lists;
 mod mppi;
 mod mppi_chunking;
 mod mppi_compiled;

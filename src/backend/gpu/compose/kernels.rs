@@ -8,6 +8,8 @@ pub const TILE_COLUMNS: u32 = 8;
 pub const TILE_PITCH: u32 = WORKGROUP / TILE_COLUMNS;
 /// Vectors of 4 neurons that one thread of a layer computes.
 pub const TILE_QUADS: u32 = 2;
+/// Trajectories or pairs that one workgroup counts.
+pub const COUNTED: u32 = 64 * WORKGROUP;
 /// Numbers of a partial of MPPI before its sums of controls.
 pub const PARTIAL_HEADER: u32 = 6;
 
@@ -26,6 +28,10 @@ pub enum Kernel {
     Deviation,
     /// Finds the farthest pair of each step.
     Reduce,
+    /// Counts measures or signs.
+    Count,
+    /// Counts how pairs fared.
+    CountPairs,
     /// Evaluates what a network sees.
     Observe,
     /// Evaluates the part of that number of formulas that call networks.
@@ -131,17 +137,21 @@ pub enum Slot {
     Blocks = 33,
     /// `left`: one number, the survivors of the other set of columns.
     Left = 34,
+    /// `counts`: of each workgroup that counts.
+    Counts = 35,
 }
 
 impl Kernel {
     /// The kernels of measures, pairs and networks.
-    pub const ROLLOUT: [Self; 9] = [
+    pub const ROLLOUT: [Self; 11] = [
         Self::Sample,
         Self::ReachAvoid,
         Self::Compact,
         Self::Narrow,
         Self::Deviation,
         Self::Reduce,
+        Self::Count,
+        Self::CountPairs,
         Self::HiddenLayer,
         Self::OutputLayer,
         Self::Observe,
@@ -162,6 +172,8 @@ impl Kernel {
             Self::Narrow => "narrow",
             Self::Deviation => "deviation",
             Self::Reduce => "reduce",
+            Self::Count => "count",
+            Self::CountPairs => "count_pairs",
             Self::Observe => "observe",
             Self::Link(_) => "link",
             Self::HiddenLayer | Self::OutputLayer => "mlp",
@@ -219,6 +231,7 @@ impl Kernel {
             ],
             Self::Narrow => &[],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
+            Self::Count | Self::CountPairs => &[(S::Measures, Read), (S::Counts, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
             Self::Link(_) => &[(S::State, Read), (S::Kept, ReadWrite)],
             Self::HiddenLayer | Self::OutputLayer => {

@@ -13,7 +13,7 @@ mod plant;
 pub use chain::ChainText;
 pub(super) use chain::{AskShape, ChainSizes};
 pub use kernels::{
-    Access, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
+    Access, COUNTED, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
 };
 pub use layers::Fused;
 pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
