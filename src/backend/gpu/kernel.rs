@@ -84,9 +84,10 @@ impl Pipelines {
         // by the length of the schedule or of the plans of the problems, and `inputs`, `plan` and
         // `mppi_plan` size every buffer for that stride, that length and those problems; workgroup
         // memory has the vectors of the widest layer, and `limits` sizes its buffers for its
-        // threads; the cell of a map is bounded by the number of its cells, as an integer; the
-        // recorded physics has neither loops nor indices that are not constant, and every loop of
-        // the hand-written kernels ends.
+        // threads; the cell of a map is bounded by the number of its cells, as an integer; a window
+        // of blocks is as long as a segment, whose dispatches alone are narrowed, and counts have a
+        // place for each workgroup; the recorded physics has neither loops nor indices that are not
+        // constant, and every loop of the hand-written kernels ends.
         unsafe {
             let checks = wgpu::ShaderRuntimeChecks::unchecked();
             device.device.create_shader_module_trusted(descriptor, checks)
