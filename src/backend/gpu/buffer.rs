@@ -183,8 +183,8 @@ impl Buffer {
         let failed = |text: String| {
             device.failed(Fault::Validation, &format!("cannot read results: {text}"))
         };
-        // The wait is over: who has not answered by then never does.
-        match done.try_recv() {
+        // The wait is over, but a thread that waits beside this one may be about to answer.
+        match done.recv() {
             Ok(Ok(())) => {}
             Ok(Err(e)) => return Err(failed(e.to_string())),
             Err(e) => return Err(failed(e.to_string())),
