@@ -68,16 +68,16 @@ struct Cost {
 }
 
 /// What the calls of `call` took, of which each is given its number.
-fn cost(backend: &Backend, mut call: impl FnMut(usize)) -> Cost {
+fn timed(backend: &Backend, mut call: impl FnMut(usize)) -> Cost {
     let Backend::Gpu(gpu) = backend else { unreachable!("it was opened as one") };
     (0..WARM_UP).for_each(&mut call);
-    let timed = (0..CALLS).map(|number| {
+    let calls = (0..CALLS).map(|number| {
         let (before, begun) = (gpu.driver_time(), Instant::now());
         call(WARM_UP + number);
         let whole = begun.elapsed().as_secs_f64();
         (whole, whole - (gpu.driver_time() - before).as_secs_f64())
     });
-    let (mut whole, mut own): (Vec<f64>, Vec<f64>) = timed.unzip();
+    let (mut whole, mut own): (Vec<f64>, Vec<f64>) = calls.unzip();
     [&mut whole, &mut own].into_iter().for_each(|times| times.sort_by(f64::total_cmp));
     Cost { whole: whole[CALLS / 2], own: own[CALLS / 2], undisturbed: own[CALLS / 10] }
 }
@@ -119,9 +119,9 @@ fn rollouts(networks: NetworkKernels, dispatches: Option<u64>) -> bool {
     for query in [Query::Measure, Query::Sign] {
         let asked = dispatches.filter(|_| query == Query::Measure);
         let task = task(&listed, &tightening, query);
-        let cost = cost(&backend, |_| sent(&program, &task));
+        let cost = timed(&backend, |_| sent(&program, &task));
         right &= report(&format!("{networks:?} {query:?}"), cost, asked);
-        let cost = cost(&backend, |_| drop(program.tally(&task, Keep::Counts).expect("it runs")));
+        let cost = timed(&backend, |_| drop(program.tally(&task, Keep::Counts).expect("it runs")));
         right &= report(&format!("{networks:?} {query:?}, counts"), cost, asked);
     }
     right & pairs(&program, &backend, &listed, networks)
@@ -149,7 +149,7 @@ fn pairs(
         tightening: &Tightening::none(&spec),
         control: PairControl::Replay,
     };
-    let cost = cost(backend, |_| {
+    let cost = timed(backend, |_| {
         program.deviation(&task, &mut |_, _| Ok(())).expect("it runs");
     });
     report(&format!("{networks:?} pairs"), cost, None)
@@ -162,7 +162,7 @@ fn plans() -> bool {
     let planning = Planning::of(&DroneRace::default(), data::lane(), spec);
     let program = backend.prepare_plans(&planning).expect("it fits");
     let problems = [data::mppi_problem(1, 0)];
-    let cost = cost(&backend, |number| {
+    let cost = timed(&backend, |number| {
         let task =
             MppiTask { problems: &problems, iteration: number as u32, costs: CostQuery::Summary };
         drop(program.improve(&task).expect("it runs"));
