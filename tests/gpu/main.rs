@@ -7,9 +7,11 @@ mod calls;
 mod certificates;
 #[path = "../common/mod.rs"]
 mod common;
+mod counts;
 mod edges;
 mod failures;
 mod faults;
+mod held;
 mod infinite;
 #[path = "../learned/mod.rs"]
 mod learned;

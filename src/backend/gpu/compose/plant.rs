@@ -3,8 +3,9 @@
 use super::chain::ChainText;
 use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
-use super::kernels::{Access, Kernel, Slot};
+use super::kernels::{Access, COUNTED, Kernel, Slot};
 use super::layers::{Fused, activation_glue, fused_text, layer_text};
+use super::narrowed::block_constants;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
@@ -20,8 +21,11 @@ const EXACT: &str = include_str!("../../../../shaders/exact.wgsl");
 const SAMPLE: &str = include_str!("../../../../shaders/sample.wgsl");
 const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
+const NARROW: &str = include_str!("../../../../shaders/narrow.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
+const COUNT: &str = include_str!("../../../../shaders/count.wgsl");
+const COUNT_PAIRS: &str = include_str!("../../../../shaders/count_pairs.wgsl");
 const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
 
 /// The texts of the kernels of a model and who drives it; values of parameters and weights are no
@@ -136,6 +140,11 @@ impl PlantText {
     /// For any other kernel.
     pub fn compose(&self, kernel: Kernel) -> String {
         let states = self.outline.states;
+        match kernel {
+            Kernel::Narrow => return block_constants() + NARROW,
+            Kernel::Count | Kernel::CountPairs => return self.count(kernel),
+            _ => {}
+        }
         let folds = || [FINITE, FOLD].concat();
         let parts = match kernel {
             Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
@@ -164,6 +173,14 @@ impl PlantText {
         let sizes = constants_with(states, self.outline.controls, length);
         let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts].concat().join("\n")
+    }
+
+    /// What counts: bits alone, nothing of the plant.
+    fn count(&self, kernel: Kernel) -> String {
+        let sizes = constants(self.outline.states, self.outline.controls);
+        let counted = format!("const COUNTED: u32 = {COUNTED}u;\n");
+        let text = if kernel == Kernel::Count { COUNT } else { COUNT_PAIRS };
+        [sizes.as_str(), PARAMS, counted.as_str(), text].join("\n")
     }
 
     /// What draws starts and pairs.
