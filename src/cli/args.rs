@@ -123,6 +123,9 @@ Example:
     Check {
         /// Folder that `certify` wrote
         folder: PathBuf,
+        /// Seed of the fresh samples, to repeat a check [default: another one each time, which is told]
+        #[arg(long, value_name = "N")]
+        fresh_seed: Option<u64>,
     },
     #[command(flatten)]
     Study(StudyCommand),

@@ -69,7 +69,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
             rollout::run(global, config, starts, measures)
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
-        Command::Check { folder } => stored::check(global, folder),
+        Command::Check { folder, fresh_seed } => stored::check(global, folder, *fresh_seed),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

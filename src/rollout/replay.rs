@@ -19,7 +19,7 @@ pub fn states<R: Real>(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Vec<R>
 
 /// Reach-avoid measure of `start` in f64, with tightened margins.
 pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
-    fold(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
+    fold_states(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
 }
 
 /// Measures `(nominal, perturbed)` of a pair in f64, as [`super::PairMeasure`] has them.
@@ -43,19 +43,47 @@ pub fn pair_measures(
     }
     let plain = Tightening::none(spec);
     let model = &plant.model;
-    (fold(model, &nominal, spec, tightening), fold(model, &replayed, spec, &plain))
+    (fold_states(model, &nominal, spec, tightening), fold_states(model, &replayed, spec, &plain))
 }
 
-/// Folds the margins of `states`; a state that is not finite, or a margin that is no number, fails
+/// Folds the margins of `states`.
+fn fold_states(
+    model: &Model,
+    states: &[Vec<f64>],
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f64 {
+    let margins = (0..).zip(states).map(|(step, x)| Margins {
+        target: model.target_at(x, step),
+        constraint: model.constraint_at(x, step),
+        finite: x.iter().all(|x| x.is_finite()),
+    });
+    fold(margins, spec, tightening)
+}
+
+/// What the fold knows of a state.
+pub(super) struct Margins {
+    /// Target margin.
+    pub(super) target: f64,
+    /// Constraint margin.
+    pub(super) constraint: f64,
+    /// Whether the state is finite.
+    pub(super) finite: bool,
+}
+
+/// Folds the margins of states in order; a state that is not finite, or a margin that is no number, fails
 /// the rollout from there on.
-fn fold(model: &Model, states: &[Vec<f64>], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
+pub(super) fn fold(
+    steps: impl Iterator<Item = Margins>,
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f64 {
     let mut fold = Fold::new();
-    for (t, x) in states.iter().enumerate() {
-        let step = t as u32;
-        let target = model.target_at(x, step) - f64::from(tightening.target[t]);
-        let constraint = model.constraint_at(x, step) - f64::from(tightening.constraint[t]);
+    for (t, margins) in steps.enumerate() {
+        let target = margins.target - f64::from(tightening.target[t]);
+        let constraint = margins.constraint - f64::from(tightening.constraint[t]);
         let number = !target.is_nan() && !constraint.is_nan();
-        if !(number && x.iter().all(|x| x.is_finite())) {
+        if !(number && margins.finite) {
             let so_far: f64 = fold.measure();
             return if so_far > 0.0 { so_far } else { f64::from(NON_FINITE) };
         }

@@ -2,18 +2,38 @@
 
 use super::ledger::{Entry, Ledger, Spend};
 use super::record::Spending;
-use super::settings::Settings;
+use super::settings::{DeviationSettings, Joint, Settings};
 use crate::error::{Error, Result};
+
+impl DeviationSettings {
+    /// What the deviation bound spends over `horizon` steps: bounds of each step on its own are so many
+    /// claims, each with its own beta. The one rule of certificates, races and sweeps.
+    pub fn spent(&self, horizon: u32) -> f64 {
+        match self.joint {
+            Joint::Separate => f64::from(horizon) * self.beta,
+            Joint::FixedShape | Joint::Variables | Joint::Bonferroni => self.beta,
+        }
+    }
+}
+
+/// What the line of the deviation bound is of.
+fn bound_of(joint: Joint) -> &'static str {
+    match joint {
+        Joint::Separate => "bounds of each step",
+        Joint::FixedShape | Joint::Variables | Joint::Bonferroni => "bound",
+    }
+}
 
 /// The ledger of all claims; growth books every round it may take.
 pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
     let rounds = f64::from(growth.rounds);
     let global = settings.global.beta;
-    let budget = settings.deviation.beta + 2.0 * global + rounds * growth.round_beta();
+    let deviation = settings.deviation.spent(settings.spec.horizon);
+    let budget = deviation + 2.0 * global + rounds * growth.round_beta();
     let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
     let claims = [
-        ("deviation", "bound", settings.deviation.beta),
+        ("deviation", bound_of(settings.deviation.joint), deviation),
         ("global", "conditional failure", global),
         ("global", "interval of the certified share", global),
     ];

@@ -49,15 +49,21 @@ pub fn certify(
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
-    let mut statements = claims::statements(settings, &deviation, &global, &growth);
-    statements.extend(claims::of_samples(plant, settings, &picture));
+    let parts = claims::Parts {
+        constants: &constants,
+        deviation: &deviation,
+        global: &global,
+        growth: &growth,
+        picture: &picture,
+    };
+    let statements = claims::statements(plant, settings, parts);
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
     Ok(Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
-        holds: claims::holds(&deviation, &global, &growth),
+        holds: claims::holds(&constants, &deviation, &global, &growth),
         statements,
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),

@@ -1,46 +1,67 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
-use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
-use super::sampling;
+use super::record::{
+    ConstantsRecord, DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord,
+};
 use super::settings::Settings;
+use super::tightened::tightening;
+use super::{empty, probe, sampling, side};
 use crate::model::Plant;
-use crate::rollout::{HUGE, StateList};
+use crate::rollout::StateList;
+use crate::rounding::{lower, upper};
 
 /// Whether every claim that is asked for was obtained.
 pub(super) fn holds(
+    constants: &ConstantsRecord,
     deviation: &DeviationRecord,
     global: &GlobalRecord,
     growth: &GrowthRecord,
 ) -> bool {
-    deviation.non_finite == 0
+    constants.stand()
+        && deviation.non_finite == 0
         && global.accepted > 0
-        && deviation.claim.epsilon.is_some_and(|asked| global.claim.certified_risk <= asked)
+        && global.claim.is_obtained()
         && growth.outcome == GrowthOutcome::Verified
 }
 
-/// The claims in words.
-pub(super) fn statements(
-    settings: &Settings,
-    deviation: &DeviationRecord,
-    global: &GlobalRecord,
-    growth: &GrowthRecord,
-) -> Vec<String> {
+/// What the claims of a record are made of.
+#[derive(Clone, Copy)]
+pub(super) struct Parts<'a> {
+    /// Lipschitz constants.
+    pub(super) constants: &'a ConstantsRecord,
+    /// Deviation bound.
+    pub(super) deviation: &'a DeviationRecord,
+    /// Certified set.
+    pub(super) global: &'a GlobalRecord,
+    /// Local growth.
+    pub(super) growth: &'a GrowthRecord,
+    /// Pictured rollouts.
+    pub(super) picture: &'a PictureRecord,
+}
+
+/// The claims in words, and what is to be said beside them.
+pub(super) fn statements(plant: &Plant, settings: &Settings, parts: Parts<'_>) -> Vec<String> {
+    let Parts { constants, deviation, global, growth, picture } = parts;
+    let model = &*plant.model;
     let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
     let mut statements: Vec<String> =
         claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
     statements.insert(2, share_statement(global, settings));
+    if global.accepted == 0 {
+        let losses = tightening(&deviation.bound, constants, &settings.spec);
+        statements.extend(empty::reasons(model, deviation, &losses, picture));
+    }
     statements.extend(growth_statement(growth));
-    statements.extend(broken_statement(deviation));
+    statements.extend(side::statement(model, settings, growth));
+    statements.extend(constants.statements());
+    statements.extend(probe::statement(global));
+    statements.extend(of_samples(plant, settings, picture));
     statements
 }
 
 /// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is
 /// too coarse for them.
-pub(super) fn of_samples(
-    plant: &Plant,
-    settings: &Settings,
-    picture: &PictureRecord,
-) -> Vec<String> {
+fn of_samples(plant: &Plant, settings: &Settings, picture: &PictureRecord) -> Vec<String> {
     let size = settings.state.len();
     let first = |x: &&Vec<f32>| x.len() == size;
     let firsts = picture.rollouts.iter().filter_map(|rollout| rollout.states.first());
@@ -50,27 +71,16 @@ pub(super) fn of_samples(
 
 /// The certified share of the box in words.
 fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
-    let [low, high] = global.share_interval;
+    let [low, high] = global.share_interval.map(|share| 100.0 * share);
     format!(
-        "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
+        "With confidence 1 - {}, the certified set holds between {} % and {} % of the box \
          ({} of {} starts).",
         settings.global.beta,
-        100.0 * low,
-        100.0 * high,
+        lower(low),
+        upper(high),
         global.accepted,
         global.draws
     )
-}
-
-/// That rollouts of the deviation bound met states that are not finite.
-fn broken_statement(deviation: &DeviationRecord) -> Option<String> {
-    let (broken, pairs) = (deviation.non_finite, deviation.claim.scenarios);
-    (broken > 0).then(|| {
-        format!(
-            "The deviation bound is none: {broken} of {pairs} pairs met a state that is not finite, \
-             which counts as a distance of {HUGE:e}; no claim follows from it."
-        )
-    })
 }
 
 /// What came of the growth, where it is not a claim.

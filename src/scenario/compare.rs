@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::finding::{Figure, Finding};
 use super::record::{Record, SCHEMA};
+use super::settings::Joint;
 
 /// Difference, relative to the larger number or to one, that another device's rounding may make.
 const TOLERANCE: f64 = 1e-3;
@@ -20,11 +21,20 @@ const FREE: [&str; 6] = [
     "provenance.version",
 ];
 /// Fields that are measured on the device, or that put its numbers into words.
-const OF_THE_DEVICE: [&str; 5] =
-    ["statements", "global.f32_error", "global.band", "global.f64_reruns", "growth.rounds"];
+const OF_THE_DEVICE: [&str; 6] = [
+    "statements",
+    "global.f32_error",
+    "global.f32_apart",
+    "global.band",
+    "global.f64_reruns",
+    "growth.rounds",
+];
 /// Fields that each version of the record has its own way of.
-const OF_THE_VERSION: [&str; 3] =
-    ["schema", "provenance.physics_sha256", "provenance.policy_sha256"];
+const OF_THE_VERSION: [&str; 4] =
+    ["schema", "provenance.physics_sha256", "provenance.policy_sha256", "global.claim.epsilon"];
+/// Fields that are another thing since schema 3 where the steps are bounded separately: each step has
+/// its own beta.
+const OF_SEPARATE_STEPS: [&str; 2] = ["ledger", "beta_total"];
 /// Counts of rollouts, in which a measure may have crossed zero.
 const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
 
@@ -45,6 +55,7 @@ pub(super) fn fields(stored: &Record, again: &Record) -> Finding {
     let mut walk = Walk {
         same_version,
         same_device,
+        separate: again.deviation.joint == Joint::Separate,
         draws: again.global.draws as f64,
         differences: Vec::new(),
     };
@@ -70,6 +81,7 @@ fn finding(differences: Vec<String>) -> Finding {
 struct Walk {
     same_version: bool,
     same_device: bool,
+    separate: bool,
     draws: f64,
     differences: Vec<String>,
 }
@@ -84,14 +96,21 @@ impl Walk {
         if under(&FREE)
             || (!self.same_device && under(&OF_THE_DEVICE))
             || (!self.same_version && under(&OF_THE_VERSION))
+            || (!self.same_version && self.separate && under(&OF_SEPARATE_STEPS))
         {
             return;
         }
         match (was, is) {
-            (Value::Object(was_map), Value::Object(is_map)) if was_map.len() == is_map.len() => {
-                for (key, was) in was_map {
+            (Value::Object(was_map), Value::Object(is_map)) => {
+                // What an older version has no field for is not looked for in it.
+                let same_version = self.same_version;
+                let new = |key: &&String| same_version && !was_map.contains_key(*key);
+                let added = is_map.keys().filter(new);
+                for key in was_map.keys().chain(added) {
                     let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                    self.compare(&inner, was, is_map.get(key).unwrap_or(&Value::Null));
+                    let [was, is] =
+                        [was_map, is_map].map(|map| map.get(key).unwrap_or(&Value::Null));
+                    self.compare(&inner, was, is);
                 }
             }
             (Value::Array(was_list), Value::Array(is_list)) if was_list.len() == is_list.len() => {

@@ -1,13 +1,12 @@
 //! What of a record follows from its settings and its own counts, without a rollout.
 
 use super::budget::{ledger, spendings};
-use super::claims::{holds, of_samples, statements};
-use super::constants::constants;
+use super::claims::{Parts, holds, statements};
 use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{deviation, global, growth};
+use super::{constants, deviation, global, growth};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::GENERATOR;
@@ -30,16 +29,18 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.provenance.physics_sha256 = physics_sha256;
     record.provenance.policy_sha256 = policy_sha256;
     record.system = system_record(model, settings);
-    record.constants = constants(model, settings)?;
+    record.constants = constants::derived(model, settings, &stored.constants)?;
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;
     record.global = global::derived(model, settings, &stored.global)?;
     record.growth = growth::derived(model, settings, &stored.growth)?;
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);
-    record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
-    record.statements.extend(of_samples(plant, settings, &record.picture));
-    record.holds = holds(&record.deviation, &record.global, &record.growth);
+    let Record { constants, deviation, global, growth, picture, .. } = &record;
+    let parts = Parts { constants, deviation, global, growth, picture };
+    let statements = statements(plant, settings, parts);
+    let holds = holds(constants, deviation, global, growth);
+    (record.statements, record.holds) = (statements, holds);
     Ok(record)
 }
 

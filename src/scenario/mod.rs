@@ -1,5 +1,6 @@
 //! Certificates: what scenarios, drawn and rolled out, allow one to claim.
 
+mod assumptions;
 pub mod bound;
 pub mod boundary;
 mod budget;
@@ -7,12 +8,15 @@ mod certify;
 mod claim;
 mod claims;
 mod compare;
+mod constant_record;
 mod constants;
 mod coordinates;
 mod derived;
 pub mod deviation;
+mod empty;
 mod finding;
 pub(crate) mod fit;
+mod fresh;
 pub mod global;
 pub mod growth;
 pub mod growth_batch;
@@ -21,15 +25,20 @@ pub(crate) mod limits;
 pub mod linear;
 pub mod lipschitz;
 mod origin;
+mod pairs_f64;
+mod probe;
 pub mod purpose;
 pub mod record;
 pub mod sampling;
 pub mod settings;
+mod side;
+mod spacing;
 mod stored;
 pub(crate) mod tail;
 pub mod tier;
 mod tightened;
 mod verify;
+mod visited;
 
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};

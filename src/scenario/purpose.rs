@@ -24,3 +24,7 @@ pub const CHECK: Purpose = Purpose::numbered(10);
 pub const CHECK_PERTURBATION: Purpose = Purpose::numbered(11);
 /// The rollouts drawn in a report.
 pub const PICTURE: Purpose = Purpose::numbered(12);
+/// Nominal starts that the deviation bound of a stored certificate is checked with.
+pub const FRESH_NOMINAL: Purpose = Purpose::numbered(24);
+/// Their perturbations.
+pub const FRESH_PERTURBATION: Purpose = Purpose::numbered(25);
