@@ -41,7 +41,7 @@ pub fn mcnemar(only_this: u64, only_other: u64) -> f64 {
 /// The paired comparison of two controllers on the same starts and seeds.
 ///
 /// # Panics
-/// If there is no race, or the two did not run the same starts.
+/// If there is no race, or the two did not run the same starts with as many seeds.
 pub fn paired(this: &Verdicts, other: &Verdicts) -> PairedRecord {
     let starts = this[0].len();
     let same =
@@ -70,7 +70,7 @@ pub fn paired(this: &Verdicts, other: &Verdicts) -> PairedRecord {
 /// hybrid controller, none for itself or where it did not run.
 ///
 /// # Panics
-/// If there is no race, or the two did not run the same starts.
+/// If there is no race, or the two did not run the same starts with as many seeds.
 pub fn judged(
     judge: Judge,
     controller: &str,
@@ -199,7 +199,12 @@ mod tests {
     #[test]
     fn record_of_the_verdicts() {
         let verdicts = [seed("1110c"), seed("11c0c"), seed("00000")];
-        let record = judged(Judge::Study, "mppi", &verdicts, Some(&[seed("11111")]));
+        let record = judged(
+            Judge::Study,
+            "mppi",
+            &verdicts,
+            Some(&[seed("11111"), seed("11111"), seed("11111")]),
+        );
         assert_eq!(record.successes, [3, 2, 0]);
         assert!((record.rate - 1.0 / 3.0).abs() < 1e-15);
         // Rates 0.6, 0.4, 0: squared distances from 1/3 sum to 14/75.
