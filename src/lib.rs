@@ -214,6 +214,7 @@ pub mod real;
 #[cfg(feature = "cli")]
 pub mod report;
 pub mod rollout;
+mod rounding;
 pub mod scenario;
 #[cfg(feature = "cli")]
 pub mod studies;

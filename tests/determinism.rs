@@ -79,7 +79,7 @@ fn a_certificate_survives_its_file_and_its_check() {
     let stored = serde_json::to_string(&record).expect("JSON");
     let read: Record = serde_json::from_str(&stored).expect("record");
     assert_eq!(read, record);
-    let report = check(&program, &read, &settings, &Unwatched).expect("check");
+    let report = check(&program, &read, &settings, 7, &Unwatched).expect("check");
     assert!(report.holds, "{:#?}", report.findings);
 }
 
@@ -99,7 +99,7 @@ fn is_caught(change: impl Fn(&mut Record)) -> bool {
     let program = program(&backend, &plant);
     let mut record = certificate(&program, &settings);
     change(&mut record);
-    match check(&program, &record, &settings, &Unwatched) {
+    match check(&program, &record, &settings, 7, &Unwatched) {
         Ok(report) => !report.holds,
         Err(Error::Refused(_)) => true,
         Err(error) => panic!("{error}"),

@@ -1,4 +1,4 @@
-//! What version 0.1 wrote: certificates are checked, the rest is read, as they were.
+//! What earlier versions wrote: certificates are checked, the rest is read, as they were.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
@@ -29,6 +29,23 @@ fn certificates_of_both_backends_still_hold() {
         assert!(found.contains("hash of the physics"), "{folder}: {found}");
         assert!(found.contains("not compared"), "{folder}: {found}");
     }
+}
+
+/// Certificates of schema 2: one of `configs/smoke.toml`, one of the double integrator whose steps were
+/// bounded separately and spent one beta, with its page of then.
+#[test]
+fn certificates_of_schema_2_still_hold() {
+    for folder in ["certificate_cpu", "certificate_separate"] {
+        let folder = format!("tests/fixtures/schema_2/{folder}");
+        let found = done(&["check", &folder, "--backend", "cpu"]);
+        assert!(found.contains("the certificate holds"), "{folder}: {found}");
+        assert!(found.contains("fresh pairs beyond the deviation bound"), "{folder}: {found}");
+        assert!(!found.contains("not compared"), "{folder}: {found}");
+    }
+    let states = "configs/race_starts_500.csv";
+    let folder = "tests/fixtures/schema_2/certificate_cpu";
+    let rows = done(&["query", folder, "--states", states, "--backend", "cpu"]);
+    assert!(rows.lines().count() > 500, "{rows}");
 }
 
 #[test]

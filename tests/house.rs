@@ -9,7 +9,7 @@ const STUDY: [&str; 4] = ["race", "races", "drone", "drones"];
 /// Files outside of the study that may name it.
 const REGISTRY: [&str; 2] = ["studies.rs", "lib.rs"];
 /// The floors of the study; each imports only from those before it.
-const FLOORS: [&str; 23] = [
+const FLOORS: [&str; 24] = [
     "system",
     "cost",
     "barrier",
@@ -20,6 +20,7 @@ const FLOORS: [&str; 23] = [
     "log",
     "record",
     "metrics",
+    "difference",
     "statistics",
     "timing",
     "weights",

@@ -10,11 +10,12 @@ use modules::{Import, Modules};
 /// Layer of each top-level module; a file may name its own layer and those below it.
 ///
 /// The study goes through all of them; its parts that stand elsewhere than with the experiments are named.
-const LAYERS: [(&str, u32); 26] = [
+const LAYERS: [(&str, u32); 27] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
     ("files", 1),
+    ("rounding", 1),
     ("system", 2),
     ("policy", 2),
     ("cost", 2),

@@ -217,7 +217,7 @@ fn verdict(
     let record: Record = serde_json::from_value(record.clone()).unwrap();
     let states = &program.plant().model.states;
     let settings = config.settings(states)?;
-    let checked = match check(program, &record, &settings, &Unwatched) {
+    let checked = match check(program, &record, &settings, 7, &Unwatched) {
         Ok(report) if report.holds => None,
         Ok(report) => {
             let failed = report.findings.iter().filter(|finding| !finding.holds);
@@ -231,7 +231,8 @@ fn verdict(
 }
 
 /// What only rollouts can tell, so that `query` takes it from the record as it is.
-const ROLLED_OUT: [&str; 25] = [
+const ROLLED_OUT: [&str; 27] = [
+    "constants.region",
     "deviation.bound",
     "deviation.largest",
     "deviation.scale",
@@ -242,6 +243,7 @@ const ROLLED_OUT: [&str; 25] = [
     "global.reached",
     "global.non_finite",
     "global.f32_error",
+    "global.f32_apart",
     "global.f64_reruns",
     "whole_box.failures",
     "whole_box.non_finite",

@@ -125,6 +125,9 @@ Example:
     Check {
         /// Folder that `certify` wrote
         folder: PathBuf,
+        /// Seed of the fresh samples, to repeat a check [default: another one each time, which is told]
+        #[arg(long, value_name = "N")]
+        fresh_seed: Option<u64>,
     },
     /// Look for a start that fails: within the box, or where a certificate claims something
     ///

@@ -73,7 +73,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
             rollout::run(global, config, starts, measures)
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
-        Command::Check { folder } => stored::check(global, folder),
+        Command::Check { folder, fresh_seed } => stored::check(global, folder, *fresh_seed),
         Command::Falsify(asked) => falsify::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),

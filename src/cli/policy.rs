@@ -15,6 +15,7 @@ use crate::policy::import::{self, Cast, Origin, Request};
 use crate::policy::inspect::{Inspection, output_intervals, output_ranges};
 use crate::real::bound::Interval;
 use crate::rollout::{Purpose, Stream};
+use crate::rounding::{interval, lower, upper};
 use crate::system::Axis;
 
 /// Ending of policy files.
@@ -299,19 +300,24 @@ fn inspect_text(inspect: &Inspect, place: &str) -> String {
         network.digest,
     );
     for (i, layer) in network.layers.iter().enumerate() {
-        let ([w, most], [b, bias]) = (layer.weight_range, layer.bias_range);
         text += &format!(
-            "layer {i}     {} -> {}, weights {w:.4} to {most:.4}, biases {b:.4} to {bias:.4}, \
-             spectral norm at most {:.4}\n",
-            layer.inputs, layer.outputs, layer.spectral_norm
+            "layer {i}     {} -> {}, weights {}, biases {}, spectral norm at most {}\n",
+            layer.inputs,
+            layer.outputs,
+            interval(layer.weight_range.map(f64::from)),
+            interval(layer.bias_range.map(f64::from)),
+            upper(layer.spectral_norm)
         );
     }
-    text += &format!("Lipschitz   at most {:.4}, everywhere\n", network.lipschitz_bound);
+    text += &format!("Lipschitz   at most {}, everywhere\n", upper(network.lipschitz_bound));
     text += &format!("actions     over the box ({place}):\n");
-    for Action { name, interval: [low, high], seen: [least, largest] } in &inspect.actions {
+    for Action { name, interval: within, seen: [least, largest] } in &inspect.actions {
+        // What was seen is rounded inwards: it was.
         text += &format!(
-            "  {name}  within {low:.4} to {high:.4}; \
-             seen {least:.4} to {largest:.4} in {} states\n",
+            "  {name}  within {}; seen {} to {} in {} states\n",
+            interval(*within),
+            upper(f64::from(*least)),
+            lower(f64::from(*largest)),
             inspect.samples
         );
     }

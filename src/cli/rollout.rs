@@ -18,6 +18,7 @@ use crate::rollout::{
     Keep, MeasureCounts, MeasureTally, Query, ReachAvoidTask, RolloutSpec, Starts, StateList,
     States, Tightening,
 };
+use crate::rounding;
 use crate::scenario::Watch;
 use crate::scenario::bound::interval;
 use crate::scenario::sampling::sampling;
@@ -177,20 +178,19 @@ fn measure(
 
 /// The summary in words.
 fn text(summary: &Summary) -> String {
-    let Summary { starts, successes, non_finite, success_interval: [low, high], .. } = summary;
+    let Summary { starts, successes, non_finite, success_interval, .. } = summary;
     let notes: String = summary.notes.iter().map(|note| format!("note: {note}\n")).collect();
     let share = 100.0 * *successes as f64 / *starts as f64;
     format!(
-        "{successes} of {starts} starts reach the target safely: {share:.2} % \
-         (95 % interval {:.2} % to {:.2} %)\n\
+        "{successes} of {starts} starts reach the target safely: {} % (95 % interval {} %)\n\
          {non_finite} failed for a state that is not finite\n\
          measures (positive where the target is reached safely): {}\n\
-         {} steps, {}, {:.3} s\n{notes}",
-        100.0 * low,
-        100.0 * high,
+         {} steps, {}, {} s\n{notes}",
+        rounding::number(share),
+        rounding::interval(success_interval.map(|end| 100.0 * end)),
         summary.measures,
         summary.horizon,
         summary.device,
-        summary.wall_seconds
+        rounding::number(summary.wall_seconds)
     )
 }

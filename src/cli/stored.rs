@@ -1,5 +1,6 @@
 //! The commands `query` and `check`: a stored certificate used and verified again.
 
+use std::hash::BuildHasher;
 use std::path::{Path, PathBuf};
 
 use super::options::Global;
@@ -12,7 +13,7 @@ use super::{Outcome, devices, document, report};
 use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
 use crate::files::{Existing, Inputs, RECORD_BYTES, Staged, StateReader, read, read_text};
-use crate::scenario::record::Record;
+use crate::scenario::record::{Record, SCHEMA};
 use crate::scenario::{self, CheckReport, Figure, Finding, QueryRow};
 
 /// Name of the file with a line per state.
@@ -138,9 +139,9 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
 }
 
 /// Verifies the certificate in the folder again.
-pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
+pub(super) fn check(global: &Global, folder: &Path, fresh_seed: Option<u64>) -> Result<Outcome> {
     let stored = Stored::read(folder)?;
-    let mut found = verify(global, &stored)?;
+    let mut found = verify(global, &stored, fresh_seed.unwrap_or_else(another_seed))?;
     // Of a record that does not hold, a page may not even be made.
     if found.holds {
         found.add(files(folder, &stored.record)?);
@@ -153,7 +154,7 @@ pub(super) fn check(global: &Global, folder: &Path) -> Result<Outcome> {
 /// another version of the program may have laid them out differently.
 fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
-    if record.provenance.version != env!("CARGO_PKG_VERSION") {
+    if record.provenance.version != env!("CARGO_PKG_VERSION") || record.schema != SCHEMA {
         return Ok(findings);
     }
     for (name, bytes) in derived_files(record) {
@@ -174,15 +175,23 @@ fn files(folder: &Path, record: &Record) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
+/// A seed that no earlier call had: the clock and the number of the process, mixed by a hasher whose
+/// keys are random. It is kept below 2^53, which every reader of JSON has exactly.
+fn another_seed() -> u64 {
+    let clock = std::time::SystemTime::now();
+    let hasher = std::collections::hash_map::RandomState::new();
+    hasher.hash_one((clock, std::process::id())) >> 11
+}
+
 /// Computes a certificate again and tries its claims on fresh scenarios.
-fn verify(global: &Global, stored: &Stored) -> Result<CheckReport> {
+fn verify(global: &Global, stored: &Stored, fresh_seed: u64) -> Result<CheckReport> {
     let Stored { record, config, policy } = stored;
     let plant = config.plant(policy)?;
     let settings = config.settings(&plant.model.states)?;
     let backend = devices::open(global)?;
     let progress = Progress::new(global);
     let program = backend.prepare(&plant)?;
-    let found = scenario::check(&program, record, &settings, &progress)?;
+    let found = scenario::check(&program, record, &settings, fresh_seed, &progress)?;
     devices::note_events(global, &backend);
     Ok(found)
 }
@@ -198,5 +207,6 @@ fn findings(found: &CheckReport) -> String {
         true => "the certificate holds",
         false => "the certificate no longer holds",
     };
-    format!("{lines}{FRESH}\n{verdict}\n")
+    let seed = found.fresh_seed;
+    format!("{lines}{FRESH}\nfresh samples: --fresh-seed {seed} draws them again\n{verdict}\n")
 }

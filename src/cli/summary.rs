@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::scenario::record::{Claim, GrowthOutcome, Record};
+use crate::rounding::{interval, lower, number, upper};
+use crate::scenario::record::{Claim, GlobalRecord, GrowthOutcome, Record};
 
 /// What the columns of the table are.
 const TABLE: &str = "\
@@ -23,26 +24,26 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     lines.extend(table(record));
     lines.push(TABLE.to_owned());
     lines.push(String::new());
-    let [low, high] = record.global.share_interval;
     let (inside, draws, what) = match record.global.share {
         Some(share) => (share.inside, share.draws, "fresh starts"),
         None => (record.global.accepted, record.global.draws, "draws"),
     };
     lines.push(format!(
-        "certified set   {inside} of {draws} {what}, P(V_global) within {low:.4} to {high:.4}"
+        "certified set   {inside} of {draws} {what}, P(V_global) within {}",
+        interval(record.global.share_interval)
     ));
-    lines.push(format!(
-        "conditional     failure inside it at most {:.5} ({} failed)",
-        record.global.claim.certified_risk, record.global.claim.failures
-    ));
+    lines.push(format!("conditional     {}", conditional(&record.global)));
     lines.push(format!("growth          {}", growth(record)));
     let state = &record.state;
-    lines.push(format!("state           tier {}, V_check {:.4}", state.tier, state.check_margin));
+    let check_margin = lower(state.check_margin);
+    lines.push(format!("state           tier {}, V_check {check_margin}", state.tier));
     lines.push(WORDS.to_owned());
     let timing = &record.timing;
     lines.push(format!(
-        "work            {} rollouts in {:.2} s on {}",
-        timing.rollouts, timing.wall_seconds, record.provenance.device
+        "work            {} rollouts in {} s on {}",
+        timing.rollouts,
+        number(timing.wall_seconds),
+        record.provenance.device
     ));
     let names = files.iter().map(|file| file.display().to_string());
     lines.push(format!("files           {}", names.collect::<Vec<_>>().join("\n                ")));
@@ -74,19 +75,28 @@ fn table(record: &Record) -> Vec<String> {
 /// The counts behind one claim.
 fn row(claim: &Claim) -> String {
     let count = |count: Option<u64>| count.map_or("-".to_owned(), |count| count.to_string());
-    let asked = claim.epsilon.map_or("-".to_owned(), |asked| format!("{asked:.5}"));
+    let asked = claim.epsilon.map_or("-".to_owned(), upper);
     format!(
-        "{:<12} {:>10} {:>8} {:>3} {:>8} {:>9.1e} {:>8} {:>8} {:>10.6}",
+        "{:<12} {:>10} {:>8} {:>3} {:>8} {:>9} {:>8} {:>8} {:>10}",
         claim.name,
         claim.scenarios,
         claim.failures,
         claim.decision_vars,
         asked,
-        claim.beta_used,
+        upper(claim.beta_used),
         count(claim.required_simple),
         count(claim.required_exact),
-        claim.certified_risk
+        upper(claim.certified_risk)
     )
+}
+
+/// The failure of rollouts from the certified set, where it has any start.
+fn conditional(global: &GlobalRecord) -> String {
+    if global.accepted == 0 {
+        return "no claim: no start that was drawn is certified".to_owned();
+    }
+    let claim = &global.claim;
+    format!("failure inside it at most {} ({} failed)", upper(claim.certified_risk), claim.failures)
 }
 
 /// What came of local growth.
@@ -95,7 +105,7 @@ fn growth(record: &Record) -> String {
     let rounds = growth.rounds.len();
     match growth.outcome {
         GrowthOutcome::Verified => {
-            format!("verified a ball of radius {:.4} in round {rounds}", growth.radius)
+            format!("verified a ball of radius {} in round {rounds}", lower(growth.radius))
         }
         GrowthOutcome::Exhausted => format!("exhausted: each of {rounds} rounds had a failure"),
         GrowthOutcome::NoBoundary => "no boundary of the certified set to grow from".to_owned(),

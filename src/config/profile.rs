@@ -10,7 +10,7 @@ use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
 use crate::scenario::record::decimal;
-use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::SystemSection;
 use crate::system::{Axis, DoubleIntegrator, System};
 
@@ -82,7 +82,12 @@ pub(crate) fn common(
         policy: PolicySection::default(),
         rollout: RolloutSection { horizon: 30, gamma: 0.95 },
         bounds: by_name(states, |axis, _| [decimal(axis.low), decimal(axis.high)]),
-        constants: ConstantsSection { target: Constant::Computed, constraint: Constant::Computed },
+        constants: ConstantsSection {
+            target: Constant::Computed,
+            constraint: Constant::Computed,
+            region: ConstantRegion::Visited,
+            assume: Vec::new(),
+        },
         deviation: DeviationSection {
             radius: 0.1,
             epsilon,

@@ -8,7 +8,8 @@ use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::model::text::NetworkFile;
 use crate::rollout::PairControl;
-use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
+use crate::scenario::record::Assumption;
+use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::{StudySettings, SystemSection};
 use crate::train::settings::TrainSettings;
 
@@ -149,13 +150,24 @@ pub struct RolloutSection {
 }
 
 /// Lipschitz constants of the margins.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConstantsSection {
     /// `L_r` of the target margin.
     pub target: Constant,
     /// `L_c` of the constraint margin.
     pub constraint: Constant,
+    /// Where they are to hold; a configuration that was stored without it meant the box of starts.
+    #[serde(default = "of_the_box")]
+    pub region: ConstantRegion,
+    /// What is confirmed of the margins: `continuous`, `hulled`.
+    #[serde(default)]
+    pub assume: Vec<Assumption>,
+}
+
+/// Where constants were computed before there was a choice.
+fn of_the_box() -> ConstantRegion {
+    ConstantRegion::Box
 }
 
 /// The deviation bound.

@@ -6,7 +6,7 @@ use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
 use crate::scenario::BoxSettings;
-use crate::scenario::limits::{finite, positive, positive_f32};
+use crate::scenario::limits::{finite, not_negative, positive_f32};
 use crate::scenario::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings, SliceAxis,
 };
@@ -49,7 +49,7 @@ impl Config {
         let (low, high) = self.corners(axes)?;
         let constant = |key: &str, constant: Constant| match constant {
             Constant::Computed => Ok(None),
-            Constant::Given(value) => positive(key, value).map(Some),
+            Constant::Given(value) => not_negative(key, value).map(Some),
         };
         Ok(Settings {
             seed: self.seed,
@@ -59,6 +59,8 @@ impl Config {
             constants: ConstantSettings {
                 target: constant("constants.target", self.constants.target)?,
                 constraint: constant("constants.constraint", self.constants.constraint)?,
+                region: self.constants.region,
+                assume: self.constants.assume.clone(),
             },
             deviation: self.deviation_settings()?,
             global: self.global_settings()?,

@@ -12,6 +12,8 @@ pub mod cost;
 #[cfg(feature = "cli")]
 pub(crate) mod defaults;
 #[cfg(feature = "cli")]
+mod difference;
+#[cfg(feature = "cli")]
 pub mod flight;
 #[cfg(feature = "cli")]
 mod folder;

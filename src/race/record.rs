@@ -175,7 +175,7 @@ pub struct PairedRecord {
     /// Difference of the mean rates, this one less the other, over all seeds.
     #[serde(with = "crate::files::number")]
     pub difference: f64,
-    /// 95 % interval of the difference: normal, over starts, seeds averaged within each start.
+    /// 95 % interval of the difference (Tango), over starts, counts averaged over the noise seeds.
     #[serde(with = "crate::files::number")]
     pub interval: [f64; 2],
 }

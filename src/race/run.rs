@@ -27,7 +27,6 @@ use crate::files::{ARCHIVE_BYTES, Claim, Staged, make_way, read, read_text};
 use crate::policy::Mlp;
 use crate::rollout::States;
 use crate::scenario::sampling::sampling;
-use crate::scenario::settings::Joint;
 use crate::scenario::{Tightened, Unwatched, Watch, provenance};
 
 /// Races of a batch; what is lost when the program is stopped is at most one of them.
@@ -192,17 +191,11 @@ impl Experiment<'_> {
         if !certifies(name) {
             return [0.0; 2];
         }
-        let deviation = &certificates.deviation;
-        // Bounds of each step on its own hold together at the sum of their betas.
-        let steps = match deviation.joint {
-            Joint::Separate => f64::from(certificates.spec.horizon),
-            _ => 1.0,
-        };
         let call = if race.hybrid.local { certificates.growth.call_beta() } else { 0.0 };
         // Tier 1 by margin drops rests on the sequence that chose its set.
         let first = match certificates.drops {
             Some(_) => certificates.global.beta,
-            None => steps * deviation.beta,
+            None => certificates.deviation.spent(certificates.spec.horizon),
         };
         [first, call]
     }

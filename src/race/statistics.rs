@@ -1,5 +1,6 @@
 //! Comparison of controllers: intervals, and paired tests on the same starts.
 
+use super::difference;
 use super::judge::{FailureClass, Judge};
 use super::record::{FailureRecord, JudgedRecord, PairedRecord, PublishedRecord};
 use crate::scenario::bound::interval;
@@ -40,27 +41,28 @@ pub fn mcnemar(only_this: u64, only_other: u64) -> f64 {
 /// The paired comparison of two controllers on the same starts and seeds.
 ///
 /// # Panics
-/// If there is no race, or the two did not run the same starts.
+/// If there is no race, or the two did not run the same starts with as many seeds.
 pub fn paired(this: &Verdicts, other: &Verdicts) -> PairedRecord {
     let starts = this[0].len();
-    let same = this.iter().chain(other).all(|seed| seed.len() == starts);
+    let same =
+        this.iter().chain(other).all(|seed| seed.len() == starts) && this.len() == other.len();
     assert!(starts > 0 && same, "races were run, and from the same starts");
-    let [this_rates, other_rates] = [this, other].map(rates_by_start);
-    let differences: Vec<f64> = this_rates.iter().zip(other_rates).map(|(a, b)| a - b).collect();
-    let difference = mean(&differences);
-    // One start says nothing about the spread between starts.
-    let half = sample_deviation(&differences)
-        .map_or(f64::INFINITY, |spread| NORMAL_QUANTILE * spread / (starts as f64).sqrt());
-    let wins = |a: &Verdicts, b: &Verdicts| {
-        a[0].iter().zip(&b[0]).filter(|(a, b)| a.is_none() && b.is_some()).count() as u64
+    let wins = |a: &Verdicts, b: &Verdicts| -> Vec<u64> {
+        let of = |(a, b): (&Vec<Option<FailureClass>>, &Vec<Option<FailureClass>>)| {
+            a.iter().zip(b).filter(|(a, b)| a.is_none() && b.is_some()).count() as u64
+        };
+        a.iter().zip(b).map(of).collect()
     };
-    let (only_this, only_other) = (wins(this, other), wins(other, this));
+    let both = [wins(this, other), wins(other, this)];
+    let [only_this, only_other] = both.each_ref().map(|seeds| seeds[0]);
+    let means = both.map(|seeds| seeds.iter().sum::<u64>() as f64 / seeds.len() as f64);
+    let starts = starts as f64;
     PairedRecord {
         only_this,
         only_other,
         p_value: mcnemar(only_this, only_other),
-        difference,
-        interval: [(difference - half).max(-1.0), (difference + half).min(1.0)],
+        difference: (means[0] - means[1]) / starts,
+        interval: difference::interval(means[0], means[1], starts, NORMAL_QUANTILE),
     }
 }
 
@@ -68,7 +70,7 @@ pub fn paired(this: &Verdicts, other: &Verdicts) -> PairedRecord {
 /// hybrid controller, none for itself or where it did not run.
 ///
 /// # Panics
-/// If there is no race, or the two did not run the same starts.
+/// If there is no race, or the two did not run the same starts with as many seeds.
 pub fn judged(
     judge: Judge,
     controller: &str,
@@ -104,12 +106,6 @@ pub fn published(controller: &str) -> Option<PublishedRecord> {
 fn failures(verdicts: &Verdicts) -> Vec<FailureRecord> {
     let count = |class| verdicts.iter().flatten().filter(|v| **v == Some(class)).count() as u64;
     FailureClass::ALL.map(|class| FailureRecord { class, count: count(class) }).into()
-}
-
-/// Per start, the share of the seeds with which it succeeded.
-fn rates_by_start(verdicts: &Verdicts) -> Vec<f64> {
-    let won = |start: usize| verdicts.iter().filter(|seed| seed[start].is_none()).count();
-    (0..verdicts[0].len()).map(|start| won(start) as f64 / verdicts.len() as f64).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -184,27 +180,31 @@ mod tests {
         let record = paired(&this, &other);
         assert_eq!((record.only_this, record.only_other), (2, 2));
         assert_eq!(record.p_value, 1.0);
-        // Shares per start: 1, 1, 1/2, 0, 0 less 1, 0, 0, 1/2, 1/2.
-        let differences = [0.0, 1.0, 0.5, -0.5, -0.5];
-        let variance = differences.iter().map(|d: &f64| (d - 0.1).powi(2)).sum::<f64>() / 4.0;
-        let half = Normal::standard().inverse_cdf(0.975) * (variance / 5.0).sqrt();
+        // Of five starts this one alone won 2 and 1, the other alone 2 and 0: means of 1.5 and 1.
         assert!((record.difference - 0.1).abs() < 1e-15);
-        assert!((record.interval[0] - (0.1 - half)).abs() < 1e-9);
-        assert!((record.interval[1] - (0.1 + half)).abs() < 1e-9);
+        let z = Normal::standard().inverse_cdf(0.975);
+        assert!((z - NORMAL_QUANTILE).abs() < 1e-9);
+        assert_eq!(record.interval, difference::interval(1.5, 1.0, 5.0, NORMAL_QUANTILE));
         let mirrored = paired(&other, &this);
-        assert!((mirrored.interval[0] + record.interval[1]).abs() < 1e-15);
+        assert!((mirrored.interval[0] + record.interval[1]).abs() < 1e-9);
     }
 
     #[test]
     fn a_single_start_leaves_the_difference_open() {
         let record = paired(&[seed("1")], &[seed("0")]);
-        assert_eq!((record.difference, record.interval), (1.0, [-1.0, 1.0]));
+        assert_eq!(record.difference, 1.0);
+        assert!(record.interval[0] < -0.5 && record.interval[1] == 1.0, "{record:?}");
     }
 
     #[test]
     fn record_of_the_verdicts() {
         let verdicts = [seed("1110c"), seed("11c0c"), seed("00000")];
-        let record = judged(Judge::Study, "mppi", &verdicts, Some(&[seed("11111")]));
+        let record = judged(
+            Judge::Study,
+            "mppi",
+            &verdicts,
+            Some(&[seed("11111"), seed("11111"), seed("11111")]),
+        );
         assert_eq!(record.successes, [3, 2, 0]);
         assert!((record.rate - 1.0 / 3.0).abs() < 1e-15);
         // Rates 0.6, 0.4, 0: squared distances from 1/3 sum to 14/75.

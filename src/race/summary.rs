@@ -8,6 +8,7 @@ use super::metrics::{RaceMetrics, mean_metrics};
 use super::record::{ControllerRecord, FilterRecord, TierRecord};
 use super::statistics::judged;
 use crate::race::barrier::FilterStatus;
+use crate::scenario::ledger::total;
 
 /// Slack from which a barrier counts as relaxed, m^2.
 const RELAXED: f32 = 1e-6;
@@ -116,7 +117,6 @@ impl Summary {
 
     /// Adds what was decided in a race.
     fn add_steps(&mut self, race: &RaceLog) {
-        let mut spent = self.tiers.beta_deviation;
         for (t, counts) in self.tiers.occupancy.iter_mut().enumerate() {
             match race.steps.get(t).map(|step| step.tier) {
                 Some(Some(tier)) => counts[usize::from(tier)] += 1,
@@ -130,8 +130,6 @@ impl Summary {
             self.non_finite_samples += u64::from(step.non_finite);
             self.plans.add(step);
             self.tiers.growth_refused += u64::from(step.refused);
-            spent += step.beta;
-            self.tiers.beta_total += step.beta;
             if let Some(ball) = step.ball {
                 self.tiers.growth_calls += 1;
                 self.tiers.growth_verified += u64::from(ball.verified);
@@ -147,7 +145,10 @@ impl Summary {
                 self.filter.failed += u64::from(failed);
             }
         }
+        let betas = || race.steps.iter().map(|step| step.beta);
+        let spent = total(std::iter::once(self.tiers.beta_deviation).chain(betas()));
         self.tiers.beta_race = self.tiers.beta_race.max(spent);
+        self.tiers.beta_total = total(std::iter::once(self.tiers.beta_total).chain(betas()));
     }
 
     /// Means over the control steps that had a plan: effective samples, and the smallest cost of a

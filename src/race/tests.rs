@@ -82,7 +82,8 @@ pub(super) fn study_starts(count: usize) -> Vec<[f32; 12]> {
 fn certificates(system: &DroneRace) -> Settings {
     let spec = RolloutSpec::new(30, 0.95).unwrap();
     let mut settings = Settings::new(&Model::of(*system), [0.0; 12], spec).expect("twelve states");
-    settings.constants = ConstantSettings { target: Some(14.15), constraint: Some(14.43) };
+    settings.constants =
+        ConstantSettings { target: Some(14.15), constraint: Some(14.43), ..Default::default() };
     settings.deviation.radius = 0.02;
     (settings.deviation.scenarios, settings.deviation.pilot) = (66, 32);
     let values = |low: f32, count: u16| (0..count).map(|i| low + 0.2 * f32::from(i)).collect();

@@ -6,12 +6,14 @@ mod lanes;
 mod scalar;
 pub(crate) mod simd;
 mod vector;
+mod wide;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use lanes::Lanes;
 pub(crate) use lanes::per_lane;
 pub(crate) use vector::{Vector, load_rows, store_rows};
+pub(crate) use wide::Wide;
 
 /// A real number as far as a system, cost or policy formula may know it.
 ///

@@ -5,7 +5,7 @@ use super::palette;
 use super::sets;
 use super::shell::{self, HATCH, Scripts, items};
 use super::table;
-use super::text::{escape, number, upper};
+use super::text::{escape, upper};
 use super::words::{self, Verdict};
 use crate::rollout::PairControl;
 use crate::scenario::record::{GrowthOutcome, Record};
@@ -74,7 +74,7 @@ fn card(verdict: &Verdict) -> String {
     let (class, mark, status) =
         if verdict.obtained { ("good", "✓", "obtained") } else { ("bad", "✗", "not obtained") };
     let beta = verdict.claim.map_or_else(String::new, |claim| {
-        format!("Confidence 1 − {} over the draw.", number(claim.beta))
+        format!("Confidence 1 − {} over the draw.", upper(claim.beta))
     });
     format!(
         "<section class=\"card claim {class}\"><h2>{}</h2>\

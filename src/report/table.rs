@@ -48,10 +48,10 @@ pub(crate) fn claims(record: &Record) -> String {
         "Claims",
         &[
             row("quantity", &|claim| claim.name.clone()),
-            row("certified risk", &|claim| upper(claim.certified_risk)),
-            row("risk asked for, epsilon", &|claim| number(claim.stated_risk())),
-            row("one minus confidence, beta", &|claim| number(claim.beta)),
-            row("beta of this draw", &|claim| number(claim.beta_used)),
+            row("risk obtained", &|claim| upper(claim.certified_risk)),
+            row("risk asked for, epsilon", &|claim| or_dash(claim.epsilon.map(upper))),
+            row("one minus confidence, beta", &|claim| upper(claim.beta)),
+            row("beta of this draw", &|claim| upper(claim.beta_used)),
             row("scenarios N", &|claim| count(claim.scenarios)),
             row("failures k", &|claim| count(claim.failures)),
             row("decision variables d", &|claim| claim.decision_vars.to_string()),
@@ -103,7 +103,16 @@ fn setting(record: &Record) -> String {
 }
 
 fn constants(record: &Record) -> String {
-    let head = ["constant", "used", "from", "computed bound", "largest sampled gradient"];
+    let head = [
+        "constant",
+        "used",
+        "from",
+        "computed bound",
+        "largest sampled gradient",
+        "assumes continuity",
+        "hulls",
+    ];
+    let flag = |flag: Option<bool>| or_dash(flag.map(|flag| if flag { "yes" } else { "no" }));
     let rows = [
         ("L_r of the target margin", &record.constants.target),
         ("L_c of the constraint margin", &record.constants.constraint),
@@ -111,10 +120,12 @@ fn constants(record: &Record) -> String {
     .map(|(name, constant)| {
         vec![
             name.to_owned(),
-            number(constant.used),
+            upper(constant.used),
             constant.source.clone(),
             upper(constant.computed),
-            number(constant.sampled),
+            lower(constant.sampled),
+            flag(constant.assumed_continuous),
+            flag(constant.hulled),
         ]
     });
     let [target, constraint] = rows;
@@ -127,14 +138,17 @@ fn deviation(record: &Record) -> String {
     pairs(
         "Deviation bound",
         &[
-            ("radius around a nominal start", number(deviation.radius)),
+            ("radius around a nominal start", lower(deviation.radius)),
             ("perturbed rollouts", words::control(deviation.control).to_owned()),
             ("joint over the steps", words::joint(deviation.joint).to_owned()),
             ("bound that tightens the margins", words::source(deviation.source).to_owned()),
             ("pilot pairs", count(deviation.pilot)),
             ("scale of the fixed shape", or_dash(deviation.scale.map(upper))),
             ("support scenarios", count(deviation.support)),
-            ("a posteriori risk (wait and judge)", upper(deviation.posterior_risk)),
+            (
+                "a posteriori risk (wait and judge; if no two pairs set the bound together)",
+                upper(deviation.posterior_risk),
+            ),
             ("pairs not finite", count(deviation.non_finite)),
         ],
     )
@@ -153,7 +167,7 @@ fn certified_set(record: &Record) -> String {
             ("perturbed starts that reach the target", count(global.reached)),
             ("failures that are not finite", count(global.non_finite)),
             ("measured f32 error of the measure", upper(global.f32_error)),
-            ("band of f64 re-runs", number(global.band)),
+            ("band of f64 re-runs", lower(global.band)),
             ("f64 re-runs", count(global.f64_reruns)),
         ],
     )
@@ -165,7 +179,7 @@ fn state(record: &Record) -> String {
         "The state of slice and growth",
         &[
             ("tier", words::tier(state.tier).to_owned()),
-            ("V_check", number(state.check_margin)),
+            ("V_check", lower(state.check_margin)),
             ("target margin", number(state.target_margin)),
             ("constraint margin", number(state.constraint_margin)),
         ],
@@ -180,7 +194,7 @@ fn growth(record: &Record) -> String {
             ("centre from", words::boundary(growth.boundary).to_owned()),
             ("distance of the centre from the state", or_dash(growth.distance.map(number))),
             ("radius of the verified ball", lower(growth.radius)),
-            ("volume of the verified ball", number(growth.volume)),
+            ("volume of the verified ball", lower(growth.volume)),
             ("coordinates that vary", {
                 growth.varies.iter().filter(|&&varies| varies).count().to_string()
             }),
@@ -193,10 +207,10 @@ fn rounds(record: &Record) -> String {
     let rows = record.growth.rounds.iter().enumerate().map(|(index, round)| {
         vec![
             (index + 1).to_string(),
-            number(round.radius),
+            lower(round.radius),
             count(round.scenarios),
             count(round.failures),
-            or_dash(round.nearest_failure.map(number)),
+            or_dash(round.nearest_failure.map(lower)),
             count(round.non_finite),
             count(round.f64_reruns),
         ]
@@ -211,7 +225,7 @@ fn rounds(record: &Record) -> String {
 fn ledger(record: &Record) -> String {
     let head = ["claim", "item", "beta spent"].map(str::to_owned).to_vec();
     let row = |claim: &str, item: &str, beta| vec![claim.to_owned(), item.to_owned(), beta];
-    let lines = record.ledger.iter().map(|line| row(&line.claim, &line.item, number(line.beta)));
+    let lines = record.ledger.iter().map(|line| row(&line.claim, &line.item, upper(line.beta)));
     let total = row("total", "", upper(record.beta_total));
     let rows: Vec<_> = std::iter::once(head).chain(lines).chain([total]).collect();
     table("Ledger of beta", &rows)
@@ -234,11 +248,16 @@ fn provenance(record: &Record) -> String {
 fn system(record: &Record) -> String {
     let head =
         ["state", "unit", "box low", "box high", "at the state", "ball centre", "in the ball"];
+    let region = record.constants.region.as_ref();
+    let extra = region.map_or(&[][..], |_| &["constants from", "constants to"]);
+    let side = |ends: &[f32], index: usize, outwards: fn(f64) -> String| {
+        or_dash(ends.get(index).map(|&end| outwards(end.into())))
+    };
     let at = |x: &[f32], index: usize| or_dash(x.get(index).map(|&value| number(value.into())));
     let rows = record.system.states.iter().enumerate().map(|(index, axis)| {
         let center = record.growth.center.as_deref().unwrap_or_default();
         let varies = record.growth.varies.get(index).copied().unwrap_or(true);
-        vec![
+        let mut row = vec![
             axis.name.clone(),
             axis.unit.clone(),
             number(axis.low.into()),
@@ -246,10 +265,14 @@ fn system(record: &Record) -> String {
             at(&record.state.x, index),
             at(center, index),
             if varies { "varies" } else { "frozen" }.to_owned(),
-        ]
+        ];
+        // Rounded inwards: the constants hold there.
+        row.extend(region.map(|region| side(&region.low, index, upper)));
+        row.extend(region.map(|region| side(&region.high, index, lower)));
+        row
     });
     let controls = record.system.controls.iter().map(|axis| {
-        vec![
+        let mut row = vec![
             format!("control {}", axis.name),
             axis.unit.clone(),
             number(axis.low.into()),
@@ -257,9 +280,11 @@ fn system(record: &Record) -> String {
             "–".to_owned(),
             "–".to_owned(),
             "–".to_owned(),
-        ]
+        ];
+        row.extend(extra.iter().map(|_| "–".to_owned()));
+        row
     });
-    let head = head.map(str::to_owned).to_vec();
+    let head: Vec<String> = head.iter().chain(extra).map(|&name| name.to_owned()).collect();
     table(
         "States and controls",
         &std::iter::once(head).chain(rows).chain(controls).collect::<Vec<_>>(),
@@ -273,7 +298,7 @@ pub(crate) fn steps(record: &Record) -> String {
     let mut head = vec!["step".to_owned(), "bound used".to_owned(), "largest seen".to_owned()];
     head.extend(exact.map(|_| "exact supremum".to_owned()));
     let rows = deviation.bound.iter().enumerate().map(|(step, &bound)| {
-        let at = |series: &[f64]| or_dash(series.get(step).map(|&value| number(value)));
+        let at = |series: &[f64]| or_dash(series.get(step).map(|&value| upper(value)));
         let mut row = vec![step.to_string(), upper(bound), at(&deviation.largest)];
         row.extend(exact.map(at));
         row

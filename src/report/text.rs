@@ -1,24 +1,8 @@
-//! Text for the page: escaping, and numbers with the rounding that keeps a claim true.
+//! Text for the page: escaping, counts and shares in words.
 
 use std::fmt::Display;
 
-/// Beyond this a number stands for "not finite": `rollout::HUGE`, also discounted or scaled.
-const ORDINARY: f64 = 1.0e20;
-/// Significant digits after the first.
-const DIGITS: usize = 3;
-
-/// Which way the last digit goes.
-#[derive(Clone, Copy, PartialEq)]
-enum Rounding {
-    Nearest,
-    Up,
-    Down,
-}
-
-/// Whether `value` is a number that can be drawn.
-pub(crate) fn ordinary(value: f64) -> bool {
-    value.abs() < ORDINARY
-}
+pub(crate) use crate::rounding::{interval, lower, number, ordinary, upper};
 
 /// `text` with the characters that mean something to HTML replaced.
 pub(crate) fn escape(text: &str) -> String {
@@ -87,26 +71,6 @@ fn common_beginning(texts: &[&str]) -> usize {
     rest.iter().map(shared).min().unwrap_or(0)
 }
 
-/// Four significant digits, to the nearest.
-pub(crate) fn number(value: f64) -> String {
-    rounded(value, Rounding::Nearest)
-}
-
-/// Four significant digits, never below `value`: for risks and bounds.
-pub(crate) fn upper(value: f64) -> String {
-    rounded(value, Rounding::Up)
-}
-
-/// Four significant digits, never above `value`: for certified radii and lower ends.
-pub(crate) fn lower(value: f64) -> String {
-    rounded(value, Rounding::Down)
-}
-
-/// `[low, high]`, rounded outwards.
-pub(crate) fn interval([low, high]: [f64; 2]) -> String {
-    format!("{} to {}", lower(low), upper(high))
-}
-
 /// A count with a comma after every third digit.
 pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
@@ -135,6 +99,11 @@ pub(crate) fn percents(shares: [f64; 2]) -> String {
     format!("{}\u{a0}%", interval(shares.map(|share| 100.0 * share)))
 }
 
+/// The most that a share can be, in percent.
+pub(crate) fn most_percent(share: f64) -> String {
+    format!("{}\u{a0}%", upper(100.0 * share))
+}
+
 /// A number with true minus signs, after which no line breaks.
 pub(crate) fn minus(number: &str) -> String {
     number.replace('-', "−")
@@ -154,63 +123,9 @@ pub(crate) fn listed(items: &[String]) -> String {
     }
 }
 
-fn rounded(value: f64, rounding: Rounding) -> String {
-    if !ordinary(value) {
-        return "not finite".to_owned();
-    }
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let (mut mantissa, mut exponent) = scientific(value);
-    let shown = decimal(mantissa, exponent);
-    // A decimal such as 0.1 is not its own double; only a real difference moves the last digit.
-    let slack = value.abs() * 1e-12;
-    match rounding {
-        Rounding::Up if shown < value - slack => mantissa += 1,
-        Rounding::Down if shown > value + slack => mantissa -= 1,
-        _ => {}
-    }
-    if mantissa.abs() == 10_i64.pow(DIGITS as u32 + 1) {
-        mantissa /= 10;
-        exponent += 1;
-    }
-    written(mantissa, exponent)
-}
-
-/// `value` as `mantissa * 10^(exponent - DIGITS)`.
-fn scientific(value: f64) -> (i64, i32) {
-    let text = format!("{value:.DIGITS$e}");
-    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    let mantissa = mantissa.replace('.', "").parse().unwrap_or(0);
-    (mantissa, exponent.parse().unwrap_or(0))
-}
-
-fn decimal(mantissa: i64, exponent: i32) -> f64 {
-    format!("{mantissa}e{}", exponent - DIGITS as i32).parse().unwrap_or(0.0)
-}
-
-fn written(mantissa: i64, exponent: i32) -> String {
-    let value = decimal(mantissa, exponent);
-    if (-4..6).contains(&exponent) {
-        let places = usize::try_from(DIGITS as i32 - exponent).unwrap_or(0);
-        return trimmed(&format!("{value:.places$}"));
-    }
-    let text = format!("{value:.DIGITS$e}");
-    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    format!("{}e{exponent}", trimmed(mantissa))
-}
-
-/// Without the zeros that end a decimal fraction.
-fn trimmed(text: &str) -> String {
-    if !text.contains('.') {
-        return text.to_owned();
-    }
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{count, escape, interval, lower, number, shorten, told_apart, upper};
+    use super::{count, escape, shorten, told_apart};
 
     #[test]
     fn cut_texts_are_told_apart() {
@@ -229,30 +144,6 @@ mod tests {
         short.sort();
         short.dedup();
         assert_eq!(short.len(), 500);
-    }
-
-    #[test]
-    fn numbers_are_short_and_rounded_the_safe_way() {
-        assert_eq!(number(0.1), "0.1");
-        assert_eq!(number(-2.0), "-2");
-        assert_eq!(number(0.042_791), "0.04279");
-        assert_eq!(upper(0.042_791), "0.0428");
-        assert_eq!(upper(0.1), "0.1");
-        assert_eq!(upper(0.3 - 0.1), "0.2");
-        assert_eq!(lower(0.369_99), "0.3699");
-        assert_eq!(upper(-0.369_99), "-0.3699");
-        assert_eq!(upper(0.999_91), "1");
-        assert_eq!(number(1e-9), "1e-9");
-        assert_eq!(number(1.234_56e9), "1.235e9");
-        assert_eq!(number(43_447.0), "43450");
-        assert_eq!(interval([0.123_46, 0.123_46]), "0.1234 to 0.1235");
-    }
-
-    #[test]
-    fn what_is_not_finite_says_so() {
-        for value in [f64::NAN, f64::INFINITY, -1e30, 14.0 * 1e30] {
-            assert_eq!(number(value), "not finite");
-        }
     }
 
     #[test]

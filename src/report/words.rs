@@ -78,13 +78,17 @@ fn whole_box(found: &BoxRecord) -> Verdict<'_> {
 
 fn deviation(record: &Record) -> Verdict<'_> {
     let claim = &record.deviation.claim;
+    let void = record.deviation.non_finite > 0;
     Verdict {
         title: "Deviation bound",
-        obtained: claim.is_obtained(),
-        headline: format!("risk ≤ {}", upper(claim.certified_risk)),
+        obtained: claim.is_obtained() && !void,
+        headline: match void {
+            true => "none".to_owned(),
+            false => format!("risk ≤ {}", upper(claim.certified_risk)),
+        },
         detail: format!(
             "Chance that a start within {} drifts further than the bound; {} was asked for.",
-            upper(record.deviation.radius),
+            lower(record.deviation.radius),
             upper(claim.stated_risk())
         ),
         claim: Some(claim),
@@ -96,7 +100,7 @@ fn global(record: &Record) -> Verdict<'_> {
     let found = global.accepted > 0;
     Verdict {
         title: "Certified set",
-        obtained: found && global.claim.is_obtained(),
+        obtained: found && global.claim.is_obtained() && record.constants_stand(),
         headline: if found {
             format!("risk ≤ {}", upper(global.claim.certified_risk))
         } else {

@@ -13,6 +13,7 @@ mod planning;
 mod region;
 pub mod replay;
 mod sample;
+pub(crate) mod side_by_side;
 mod spec;
 mod starts;
 mod tally;

@@ -19,7 +19,7 @@ pub fn states<R: Real>(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Vec<R>
 
 /// Reach-avoid measure of `start` in f64, with tightened margins.
 pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
-    fold(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
+    fold_states(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
 }
 
 /// The margins of the rollout from `start` in f64, `[T + 1]`.
@@ -115,9 +115,8 @@ fn margins<'a>(model: &Model, states: impl Iterator<Item = &'a [f64]>) -> Vec<Ma
     (0..).zip(states).map(at).collect()
 }
 
-/// Folds the margins of `states`; a state that is not finite, or a margin that is no number, fails
-/// the rollout from there on.
-pub(crate) fn fold(
+/// Reach-avoid measure of `states`.
+pub(crate) fn fold_states(
     model: &Model,
     states: &[Vec<f64>],
     spec: &RolloutSpec,
@@ -128,8 +127,18 @@ pub(crate) fn fold(
 
 /// Reach-avoid measure of the margins of a rollout, `[T + 1]`, tightened.
 pub fn measure_of(margins: &[Margins], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
+    fold(margins.iter().copied(), spec, tightening)
+}
+
+/// Folds the margins of states in order; a state that is not finite, or a margin that is no number, fails
+/// the rollout from there on.
+pub(super) fn fold(
+    steps: impl Iterator<Item = Margins>,
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f64 {
     let mut fold = Fold::new();
-    for (t, margins) in margins.iter().enumerate() {
+    for (t, margins) in steps.enumerate() {
         let target = tightening.acted(margins.target, tightening.target[t]);
         let constraint = tightening.acted(margins.constraint, tightening.constraint[t]);
         if target.is_nan() || constraint.is_nan() {

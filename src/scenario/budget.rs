@@ -2,8 +2,27 @@
 
 use super::ledger::{Entry, Ledger, Spend};
 use super::record::Spending;
-use super::settings::Settings;
+use super::settings::{DeviationSettings, Joint, Settings};
 use crate::error::{Error, Result};
+
+impl DeviationSettings {
+    /// What the deviation bound spends over `horizon` steps: bounds of each step on its own are so many
+    /// claims, each with its own beta. The one rule of certificates, races and sweeps.
+    pub fn spent(&self, horizon: u32) -> f64 {
+        match self.joint {
+            Joint::Separate => f64::from(horizon) * self.beta,
+            Joint::FixedShape | Joint::Variables | Joint::Bonferroni => self.beta,
+        }
+    }
+}
+
+/// What the line of the deviation bound is of.
+fn bound_of(joint: Joint) -> &'static str {
+    match joint {
+        Joint::Separate => "bounds of each step",
+        Joint::FixedShape | Joint::Variables | Joint::Bonferroni => "bound",
+    }
+}
 
 /// The ledger of all claims; growth books every round it may take.
 pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
@@ -14,10 +33,11 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
         settings.whole_box.map(|asked| ("box", "interval of the failing share", asked.beta));
     let more: Vec<_> = whole_box.into_iter().chain(drops_claims(settings)).collect();
     let of_more: f64 = more.iter().map(|(.., beta)| beta).sum();
-    let budget = settings.deviation.beta + 2.0 * global + of_more + rounds * growth.round_beta();
+    let deviation = settings.deviation.spent(settings.spec.horizon);
+    let budget = deviation + 2.0 * global + of_more + rounds * growth.round_beta();
     let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
     let claims = [
-        ("deviation", "bound", settings.deviation.beta),
+        ("deviation", bound_of(settings.deviation.joint), deviation),
         ("global", "conditional failure", global),
         ("global", "interval of the certified share", global),
     ];

@@ -63,8 +63,6 @@ pub fn certify(
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
-    let mut statements = claims::statements(settings, &deviation, &global, &growth);
-    statements.extend(claims::of_the_box(whole_box.as_ref()));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + whole_box.as_ref().map_or(0, |found| found.draws)
         + slice.check_margin.len() as u64
@@ -72,8 +70,8 @@ pub fn certify(
     let mut record = Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
-        holds: claims::holds(&deviation, &global, &growth) && claims::box_holds(whole_box.as_ref()),
-        statements,
+        holds: false,
+        statements: Vec::new(),
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),
         horizon: settings.spec.horizon,
@@ -94,8 +92,8 @@ pub fn certify(
         events: backend.events(),
         timing: Timing { wall_seconds: 0.0, threads: 0, rollouts },
     };
-    record.statements.extend(sets::statements(&record, settings.global.draws));
-    record.statements.extend(claims::of_samples(plant, settings, &record.picture));
+    record.statements = claims::statements(plant, settings, &record);
+    record.holds = claims::holds(&record);
     record.timing.rollouts += sets::rollouts(&record);
     record.timing.wall_seconds = begun.elapsed().as_secs_f64();
     Ok(record)

@@ -1,65 +1,68 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
 use super::box_record::BoxRecord;
-use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
-use super::sampling;
+use super::record::{GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record};
 use super::settings::Settings;
+use super::{empty, probe, sampling, sets, side};
 use crate::model::Plant;
-use crate::rollout::{HUGE, StateList};
+use crate::rollout::StateList;
+use crate::rounding::{lower, upper};
 
 /// Whether every claim that is asked for was obtained.
-pub(super) fn holds(
-    deviation: &DeviationRecord,
-    global: &GlobalRecord,
-    growth: &GrowthRecord,
-) -> bool {
-    deviation.non_finite == 0
+pub(super) fn holds(record: &Record) -> bool {
+    let Record { deviation, global, growth, .. } = record;
+    record.constants_stand()
+        && deviation.non_finite == 0
         && global.accepted > 0
-        && (global.claim.epsilon.or(deviation.claim.epsilon))
-            .is_some_and(|asked| global.claim.certified_risk <= asked)
+        && global.claim.is_obtained()
         && growth.outcome == GrowthOutcome::Verified
+        && box_holds(record.whole_box.as_ref())
 }
 
 /// Whether the risk of the whole box is at most the one asked for, where one was.
-pub(super) fn box_holds(found: Option<&BoxRecord>) -> bool {
+fn box_holds(found: Option<&BoxRecord>) -> bool {
     found.is_none_or(|found| found.claim.is_obtained())
 }
 
 /// What is said of the whole box: its claim, and whether that is more than was asked for.
-pub(super) fn of_the_box(found: Option<&BoxRecord>) -> Option<String> {
+fn of_the_box(found: Option<&BoxRecord>) -> Option<String> {
     found.map(|found| match box_holds(Some(found)) {
         true => found.claim.statement.clone(),
         false => format!(
             "{} That is above the risk of {} that was asked for.",
             found.claim.statement,
-            found.claim.stated_risk()
+            upper(found.claim.stated_risk())
         ),
     })
 }
 
-/// The claims in words.
-pub(super) fn statements(
-    settings: &Settings,
-    deviation: &DeviationRecord,
-    global: &GlobalRecord,
-    growth: &GrowthRecord,
-) -> Vec<String> {
+/// The claims in words, and what is to be said beside them.
+pub(super) fn statements(plant: &Plant, settings: &Settings, record: &Record) -> Vec<String> {
+    let Record { constants, deviation, global, growth, picture, .. } = record;
+    let model = &*plant.model;
     let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
     let mut statements: Vec<String> =
         claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
     statements.insert(2, share_statement(global, settings));
+    statements.extend(of_the_box(record.whole_box.as_ref()));
+    statements.extend(sets::statements(record, settings.global.draws));
+    if global.accepted == 0 {
+        statements.extend(empty::reasons(model, record, &settings.spec));
+    }
     statements.extend(growth_statement(growth));
-    statements.extend(broken_statement(deviation));
+    statements.extend(side::statement(model, settings, growth));
+    // Margin drops rest on no constant.
+    if record.drops.is_none() {
+        statements.extend(constants.statements());
+    }
+    statements.extend(probe::statement(global));
+    statements.extend(of_samples(plant, settings, picture));
     statements
 }
 
 /// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is
 /// too coarse for them.
-pub(super) fn of_samples(
-    plant: &Plant,
-    settings: &Settings,
-    picture: &PictureRecord,
-) -> Vec<String> {
+fn of_samples(plant: &Plant, settings: &Settings, picture: &PictureRecord) -> Vec<String> {
     let size = settings.state.len();
     let first = |x: &&Vec<f32>| x.len() == size;
     let firsts = picture.rollouts.iter().filter_map(|rollout| rollout.states.first());
@@ -69,29 +72,18 @@ pub(super) fn of_samples(
 
 /// The certified share of the box in words.
 fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
-    let [low, high] = global.share_interval;
+    let [low, high] = global.share_interval.map(|share| 100.0 * share);
     let (inside, draws) =
         global.share.map_or((global.accepted, global.draws), |share| (share.inside, share.draws));
     format!(
-        "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
+        "With confidence 1 - {}, the certified set holds between {} % and {} % of the box \
          ({} of {} starts).",
         settings.global.beta,
-        100.0 * low,
-        100.0 * high,
+        lower(low),
+        upper(high),
         inside,
         draws
     )
-}
-
-/// That rollouts of the deviation bound met states that are not finite.
-fn broken_statement(deviation: &DeviationRecord) -> Option<String> {
-    let (broken, pairs) = (deviation.non_finite, deviation.claim.scenarios);
-    (broken > 0).then(|| {
-        format!(
-            "The deviation bound is none: {broken} of {pairs} pairs met a state that is not finite, \
-             which counts as a distance of {HUGE:e}; no claim follows from it."
-        )
-    })
 }
 
 /// What came of the growth, where it is not a claim.

@@ -1,11 +1,10 @@
 //! Compares a stored record with the one computed again from its seed, field by field.
 
-use std::collections::BTreeSet;
-
 use serde_json::Value;
 
 use super::finding::{Figure, Finding};
 use super::record::{Record, SCHEMA};
+use super::settings::Joint;
 
 /// Difference, relative to the larger number or to one, that another device's rounding may make.
 const TOLERANCE: f64 = 1e-3;
@@ -22,9 +21,10 @@ const FREE: [&str; 6] = [
     "provenance.version",
 ];
 /// Fields that are measured on the device, or that put its numbers into words.
-const OF_THE_DEVICE: [&str; 9] = [
+const OF_THE_DEVICE: [&str; 10] = [
     "statements",
     "global.f32_error",
+    "global.f32_apart",
     "global.band",
     "global.f64_reruns",
     "growth.rounds",
@@ -34,8 +34,11 @@ const OF_THE_DEVICE: [&str; 9] = [
     "whole_box.pairs",
 ];
 /// Fields that each version of the record has its own way of.
-const OF_THE_VERSION: [&str; 3] =
-    ["schema", "provenance.physics_sha256", "provenance.policy_sha256"];
+const OF_THE_VERSION: [&str; 4] =
+    ["schema", "provenance.physics_sha256", "provenance.policy_sha256", "global.claim.epsilon"];
+/// Fields that are another thing since schema 3 where the steps are bounded separately: each step has
+/// its own beta.
+const OF_SEPARATE_STEPS: [&str; 2] = ["ledger", "beta_total"];
 /// Counts of rollouts, in which a measure may have crossed zero.
 const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
 
@@ -58,6 +61,7 @@ pub(super) fn fields(stored: &Record, again: &Record) -> Finding {
     let mut walk = Walk {
         same_version,
         same_device,
+        separate: again.deviation.joint == Joint::Separate,
         draws: again.global.draws as f64,
         differences: Vec::new(),
     };
@@ -83,6 +87,7 @@ fn finding(differences: Vec<String>) -> Finding {
 struct Walk {
     same_version: bool,
     same_device: bool,
+    separate: bool,
     draws: f64,
     differences: Vec<String>,
 }
@@ -97,14 +102,17 @@ impl Walk {
         if under(&FREE)
             || (!self.same_device && under(&OF_THE_DEVICE))
             || (!self.same_version && under(&OF_THE_VERSION))
+            || (!self.same_version && self.separate && under(&OF_SEPARATE_STEPS))
         {
             return;
         }
         match (was, is) {
             (Value::Object(was_map), Value::Object(is_map)) => {
-                // A field that one of them lacks is named, too.
-                let keys: BTreeSet<&String> = was_map.keys().chain(is_map.keys()).collect();
-                for key in keys {
+                // What an older version has no field for is not looked for in it.
+                let same_version = self.same_version;
+                let new = |key: &&String| same_version && !was_map.contains_key(*key);
+                let added = is_map.keys().filter(new);
+                for key in was_map.keys().chain(added) {
                     let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
                     let [was, is] =
                         [was_map, is_map].map(|map| map.get(key).unwrap_or(&Value::Null));

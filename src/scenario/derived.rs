@@ -1,13 +1,12 @@
 //! What of a record follows from its settings and its own counts, without a rollout.
 
 use super::budget::{ledger, spendings};
-use super::claims::{box_holds, holds, of_samples, of_the_box, statements};
-use super::constants::constants;
+use super::claims::{holds, statements};
 use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{deviation, global, growth, sets, whole_box};
+use super::{constants, deviation, global, growth, sets, whole_box};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::GENERATOR;
@@ -30,7 +29,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.provenance.physics_sha256 = physics_sha256;
     record.provenance.policy_sha256 = policy_sha256;
     record.system = system_record(model, settings);
-    record.constants = constants(model, settings)?;
+    record.constants = constants::derived(model, settings, &stored.constants)?;
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;
     match &settings.drops {
         Some(asked) => sets::rederived(model, settings, asked, &mut record)?,
@@ -42,12 +41,8 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);
-    record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
-    record.statements.extend(of_the_box(record.whole_box.as_ref()));
-    record.statements.extend(sets::statements(&record, settings.global.draws));
-    record.statements.extend(of_samples(plant, settings, &record.picture));
-    record.holds = holds(&record.deviation, &record.global, &record.growth)
-        && box_holds(record.whole_box.as_ref());
+    record.statements = statements(plant, settings, &record);
+    record.holds = holds(&record);
     Ok(record)
 }
 

@@ -14,6 +14,7 @@ use crate::rollout::{
     DeviationTask, Farthest, HUGE, Keep, PairControl, PairTally, Pairs, Purpose, Region,
     RolloutSpec, Starts, Stream, Tightening,
 };
+use crate::rounding::{complement, upper};
 
 /// Draws the pairs and bounds the deviation; method and numbers as `settings` ask.
 pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecord> {
@@ -64,7 +65,13 @@ fn record(
         _ => bound,
     };
     Ok(DeviationRecord {
-        claim: claim(model, settings, program)?,
+        claim: match non_finite {
+            0 => claim(model, settings, program)?,
+            broken => {
+                let statement = broken_statement(broken, asked.scenarios);
+                Claim { statement, ..claim(model, settings, program)? }
+            }
+        },
         // As it was written: 0.1, not 0.10000000149.
         radius: decimal(asked.radius),
         control: asked.control,
@@ -189,6 +196,14 @@ fn conclude(
     (bound.collect(), Some(scale), 1)
 }
 
+/// That pairs met states that are not finite, so that there is no claim.
+fn broken_statement(broken: u64, pairs: u64) -> String {
+    format!(
+        "The deviation bound is none: {broken} of {pairs} pairs met a state that is not finite, which counts \
+         as a distance of {HUGE:e}; no claim follows from it."
+    )
+}
+
 /// The claim in words and numbers.
 fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim> {
     let asked = &settings.deviation;
@@ -203,11 +218,18 @@ fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim>
         PairControl::Replay => "the same controls replayed",
         PairControl::ClosedLoop => "the policy in feedback on both",
     };
+    let beta = asked.beta;
+    let confidence = match asked.joint {
+        Joint::Separate => format!(
+            "With confidence 1 - {beta} for each step, and 1 - {} for all {horizon} of them",
+            upper(asked.spent(horizon))
+        ),
+        _ => format!("With confidence 1 - {beta}"),
+    };
     let confidence = format!(
-        "With confidence 1 - {}, a fresh pair stays within the scenario bound {joint} with \
-         probability at least {}, {driven}.",
-        asked.beta,
-        1.0 - asked.epsilon
+        "{confidence}, a fresh pair stays within the scenario bound {joint} with probability at least {}, \
+         {driven}.",
+        complement(asked.epsilon)
     );
     let statement = match asked.source {
         DeviationSource::Scenario => confidence,

@@ -4,14 +4,18 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::rounding::{interval, lower, upper};
+
 /// One side of a finding; plain numbers are numbers in JSON too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Figure {
     /// A number of rollouts.
     Count(u64),
-    /// A number.
-    Number(#[serde(with = "crate::files::number")] f64),
+    /// A number whose upper side is the safe one: a risk, a bound, a constant.
+    Upper(#[serde(with = "crate::files::number")] f64),
+    /// A number whose lower side is the safe one: a radius.
+    Lower(#[serde(with = "crate::files::number")] f64),
     /// Whether something is so.
     Flag(bool),
     /// Lower and upper end.
@@ -40,12 +44,13 @@ impl fmt::Display for Figure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Count(count) => write!(f, "{count}"),
-            Self::Number(number) => write!(f, "{number:.6}"),
+            Self::Upper(number) => f.write_str(&upper(*number)),
+            Self::Lower(number) => f.write_str(&lower(*number)),
             Self::Flag(flag) => write!(f, "{flag}"),
-            Self::Interval([low, high]) => write!(f, "{low:.6} to {high:.6}"),
-            Self::AtMost { at_most } => write!(f, "at most {at_most:.6}"),
+            Self::Interval(ends) => f.write_str(&interval(*ends)),
+            Self::AtMost { at_most } => write!(f, "at most {}", upper(*at_most)),
             Self::Trials { failures, trials, at_least } => {
-                write!(f, "{failures} of {trials}: at least {at_least:.6}")
+                write!(f, "{failures} of {trials}: at least {}", lower(*at_least))
             }
             Self::Words(words) => f.write_str(words),
         }
@@ -70,14 +75,16 @@ pub struct Finding {
 pub struct CheckReport {
     /// Whether every finding holds.
     pub holds: bool,
+    /// Seed of the fresh samples that the claims were tried on.
+    pub fresh_seed: u64,
     /// One by one.
     pub findings: Vec<Finding>,
 }
 
 impl CheckReport {
     /// The report of these findings.
-    pub(super) fn new(findings: Vec<Finding>) -> Self {
-        Self { holds: findings.iter().all(|finding| finding.holds), findings }
+    pub(super) fn new(fresh_seed: u64, findings: Vec<Finding>) -> Self {
+        Self { holds: findings.iter().all(|finding| finding.holds), fresh_seed, findings }
     }
 
     /// Adds what was found beside.

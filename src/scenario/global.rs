@@ -1,13 +1,12 @@
 //! The certified set: `V_check` of any states, over a slice, and its conditional failure.
 
-use rayon::prelude::*;
-
 use super::Context;
 use super::bound::{certified_risk, interval};
 use super::coordinates::{Coordinates, coordinates};
 use super::drops::pairs;
 use super::drops_record::{SequenceOutcome, SequenceRecord, ShareRecord};
-use super::finding::{Figure, Finding};
+use super::pairs_f64;
+use super::probe::{PROBES, Probe, probe};
 use super::purpose;
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord, finite_margin};
 use super::settings::Settings;
@@ -17,9 +16,8 @@ use crate::rollout::{
     DeviationTask, Keep, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
     RolloutSpec, Starts, StateList, States, Stream, Tightening, replay,
 };
+use crate::rounding::upper;
 
-/// Pairs that are run in f32 and f64 to measure the f32 error.
-const ERROR_SAMPLE: u64 = 128;
 /// The band around zero that is run again in f64, in measured errors.
 const BAND_FACTOR: f64 = 8.0;
 /// The least band: rounding of a margin of order 10 in f32.
@@ -127,13 +125,14 @@ pub fn conditional(
         control: settings.deviation.control,
     };
     context.watch.begin("certified set", draws);
-    let f32_error = f32_error(context, &task)?;
-    let mut count = Count { band: band_of(f32_error), ..Count::default() };
+    let probe = probe(context, &task)?;
+    let mut count = Count { band: band_of(probe.error), ..Count::default() };
     context.program.deviation(&task, &mut |first, pairs| {
         count.add(context.plant(), &task, first, pairs);
         context.watch.advance(pairs.len() as u64)
     })?;
-    conclude(context.model(), settings, &count, f32_error)
+    let record = conclude(context.model(), settings, &count, probe.error)?;
+    Ok(GlobalRecord { f32_apart: Some(probe.apart), ..record })
 }
 
 /// What `stored` says as its own counts and `settings` give it.
@@ -145,7 +144,8 @@ pub(super) fn derived(
     let GlobalRecord { accepted, reached, non_finite, f32_error, f64_reruns, .. } = *stored;
     let (band, failures) = (band_of(f32_error), stored.claim.failures);
     let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
-    conclude(model, settings, &count, f32_error)
+    let record = conclude(model, settings, &count, f32_error)?;
+    Ok(GlobalRecord { f32_apart: stored.f32_apart, ..record })
 }
 
 /// Claim and intervals that the counts support.
@@ -164,12 +164,7 @@ fn conclude(
     let states = model.states.len();
     let claim = Claim {
         name: "global".to_owned(),
-        statement: format!(
-            "With confidence 1 - {beta}, a perturbed rollout whose nominal start is drawn from the \
-             box and certified fails with probability at most {risk:.6} \
-             ({} of {} such rollouts failed).",
-            count.failures, count.accepted
-        ),
+        statement: statement(count, draws, beta, risk),
         measure: format!(
             "nominal start uniform in the certified part of the box, {dimension} of {states} \
              coordinates varying; perturbed start uniform in the Euclidean ball of radius {} around \
@@ -181,7 +176,8 @@ fn conclude(
         scenarios: count.accepted,
         failures: count.failures,
         decision_vars: 1,
-        epsilon: None,
+        // The certified set is to be as safe as the bound that it rests on.
+        epsilon: Some(settings.deviation.epsilon),
         beta,
         beta_used: beta,
         required_simple: None,
@@ -198,6 +194,7 @@ fn conclude(
         reached: count.reached,
         non_finite: count.non_finite,
         f32_error,
+        f32_apart: None,
         band: count.band,
         f64_reruns: count.f64_reruns,
         share: None,
@@ -214,8 +211,8 @@ pub(super) struct ChosenSet<'a> {
     pub(super) reached: u64,
     /// Perturbed rollouts that failed for a state that is not finite.
     pub(super) non_finite: u64,
-    /// Measured f32 error of the measure with the set's tightening.
-    pub(super) f32_error: f64,
+    /// How far measures with the set's tightening lie from f64.
+    pub(super) probe: Probe,
     /// Draws decided in f64.
     pub(super) f64_reruns: u64,
 }
@@ -226,37 +223,38 @@ pub(super) fn of_sequence(
     settings: &Settings,
     chosen: &ChosenSet<'_>,
 ) -> Result<GlobalRecord> {
-    let &ChosenSet { sequence, share, reached, non_finite, f32_error, f64_reruns } = chosen;
+    let &ChosenSet { sequence, share, reached, non_finite, probe, f64_reruns } = chosen;
     let level = sequence.levels.get(sequence.chosen);
     let accepted = level.and_then(|level| level.accepted).unwrap_or_default();
     let failures = level.and_then(|level| level.failures).unwrap_or_default();
-    let band = band_of(f32_error);
+    let band = band_of(probe.error);
     let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
-    let mut global = conclude(model, settings, &count, f32_error)?;
+    let mut global = conclude(model, settings, &count, probe.error)?;
     if sequence.outcome != SequenceOutcome::Single {
         (global.claim.epsilon, global.claim.required_exact) = (sequence.risk, sequence.required);
     }
     global.share_interval = share.interval;
     global.volume_interval = share.interval.map(|end| end * global.box_volume);
     global.share = Some(share);
+    global.f32_apart = Some(probe.apart);
     Ok(global)
 }
 
-/// The f32 error of the measure with `tightening`, measured on pairs drawn from the box.
-pub(super) fn measured_error(
-    context: Context<'_>,
-    settings: &Settings,
-    tightening: &Tightening,
-) -> Result<f64> {
-    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-    let task = DeviationTask {
-        pairs: pairs(settings, purposes)?,
-        range: 0..ERROR_SAMPLE,
-        spec: settings.spec,
-        tightening,
-        control: settings.deviation.control,
-    };
-    f32_error(context, &task)
+/// The claim in words; of an empty set there is none.
+fn statement(count: &Count, draws: u64, beta: f64, risk: f64) -> String {
+    if count.accepted == 0 {
+        return format!(
+            "No claim is made about rollouts from the certified set: it holds none of {draws} nominal \
+             starts that were drawn from the box."
+        );
+    }
+    format!(
+        "With confidence 1 - {beta}, a perturbed rollout whose nominal start is drawn from the box and \
+         certified fails with probability at most {} ({} of {} such rollouts failed).",
+        upper(risk),
+        count.failures,
+        count.accepted
+    )
 }
 
 /// Counts over the pairs.
@@ -271,29 +269,41 @@ struct Count {
 }
 
 impl Count {
-    /// Adds the pairs `first..`; a measure within the band is run again in f64.
+    /// Adds the pairs `first..`: those that are certified, or of which a measure is within the band, as
+    /// f64 has them. Whether a start is certified is for f64 to say within the band alone.
     fn add(&mut self, plant: &Plant, task: &DeviationTask<'_>, first: u64, pairs: &[PairMeasure]) {
-        for (index, pair) in (first..).zip(pairs) {
-            let (mut nominal, mut perturbed) = (f64::from(pair.nominal), f64::from(pair.perturbed));
-            if nominal.abs() <= self.band || perturbed.abs() <= self.band {
-                (nominal, perturbed) = pair_f64(plant, task, index);
-                self.f64_reruns += 1;
-            }
-            self.reached += u64::from(perturbed > 0.0);
-            self.non_finite += u64::from(perturbed == f64::from(NON_FINITE));
-            if nominal > 0.0 {
-                self.accepted += 1;
-                self.failures += u64::from(perturbed <= 0.0);
-            }
+        let band = self.band;
+        let near = |pair: &PairMeasure| {
+            [pair.nominal, pair.perturbed].iter().any(|measure| f64::from(measure.abs()) <= band)
+        };
+        let again = |pair: &PairMeasure| pair.nominal > 0.0 || near(pair);
+        let numbered = (first..).zip(pairs);
+        let indices = numbered.filter(|(_, pair)| again(pair)).map(|(index, _)| index);
+        let indices: Vec<u64> = indices.collect();
+        let mut doubles = pairs_f64::measures(plant, task, &indices).into_iter();
+        for pair in pairs {
+            let single = [pair.nominal, pair.perturbed].map(f64::from);
+            let double = again(pair).then(|| doubles.next()).flatten();
+            self.f64_reruns += u64::from(double.is_some());
+            let [nominal, perturbed] = match double {
+                Some(double) if near(pair) => double,
+                Some([_, perturbed]) => [single[0], perturbed],
+                None => single,
+            };
+            self.count(nominal, perturbed);
         }
     }
-}
 
-/// The measures of pair `index` in f64.
-fn pair_f64(plant: &Plant, task: &DeviationTask<'_>, index: u64) -> (f64, f64) {
-    let [nominal, perturbed] = task.pairs.pair(index);
-    let pair = [&*nominal, &*perturbed];
-    replay::pair_measures(plant, pair, &task.spec, task.tightening, task.control)
+    /// Counts a pair of these measures.
+    fn count(&mut self, nominal: f64, perturbed: f64) {
+        self.reached += u64::from(perturbed > 0.0);
+        self.non_finite += u64::from(perturbed == f64::from(NON_FINITE));
+        if nominal > 0.0 {
+            self.accepted += 1;
+            // What is no number failed.
+            self.failures += u64::from(perturbed.is_nan() || perturbed <= 0.0);
+        }
+    }
 }
 
 /// The band around zero that a measured f32 error asks for.
@@ -304,32 +314,22 @@ pub(super) fn band_of(f32_error: f64) -> f64 {
 /// The band around zero within which measures are run again in f64, from the f32 error measured
 /// on pairs drawn from the box.
 pub fn band(context: Context<'_>, settings: &Settings, tightening: &Tightening) -> Result<f64> {
-    Ok(band_of(measured_error(context, settings, tightening)?))
+    Ok(band_of(probed(context, settings, tightening)?.error))
 }
 
-/// The largest distance of an f32 measure from f64 over the first pairs, those that are finite.
-pub(super) fn f32_error(context: Context<'_>, task: &DeviationTask<'_>) -> Result<f64> {
-    let (range, plant) = (0..ERROR_SAMPLE.min(task.range.end), context.plant());
-    let sample = DeviationTask { range: range.clone(), ..task.clone() };
-    let pairs = context.program.tally_pairs(&sample, Keep::Measures)?.finish(range)?.values;
-    let finite = |a: f64, b: f32| {
-        if b == NON_FINITE || a == f64::from(NON_FINITE) { 0.0 } else { (a - f64::from(b)).abs() }
+/// How far measures with `tightening` lie from f64, on pairs drawn from the box.
+pub(super) fn probed(
+    context: Context<'_>,
+    settings: &Settings,
+    tightening: &Tightening,
+) -> Result<Probe> {
+    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
+    let task = DeviationTask {
+        pairs: pairs(settings, purposes)?,
+        range: 0..PROBES,
+        spec: settings.spec,
+        tightening,
+        control: settings.deviation.control,
     };
-    let error = |(index, pair): (usize, &PairMeasure)| {
-        let (nominal, perturbed) = pair_f64(plant, task, index as u64);
-        finite(nominal, pair.nominal).max(finite(perturbed, pair.perturbed))
-    };
-    Ok(pairs.par_iter().enumerate().map(error).reduce(|| 0.0, f64::max))
-}
-
-/// Whether the certified shares of two independent samples are compatible.
-pub(super) fn share_overlaps(stored: &GlobalRecord, fresh: &GlobalRecord) -> Finding {
-    let [low, high] = stored.share_interval;
-    let [fresh_low, fresh_high] = fresh.share_interval;
-    Finding {
-        name: "certified share on fresh pairs".to_owned(),
-        stored: Figure::Interval(stored.share_interval),
-        found: Figure::Interval(fresh.share_interval),
-        holds: low <= fresh_high && fresh_low <= high,
-    }
+    probe(context, &task)
 }

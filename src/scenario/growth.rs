@@ -7,11 +7,13 @@ use super::coordinates::{Coordinates, coordinates};
 use super::purpose;
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
+use super::spacing::is_fine;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{
     Ball, NON_FINITE, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
 };
+use crate::rounding::{complement, lower};
 
 /// Starts of the last round that are kept for the picture.
 const KEPT_SAMPLES: u64 = 400;
@@ -91,8 +93,8 @@ pub fn grow(
                 let outcome = Growth::Verified(ball);
                 return Ok(GrowthRun { outcome, rounds, samples });
             }
-            Some(distance) => match next_radius(asked, number, distance) {
-                Some(radius) => ball.radius = radius,
+            Some(distance) => match next_ball(asked, number, &ball, distance) {
+                Some(next) => ball = next,
                 None => break,
             },
         }
@@ -101,12 +103,18 @@ pub fn grow(
     Ok(GrowthRun { outcome, rounds, samples })
 }
 
-/// The radius of the round after `number`, whose nearest failure was that far; none after the
-/// last round, and where nothing is left.
-pub(super) fn next_radius(asked: &GrowthSettings, number: u32, nearest: f64) -> Option<f32> {
+/// The ball of the round after `number`, whose nearest failure was that far; none after the last round,
+/// and where nothing is left that f32 has points enough for.
+pub(super) fn next_ball(
+    asked: &GrowthSettings,
+    number: u32,
+    ball: &Ball,
+    nearest: f64,
+) -> Option<Ball> {
     // Rounded down: the failure itself stays outside.
-    let next = (nearest as f32 > 0.0).then(|| (nearest as f32).next_down());
-    next.filter(|_| number + 1 < asked.rounds)
+    let radius = (nearest as f32).next_down();
+    let next = Ball { radius, ..ball.clone() };
+    Some(next).filter(|next| number + 1 < asked.rounds && next.radius > 0.0 && is_fine(next))
 }
 
 /// Refuses fewer starts than one clean round needs.
@@ -197,8 +205,8 @@ pub(super) fn derived(
     let mut ball = Ball { center, radius: asked.radius, varies: asked.varies.to_vec() };
     for (number, round) in (0..).zip(&mut record.rounds) {
         (round.radius, round.scenarios) = (decimal(ball.radius), asked.scenarios);
-        let next = round.nearest_failure.and_then(|far| next_radius(asked, number, far));
-        ball.radius = next.unwrap_or(ball.radius);
+        let next = round.nearest_failure.and_then(|far| next_ball(asked, number, &ball, far));
+        ball = next.unwrap_or(ball);
     }
     if record.rounds.last().is_some_and(|round| round.failures == 0) {
         verified(&mut record, model, settings, ball)?;
@@ -269,12 +277,12 @@ fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(
-            "With confidence 1 - {}, a start drawn from the verified ball of radius {:.4} reaches \
+            "With confidence 1 - {}, a start drawn from the verified ball of radius {} reaches \
              the target safely within {} steps with probability at least {}{}.",
             asked.beta,
-            ball.radius,
+            lower(decimal(ball.radius)),
             settings.spec.horizon,
-            1.0 - asked.epsilon,
+            complement(asked.epsilon),
             if asked.split_beta || asked.rounds == 1 {
                 ""
             } else {
@@ -282,8 +290,8 @@ fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
             }
         ),
         measure: format!(
-            "start uniform in the Euclidean ball of radius {:.4} in {}",
-            ball.radius,
+            "start uniform in the Euclidean ball of radius {} in {}",
+            lower(decimal(ball.radius)),
             match dimension {
                 all if all == states => format!("all {states} coordinates"),
                 some => format!(

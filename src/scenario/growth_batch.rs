@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Context;
-use super::growth::{Growth, check_scenarios, next_radius};
+use super::growth::{Growth, check_scenarios, next_ball};
 use super::purpose;
 use super::settings::Settings;
 use crate::error::Result;
@@ -77,9 +77,9 @@ pub fn grow_each(
             .into_iter()
             .zip(std::mem::take(&mut balls))
             .for_each(|(nearest, mut open)| {
-                let next = nearest.and_then(|nearest| next_radius(asked, number, nearest));
-                if let Some(radius) = next {
-                    open.ball.radius = radius;
+                let next = nearest.and_then(|far| next_ball(asked, number, &open.ball, far));
+                if let Some(ball) = next {
+                    open.ball = ball;
                     balls.push(open);
                 } else {
                     let request = open.request;

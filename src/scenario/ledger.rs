@@ -7,6 +7,12 @@ use crate::error::Error;
 /// Slack of the budget, relative: M rounds of `beta / M` must fit in `beta` in spite of rounding.
 const ROUNDING: f64 = 1e-12;
 
+/// What betas come to: by the union bound, the chance that any of so many claims is wrong. Certificates,
+/// races and sweeps sum with this.
+pub fn total(betas: impl IntoIterator<Item = f64>) -> f64 {
+    betas.into_iter().sum()
+}
+
 /// One expense: a chance `beta` of being wrong, and what it was taken for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
@@ -94,7 +100,7 @@ impl Ledger {
 
     /// What has been spent.
     pub fn total(&self) -> f64 {
-        self.entries.iter().map(|entry| entry.beta).sum()
+        total(self.entries.iter().map(|entry| entry.beta))
     }
 
     /// The expenses, in order.

@@ -4,6 +4,7 @@ use super::drops_settings::DropSettings;
 use super::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings,
 };
+use super::spacing;
 use crate::error::{Error, Result};
 
 /// Most rollouts or pairs of a sample: a fast GPU's work of a day.
@@ -31,6 +32,14 @@ pub(crate) fn positive(key: &str, value: f64) -> Result<f64> {
     Err(Error::invalid(key, format!("{value} is not a positive number")))
 }
 
+/// `value`, finite and at least 0.
+pub(crate) fn not_negative(key: &str, value: f64) -> Result<f64> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(value);
+    }
+    Err(Error::invalid(key, format!("{value} is not 0 or a positive number")))
+}
+
 /// `value` as an f32, finite and above 0.
 pub(crate) fn positive_f32(key: &str, value: f64) -> Result<f32> {
     let single = value as f32;
@@ -56,12 +65,12 @@ fn sample_size(key: &str, count: u64) -> Result<()> {
 }
 
 impl ConstantSettings {
-    /// Refuses a constant that is given and not positive.
+    /// Refuses a constant that is given and below 0, or not finite; 0 is that of a constant margin.
     pub(crate) fn check(&self) -> Result<()> {
         for (key, given) in
             [("constants.target", self.target), ("constants.constraint", self.constraint)]
         {
-            given.map_or(Ok(0.0), |value| positive(key, value))?;
+            given.map_or(Ok(0.0), |value| not_negative(key, value))?;
         }
         Ok(())
     }
@@ -130,7 +139,8 @@ impl Settings {
         self.global.check()?;
         self.whole_box.map_or(Ok(()), |asked| asked.check())?;
         self.drops.as_ref().map_or(Ok(()), DropSettings::check)?;
-        self.growth.check()
+        self.growth.check()?;
+        spacing::check(self)
     }
 }
 
@@ -196,7 +206,7 @@ mod tests {
         refused("slice.y: its values", &|s| {
             s.slice.iter_mut().for_each(|axes| axes[1].values.clear());
         });
-        refused("constants.target: 0 is not", &|s| s.constants.target = Some(0.0));
+        refused("constants.target: -1 is not", &|s| s.constants.target = Some(-1.0));
         refused("constants.constraint: NaN", &|s| s.constants.constraint = Some(f64::NAN));
         refused("deviation.radius: 0 is not", &|s| s.deviation.radius = 0.0);
         refused("deviation.radius: NaN is not", &|s| s.deviation.radius = f32::NAN);
@@ -211,6 +221,8 @@ mod tests {
         refused("growth.scenarios: 0 is not", &|s| s.growth.scenarios = 0);
         refused("growth.epsilon: NaN is not", &|s| s.growth.epsilon = f64::NAN);
         refused("growth.beta: 2 is not", &|s| s.growth.beta = 2.0);
+        refused("deviation.radius: 0.0001 is below 4.76", &|s| s.deviation.radius = 1e-4);
+        refused("growth.radius: 0.0001 is below 4.76", &|s| s.growth.radius = 1e-4);
         refused("growth.varies: no coordinate", &|s| s.growth.varies = vec![false; 2]);
     }
 }

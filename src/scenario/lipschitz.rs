@@ -63,7 +63,8 @@ pub fn margins(model: &Model, region: MarginBox<'_>) -> MarginConstants {
 /// Largest slopes of the margins along their own numerical gradients at `count` random states.
 ///
 /// Half of the coordinates are drawn at the ends of the box, where slopes are often largest. Each
-/// figure is a slope between two states of the box, so up to rounding no constant is below it.
+/// figure is a slope between two states of the box, less what rounding may have added: a constant
+/// below it is wrong.
 pub fn sampled(model: &Model, region: MarginBox<'_>, count: u32, seed: u64) -> SampledSlopes {
     let slopes = |index: u32| {
         let (start, step) = (state(region, index, seed), index % (region.horizon + 1));
@@ -102,6 +103,8 @@ fn state(MarginBox { low, high, .. }: MarginBox<'_>, index: u32, seed: u64) -> V
 fn slope(region: MarginBox<'_>, start: &[f64], margin: &mut dyn FnMut(&[f64]) -> f64) -> f64 {
     // Large against the rounding of the margins (1e-16 of their size), small against the box.
     const STEP: f64 = 1e-5;
+    // Roundings that a margin may be off by.
+    const DOUBT: f64 = 64.0;
     let within = |i: usize, x: f64| x.clamp(f64::from(region.low[i]), f64::from(region.high[i]));
     let mut x = start.to_vec();
     let mut gradient = vec![0.0; start.len()];
@@ -129,7 +132,10 @@ fn slope(region: MarginBox<'_>, start: &[f64], margin: &mut dyn FnMut(&[f64]) ->
     if apart < STEP {
         return 0.0;
     }
-    (margin(&ahead) - margin(&back)).abs() / apart
+    let (above, below) = (margin(&ahead), margin(&back));
+    // Both are rounded, at the size of what they were computed from.
+    let size = start.iter().copied().chain([above, below]).map(f64::abs).fold(1.0, f64::max);
+    (((above - below).abs() - DOUBT * f64::EPSILON * size) / apart).max(0.0)
 }
 
 fn length(vector: impl Iterator<Item = f64>) -> f64 {

@@ -40,3 +40,7 @@ pub const FRESH_SHARE: Purpose = Purpose::numbered(34);
 pub const CALIBRATION_NOMINAL: Purpose = Purpose::numbered(35);
 /// Their perturbations.
 pub const CALIBRATION_PERTURBATION: Purpose = Purpose::numbered(36);
+/// Nominal starts that the deviation bound of a stored certificate is checked with.
+pub const FRESH_NOMINAL: Purpose = Purpose::numbered(24);
+/// Their perturbations.
+pub const FRESH_PERTURBATION: Purpose = Purpose::numbered(25);

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::box_record::BoxRecord;
 pub use super::claim::Claim;
+pub use super::constant_record::{Assumption, ConstantRecord, ConstantsRecord, VisitedRecord};
 use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
@@ -105,6 +106,12 @@ impl Record {
         let sets = first.chain(whole_box).chain(drops).chain(calibration);
         sets.chain(&self.growth.claim).collect()
     }
+
+    /// Whether nothing speaks against the Lipschitz constants, where the certified set rests on them:
+    /// margin drops rest on none.
+    pub fn constants_stand(&self) -> bool {
+        self.drops.is_some() || self.constants.stand()
+    }
 }
 
 /// Who computed what from which input.
@@ -143,33 +150,6 @@ pub struct SystemRecord {
     pub controls: Vec<Axis>,
     /// What a picture shows.
     pub bodies: Vec<Body>,
-}
-
-/// The Lipschitz constants that tighten the margins.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ConstantsRecord {
-    /// `L_r` of the target margin.
-    pub target: ConstantRecord,
-    /// `L_c` of the constraint margin.
-    pub constraint: ConstantRecord,
-}
-
-/// One Lipschitz constant.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ConstantRecord {
-    /// The constant used, Euclidean norm over all states.
-    #[serde(with = "crate::files::number")]
-    pub used: f64,
-    /// Where it comes from: `computed` (gradient bound over the box) or `given`.
-    pub source: String,
-    /// The computed bound, also where a given constant is used; infinite where none could be shown.
-    #[serde(with = "crate::files::number::or_infinite")]
-    pub computed: f64,
-    /// Largest gradient among random points: a lower estimate.
-    #[serde(with = "crate::files::number")]
-    pub sampled: f64,
 }
 
 /// The deviation bound, `docs/method.md` section 3.
@@ -236,10 +216,13 @@ pub struct GlobalRecord {
     /// Measured f32 error of the measure: sample maximum against f64.
     #[serde(with = "crate::files::number")]
     pub f32_error: f64,
+    /// Pairs among those whose measure in f64 is that of another rollout; unknown before schema 3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f32_apart: Option<u64>,
     /// Measures within this distance of zero were run again in f64.
     #[serde(with = "crate::files::number")]
     pub band: f64,
-    /// How many were.
+    /// Pairs that were run again in f64: those, and all whose nominal start is certified.
     pub f64_reruns: u64,
     /// The fresh starts that the share is from, where the set was chosen among several; else it is from
     /// the draws.

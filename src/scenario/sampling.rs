@@ -2,12 +2,11 @@
 
 use crate::model::Plant;
 use crate::rollout::{States, replay};
+use crate::rounding::{lower, number, upper};
 use crate::system::{Axis, Body, Feature};
 
 /// Share of the longest step of a coordinate from which on the spacing of its numbers is told.
 const SHARE: f64 = 0.01;
-/// Digits of a figure in a sentence, after the first.
-const DIGITS: i32 = 2;
 
 /// What is to be said of rollouts from `starts`: that nothing is looked at between samples, with the
 /// farthest that something moves within a step, and where f32 loses the motion.
@@ -26,11 +25,11 @@ fn between(count: usize, moved: Option<Moved>, feature: Option<Feature>) -> Stri
         "States are looked at only at the samples, and nothing is said of what lies between two of them"
             .to_owned();
     if let Some(Moved { what, step }) = &moved {
-        let step = short(*step);
+        let step = upper(*step);
         text += &format!("; in {count} rollouts, {what} moves up to {step} m in a step");
     }
     if let Some(Feature { name, width }) = &feature {
-        let wide = short(f64::from(*width));
+        let wide = lower(f64::from(*width));
         text += &format!(", and the smallest feature, {name}, is {wide} m wide");
     }
     text.push('.');
@@ -99,10 +98,10 @@ fn lost(axes: &[Axis], rollouts: &[Vec<Vec<f64>>]) -> Option<String> {
             "CAUTION: around {name} = {} {unit} numbers of f32 lie {} apart, {} % of the longest step \
              of {name} ({}), and what is smaller is lost; give coordinates relative to an origin \
              nearby.",
-            short(most),
-            short(spacing),
-            short(100.0 * spacing / step),
-            short(step)
+            number(most),
+            upper(spacing),
+            upper(100.0 * spacing / step),
+            number(step)
         )
     })
 }
@@ -111,19 +110,6 @@ fn lost(axes: &[Axis], rollouts: &[Vec<Vec<f64>>]) -> Option<String> {
 pub(crate) fn spacing(value: f64) -> f64 {
     let single = value.abs() as f32;
     f64::from(single.next_up()) - f64::from(single)
-}
-
-/// A figure with a few digits.
-fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    let exponent = value.abs().log10().floor() as i32;
-    match DIGITS - exponent {
-        decimals @ 0..=8 => format!("{value:.*}", decimals as usize),
-        -7..0 => format!("{value:.0}"),
-        _ => format!("{value:.2e}"),
-    }
 }
 
 #[cfg(test)]
@@ -142,7 +128,7 @@ mod tests {
         // From 1.5 m/s away from the origin the mass slows down: its first step, 0.15 m, is the longest.
         let text = said(&[[0.1, 1.5]], 0.25);
         assert_eq!(text.len(), 1, "{text:?}");
-        for words in ["only at the samples", "position moves up to 0.150 m", "is 0.500 m wide."] {
+        for words in ["only at the samples", "position moves up to 0.1501 m", "is 0.5 m wide."] {
             assert!(text[0].contains(words), "{words}: {}", text[0]);
         }
         assert!(!text[0].contains("leap over"), "{}", text[0]);
@@ -155,7 +141,7 @@ mod tests {
         assert_eq!(said(&[[1000.0, 0.5]], 0.25).len(), 1);
         let far = said(&[[1e5, 0.5]], 0.25);
         assert!(far[1].contains("position = 100000 m"), "{}", far[1]);
-        assert!(far[1].contains("lie 0.00781 apart"), "{}", far[1]);
+        assert!(far[1].contains("lie 0.007813 apart"), "{}", far[1]);
         assert!(far[1].contains("relative to an origin"), "{}", far[1]);
         // Velocity stays below the acceleration of 3 s: it is nowhere near.
         assert!(!far[1].contains("velocity"), "{}", far[1]);
@@ -166,11 +152,5 @@ mod tests {
         assert_eq!(spacing(1.0), f64::from(f32::EPSILON));
         assert_eq!(spacing(2e7), 2.0);
         assert_eq!(spacing(-1.5), f64::from(f32::EPSILON));
-    }
-
-    #[test]
-    fn figures_are_short() {
-        let texts = [0.0714321, 12.345, 123456.7, 1.5e-12, 0.0].map(short);
-        assert_eq!(texts, ["0.0714", "12.3", "123457", "1.50e-12", "0"]);
     }
 }

@@ -5,6 +5,7 @@ use super::drops_record::{
     CalibrationRecord, DropsRecord, SeenRecord, SequenceOutcome, SequenceRecord, ShareRecord,
 };
 use super::drops_settings::DropSettings;
+use super::probe::{Probe, probe};
 use super::record::{GlobalRecord, Record};
 use super::sequence::{Counts, Failed, Levels, derived, test};
 use super::settings::Settings;
@@ -64,13 +65,13 @@ pub(super) fn sets(
             Ok::<_, Error>(CalibrationRecord { share, ..record })
         })
         .transpose()?;
-    let error = global::measured_error(context, settings, &tightened.tightening)?;
+    let probe = global::probed(context, settings, &tightened.tightening)?;
     let chosen = global::ChosenSet {
         sequence: &sequence,
         share,
         reached: tally.reached,
         non_finite: tally.non_finite,
-        f32_error: error,
+        probe,
         f64_reruns: tally.f64_reruns,
     };
     let global = global::of_sequence(context.model(), settings, &chosen)?;
@@ -124,10 +125,11 @@ pub(super) fn rederived(
         record.calibration = Some(derived);
     }
     if let (Some(sequence), Some(share)) = (&record.sequence, &record.global.share) {
-        let GlobalRecord { reached, non_finite, f32_error, f64_reruns, .. } = record.global;
+        let GlobalRecord { reached, non_finite, f32_error, f64_reruns, f32_apart, .. } =
+            record.global;
+        let probe = Probe { error: f32_error, apart: f32_apart.unwrap_or_default() };
         let share = ShareRecord::new(share.inside, asked.share_draws, beta);
-        let chosen =
-            global::ChosenSet { sequence, share, reached, non_finite, f32_error, f64_reruns };
+        let chosen = global::ChosenSet { sequence, share, reached, non_finite, probe, f64_reruns };
         record.global = global::of_sequence(model, settings, &chosen)?;
     }
     Ok(())
@@ -255,7 +257,7 @@ impl Tally {
             control: settings.deviation.control,
         };
         context.watch.begin("certified set", draws);
-        let band = global::band_of(global::f32_error(context, &task)?);
+        let band = global::band_of(probe(context, &task)?.error);
         let judge = Judge::new(context.plant(), settings, shapes, &levels.levels, band);
         let counts = Counts::new(levels.levels.len());
         let mut tally = Self { counts, reached: 0, non_finite: 0, f64_reruns: 0, band };

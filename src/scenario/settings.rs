@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
 use super::box_settings::BoxSettings;
+use super::constant_record::Assumption;
 use super::drops_settings::DropSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -37,12 +38,27 @@ pub enum DeviationSource {
 }
 
 /// Lipschitz constants of the margins: computed from the system, or given.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConstantSettings {
     /// `L_r`; computed if absent.
     pub target: Option<f64>,
     /// `L_c`; computed if absent.
     pub constraint: Option<f64>,
+    /// Where they are to hold.
+    pub region: ConstantRegion,
+    /// What is confirmed of the margins.
+    pub assume: Vec<Assumption>,
+}
+
+/// Where the Lipschitz constants are computed, section 4.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ConstantRegion {
+    /// On the hull of the states that pilot rollouts visit, widened.
+    #[default]
+    Visited,
+    /// On the box of starts, which rollouts may leave: certificates before schema 3.
+    Box,
 }
 
 /// The deviation bound, section 3.

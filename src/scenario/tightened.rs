@@ -23,7 +23,7 @@ pub(super) fn tightening(
 /// [`crate::Error::TooFewScenarios`] and [`crate::Error::Invalid`] before any work; those of the backend.
 pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened> {
     Region::new_box(&*settings.low, &*settings.high)?;
-    let constants = constants(context.model(), settings)?;
+    let constants = constants(context, settings)?;
     let deviation = deviation::bound(context, settings)?;
     let drops = settings.drops.as_ref();
     let drops = drops.map(|asked| drops::bound(context, settings, asked)).transpose()?;

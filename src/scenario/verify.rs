@@ -2,28 +2,21 @@
 
 use serde::Serialize;
 
-use super::bound::lower_bound;
 use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
+use super::fresh;
 use super::origin::{Hashes, hashes, provenance};
-use super::purpose;
 use super::record::{HASHED_ALIKE, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
-use super::tier::{Tier, tier, verified_ball};
+use super::tier::{Tier, tier};
 use super::{Context, Unwatched, Watch, compare, global, sets, whole_box};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
-use crate::rollout::{
-    Ball, Keep, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
-};
+use crate::rollout::{Query, States};
 
-/// Fresh starts that a verified ball is tried with.
-const FRESH_STARTS: u64 = 20_000;
-/// Chance that a check calls a true claim false, each.
-const FALSE_ALARM: f64 = 1e-6;
 /// Relative difference of a recomputed bound that another device's rounding may make.
 const TOLERANCE: f64 = 1e-4;
 /// Share of the recomputed counts that another device's rounding may move across zero.
@@ -141,8 +134,8 @@ pub fn query(
     Ok(states.iter().zip(margins).map(row).collect())
 }
 
-/// Verifies a stored certificate: computes it again from its seed, and tries its claims on fresh
-/// scenarios.
+/// Verifies a stored certificate: computes it again from its seed, and tries its claims on scenarios of
+/// `fresh_seed`, which is to be another one each time, or the same again to repeat a check.
 ///
 /// A claim fails on fresh scenarios only if they refute it with confidence 1 - 1e-6.
 ///
@@ -152,6 +145,7 @@ pub fn check(
     program: &Program<'_>,
     record: &Record,
     settings: &Settings,
+    fresh_seed: u64,
     watch: &dyn Watch,
 ) -> Result<CheckReport> {
     check_identity(program.plant(), record)?;
@@ -161,39 +155,20 @@ pub fn check(
     let mut findings = recomputed(record, &again);
     findings.push(compare::fields(record, &again));
     findings.extend(not_compared(record));
-    let tightening = sets::tightening(record, &settings.spec);
-    let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
-    let fresh = global::conditional(context, settings, &tightening, purposes)?;
-    findings.push(refuted(
-        "conditional failure on fresh pairs",
-        record.global.claim.certified_risk,
-        fresh.claim.failures,
-        fresh.accepted,
-    ));
-    let share = global::share_overlaps(&record.global, &fresh);
-    findings.push(share);
-    if let Some(stored) = &record.whole_box {
-        let band = record.global.band;
-        let found = whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?;
-        findings.push(found);
-    }
-    if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
-        let failures = fresh_failures(context, settings, ball)?;
-        let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
-        findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
-    }
-    Ok(CheckReport::new(findings))
+    findings.extend(fresh::findings(context, record, settings, fresh_seed)?);
+    Ok(CheckReport::new(fresh_seed, findings))
 }
 
 /// Compares the stored record with the one computed again from its seed.
 fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
-    let number = |name: &str, stored: f64, found: f64| Finding {
+    let number = |side: fn(f64) -> Figure, name: &str, stored: f64, found: f64| Finding {
         name: name.to_owned(),
-        stored: Figure::Number(stored),
-        found: Figure::Number(found),
+        stored: side(stored),
+        found: side(found),
         // Two that are infinite have no difference.
         holds: stored == found || (stored - found).abs() <= TOLERANCE * stored.abs().max(1e-9),
     };
+    let (upper, lower) = (Figure::Upper, Figure::Lower);
     let count = |name: &str, stored: u64, found: u64, of: u64| Finding {
         name: name.to_owned(),
         stored: Figure::Count(stored),
@@ -212,16 +187,18 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
     let outcome = |record: &Record| Figure::Words(record.growth.outcome.name().to_owned());
     vec![
         number(
+            upper,
             "constant of the target margin",
             stored.constants.target.used,
             again.constants.target.used,
         ),
         number(
+            upper,
             "constant of the constraint margin",
             stored.constants.constraint.used,
             again.constants.constraint.used,
         ),
-        number("deviation bound, where it differs most", was, is),
+        number(upper, "deviation bound, where it differs most", was, is),
         count(
             "certified starts",
             stored.global.accepted,
@@ -235,39 +212,13 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
             again.global.draws,
         ),
         number(
+            upper,
             "conditional failure bound",
             stored.global.claim.certified_risk,
             again.global.claim.certified_risk,
         ),
         text("outcome of local growth", outcome(stored), outcome(again)),
-        number("radius of the verified ball", stored.growth.radius, again.growth.radius),
+        number(lower, "radius of the verified ball", stored.growth.radius, again.growth.radius),
         text("all claims obtained", Figure::Flag(stored.holds), Figure::Flag(again.holds)),
     ]
-}
-
-/// Whether `failures` of `trials` refute a risk of at most `risk`.
-fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
-    let least = lower_bound(failures, trials, FALSE_ALARM);
-    Finding {
-        name: name.to_owned(),
-        stored: Figure::AtMost { at_most: risk },
-        found: Figure::Trials { failures, trials, at_least: least },
-        holds: least <= risk,
-    }
-}
-
-/// Failures among fresh starts in the verified ball.
-fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
-    context.watch.begin("fresh starts in the ball", FRESH_STARTS);
-    let stream = Stream::new(settings.seed, purpose::CHECK, 1);
-    let tightening = Tightening::none(&settings.spec);
-    let task = ReachAvoidTask {
-        starts: Starts::Drawn { region: Region::Ball(ball), stream },
-        range: 0..FRESH_STARTS,
-        spec: settings.spec,
-        tightening: &tightening,
-        query: Query::Sign,
-    };
-    let advance = &mut |count| context.watch.advance(count);
-    Ok(context.program.tally_told(&task, Keep::Counts, advance)?.counts().failures())
 }

@@ -70,7 +70,11 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
         spec: RolloutSpec::new(horizon, 0.95).expect("spec"),
         low: axes.iter().map(|axis| axis.low).collect(),
         high: axes.iter().map(|axis| axis.high).collect(),
-        constants: ConstantSettings { target: Some(1.0), constraint: Some(1.0) },
+        constants: ConstantSettings {
+            target: Some(1.0),
+            constraint: Some(1.0),
+            ..Default::default()
+        },
         deviation: DeviationSettings {
             radius: 0.1,
             epsilon: 0.1,
@@ -104,7 +108,8 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
 /// x-y plane, growth in the ego's x and y.
 pub(crate) fn race_settings(system: &DroneRace) -> Settings {
     let mut settings = settings(system, 30);
-    settings.constants = ConstantSettings { target: Some(14.15), constraint: Some(14.43) };
+    settings.constants =
+        ConstantSettings { target: Some(14.15), constraint: Some(14.43), ..Default::default() };
     settings.deviation.radius = 0.02;
     let axes = [(0, -0.9, 0.1, 18_u16), (2, -2.6, 0.2, 13)];
     settings.slice = Some(axes.map(|(state, low, step, count)| SliceAxis {

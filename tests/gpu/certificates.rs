@@ -34,7 +34,7 @@ fn certificate(backend: &Backend) -> Record {
 fn holds(backend: &Backend, record: &Record) -> bool {
     let (plant, settings) = integrator();
     let program = backend.prepare(&plant).expect("a program");
-    let report = check(&program, record, &settings, &Unwatched).expect("a check");
+    let report = check(&program, record, &settings, 7, &Unwatched).expect("a check");
     report.findings.iter().filter(|finding| !finding.holds).for_each(|f| println!("{f:?}"));
     report.holds
 }

@@ -249,8 +249,15 @@ fn constants([target, constraint]: [f64; 2]) -> ConstantsRecord {
         source: "computed".to_owned(),
         computed: used,
         sampled: 0.998 * used,
+        assumed_continuous: Some(false),
+        hulled: Some(false),
     };
-    ConstantsRecord { target: constant(target), constraint: constant(constraint) }
+    ConstantsRecord {
+        target: constant(target),
+        constraint: constant(constraint),
+        region: None,
+        assumed: Vec::new(),
+    }
 }
 
 fn deviation(bound: &[f64], radius: f64, dimension: usize) -> DeviationRecord {
@@ -287,7 +294,6 @@ fn global(dimension: usize) -> GlobalRecord {
     GlobalRecord {
         claim: Claim {
             dimension,
-            epsilon: None,
             scenarios: 1377,
             failures: 4,
             required_simple: None,
@@ -302,6 +308,7 @@ fn global(dimension: usize) -> GlobalRecord {
         reached: 31_415,
         non_finite: 3,
         f32_error: 7.3e-7,
+        f32_apart: Some(0),
         band: 2.92e-6,
         f64_reruns: 17,
         share: None,

@@ -18,6 +18,7 @@ use crate::model::{Model, Plant};
 use crate::policy::{Activation, OutputActivation};
 use crate::report::train_html;
 use crate::rollout::{Purpose, Stream};
+use crate::rounding::number;
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, provenance, tightened};
 use crate::system::Axis;
@@ -214,14 +215,14 @@ fn text(record: &TrainRecord, files: &[PathBuf], seconds: f64) -> String {
     };
     let best = record.curve.iter().find(|point| point.iteration == record.best);
     for (name, score) in record.scores.iter().zip(best.iter().flat_map(|best| &best.scores)) {
-        line(format_args!("{name}: {score:.4}"));
+        line(format_args!("{name}: {}", number(*score)));
     }
     let early = if record.stopped_early { ", ended early" } else { "" };
     line(format_args!("best after {} of {} iterations{early}", record.best, record.total));
     for network in &record.networks {
         line(format_args!("{} {}", network.file, network.sha256));
     }
-    line(format_args!("{seconds:.1} s"));
+    line(format_args!("{} s", number(seconds)));
     for file in files {
         line(format_args!("{}", file.display()));
     }

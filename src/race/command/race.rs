@@ -18,6 +18,7 @@ use crate::race::page::race_html;
 use crate::race::record::{ControllerRecord, JudgedRecord, RaceRecord};
 use crate::race::run::{Experiment, RaceResults};
 use crate::race::timing::TimingRecord;
+use crate::rounding::{interval, number, upper};
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-race";
@@ -129,7 +130,7 @@ fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
     }
     let ceiling = |i: usize| {
         let share = record.starts.ceilings[i].safe as f64 / record.starts.count as f64;
-        format!("at most {:.1} %", 100.0 * share)
+        format!("at most {} %", upper(100.0 * share))
     };
     let [study, paper, rigorous] = [0, 1, 2].map(ceiling);
     line(format_args!(
@@ -143,7 +144,7 @@ fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
     for note in &record.notes {
         line(format_args!("note: {note}"));
     }
-    line(format_args!("\n{:.1} s on {}", timing.wall_seconds, record.provenance.device));
+    line(format_args!("\n{} s on {}", number(timing.wall_seconds), record.provenance.device));
     for file in files {
         line(format_args!("{}", file.display()));
     }
@@ -152,12 +153,12 @@ fn text(record: &RaceRecord, timing: &Timing, files: &[PathBuf]) -> String {
 
 /// A rate with its interval.
 fn rate(judged: &JudgedRecord) -> String {
-    let [low, high] = judged.interval.map(|end| 100.0 * end);
-    format!("{:.1} % ({low:.1} to {high:.1})", 100.0 * judged.rate)
+    let ends = judged.interval.map(|end| 100.0 * end);
+    format!("{} % ({})", number(100.0 * judged.rate), interval(ends))
 }
 
 /// The published rate.
 fn published(controller: &ControllerRecord) -> String {
     let published = controller.judged[0].published;
-    published.map_or_else(String::new, |published| format!("{:.1} %", 100.0 * published.rate))
+    published.map_or_else(String::new, |published| format!("{} %", number(100.0 * published.rate)))
 }

@@ -43,7 +43,8 @@ pub(crate) fn config(profile: Profile) -> Config {
         speed_limit: profile == Profile::Study,
     };
     let mut config = common(profile, Some(system), &states, &RACE_STATE, slice);
-    config.constants = ConstantsSection { target: given(10.0), constraint: given(20.0) };
+    config.constants =
+        ConstantsSection { target: given(10.0), constraint: given(20.0), ..config.constants };
     config.growth.heading = names(["ego_x", "ego_vx", "ego_y", "ego_vy"]);
     config.study = Some(section::race(profile));
     config.train = Some(train::race());

@@ -5,7 +5,7 @@ use super::words::{self, points};
 use crate::race::judge::Judge;
 use crate::race::record::{ControllerRecord, JudgedRecord, RaceRecord};
 use crate::report::shell::Headline;
-use crate::report::text::{count, counted, listed, minus, percent, percents, upper};
+use crate::report::text::{count, counted, listed, minus, most_percent, percent, percents, upper};
 
 /// One headline per judge that judged the leading controller.
 pub(super) fn headlines(record: &RaceRecord) -> Vec<Headline> {
@@ -40,7 +40,7 @@ fn details(record: &RaceRecord, judged: &JudgedRecord) -> Vec<String> {
         let starts = count(record.starts.count);
         details.push(format!(
             "Ceiling: {}; {} of {starts} starts are safe before anyone moves.",
-            percent(share),
+            most_percent(share),
             count(safe)
         ));
     }
@@ -211,5 +211,10 @@ fn comparisons(record: &RaceRecord) -> Option<String> {
     let judged = record.controllers.iter().flat_map(|controller| &controller.judged);
     let comparisons = judged.filter(|judged| judged.against_hybrid.is_some()).count();
     (comparisons > 1)
-        .then(|| format!("None of the {comparisons} p-values is corrected for there being others."))
+        .then(|| {
+            format!(
+                "None of the {comparisons} p-values and intervals of differences is corrected for there \
+                 being others."
+            )
+        })
 }

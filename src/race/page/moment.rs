@@ -240,7 +240,7 @@ fn dash() -> String {
 fn check(frame: &FrameRecord) -> String {
     frame.check_margin.map_or_else(dash, |margin| {
         let meaning = if margin > 0.0 { "certified" } else { "not certified" };
-        format!("{}, {meaning}", minus(&number(margin.into())))
+        format!("{}, {meaning}", minus(&lower(margin.into())))
     })
 }
 
@@ -256,7 +256,7 @@ fn ball(frame: &FrameRecord) -> String {
         let outcome = if ball.verified { "verified" } else { "not verified" };
         let rounds = counted(ball.rounds as usize, "round", "rounds");
         let radius = f64::from(ball.radius);
-        let radius = if ball.verified { lower(radius) } else { number(radius) };
+        let radius = lower(radius);
         format!("radius {radius} m, {outcome} after {rounds}")
     })
 }

@@ -6,7 +6,7 @@ use crate::race::judge::Judge;
 use crate::race::record::{ControllerRecord, JudgedRecord, PublishedRecord, RaceRecord};
 use crate::report::figure::{Figure, Swatch};
 use crate::report::sheet::{Anchor, Sheet, WIDTH, panels};
-use crate::report::text::{ordinary, percent, percents, shorten};
+use crate::report::text::{most_percent, ordinary, percent, percents, shorten};
 
 /// Left end of the scale.
 const LEFT: f64 = 8.0;
@@ -76,7 +76,7 @@ fn shifted(drawing: &str) -> String {
 fn caption(record: &RaceRecord, judges: &[Judge]) -> String {
     let rules = judges.iter().map(|&judge| {
         let ceiling = words::ceiling(record, judge).map_or_else(String::new, |ceiling| {
-            format!(", under which at most {} of the races can be won", percent(ceiling.share))
+            format!(", under which at most {} of the races can be won", most_percent(ceiling.share))
         });
         format!("The {} judge applies {}{ceiling}.", judge.name(), verdicts::rules(judge))
     });
@@ -90,7 +90,7 @@ fn panel(record: &RaceRecord, judge: Judge) -> String {
     let height = ROWS[usize::from(any_published(record))];
     let mut top = 4.0;
     if let Some(share) = ceiling {
-        let text = format!("ceiling {}", percent(share));
+        let text = format!("ceiling {}", most_percent(share));
         sheet.text("tick", [across(share), 12.0], Anchor::End, &text);
         top = 18.0;
     }

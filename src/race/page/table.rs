@@ -9,7 +9,9 @@ use crate::race::record::{
     TierRecord,
 };
 use crate::report::table::{pairs, table};
-use crate::report::text::{count, minus, number, or_dash, percent, percents, upper};
+use crate::report::text::{
+    count, lower, minus, most_percent, number, or_dash, percent, percents, upper,
+};
 use crate::scenario::record::ConstantRecord;
 
 /// A table of more than three columns; nothing without a row.
@@ -205,7 +207,7 @@ fn starts(record: &RaceRecord) -> String {
                 Judge::Paper => "safe at t = 0, paper judge",
                 Judge::Rigorous => "safe at t = 0, rigorous judge",
             };
-            values.push((name, format!("{}, {}", count(safe), percent(share))));
+            values.push((name, format!("{}, {}", count(safe), most_percent(share))));
         }
     }
     pairs("Starts and noise", &values)
@@ -230,18 +232,17 @@ fn bounds(record: &RaceRecord) -> String {
         let risk = or_dash(set.risk.map(upper));
         format!("margin drops at level {}, conditional risk at most {risk}", upper(set.level))
     });
-    pairs(
-        "What V_check was computed with",
-        &[
-            ("certified set", set.unwrap_or_else(|| "constants times the bound".to_owned())),
-            ("deviation bound", claim.statement.clone()),
-            ("measure", claim.measure.clone()),
-            ("pairs", format!("{}, none allowed to exceed the bound", count(claim.scenarios))),
-            ("Lipschitz constant of the target margin", constant(&constants.target)),
-            ("Lipschitz constant of the constraint margin", constant(&constants.constraint)),
-            ("run again in f64 within", upper(*band)),
-        ],
-    )
+    let mut values = vec![
+        ("certified set", set.unwrap_or_else(|| "constants times the bound".to_owned())),
+        ("deviation bound", claim.statement.clone()),
+        ("measure", claim.measure.clone()),
+        ("pairs", format!("{}, none allowed to exceed the bound", count(claim.scenarios))),
+        ("Lipschitz constant of the target margin", constant(&constants.target)),
+        ("Lipschitz constant of the constraint margin", constant(&constants.constraint)),
+        ("run again in f64 within", lower(*band)),
+    ];
+    values.extend(constants.statements().into_iter().map(|said| ("about the constants", said)));
+    pairs("What V_check was computed with", &values)
 }
 
 fn made_by(record: &RaceRecord) -> String {

@@ -8,7 +8,7 @@ use super::rows;
 use crate::report::figure::{Figure, Swatch};
 use crate::report::scale::Scale;
 use crate::report::sheet::panels;
-use crate::report::text::{number, percent};
+use crate::report::text::{most_percent, number};
 
 /// Axes that a figure has room for: across, lines, panels.
 const DEPTH: usize = 3;
@@ -145,7 +145,7 @@ fn legend(chart: &Chart<'_, '_, '_>) -> Vec<(Swatch, String)> {
         legend.push((swatch, (*name).to_owned()));
     }
     if let Some(share) = chart.ceiling {
-        let name = format!("most that can be won: {}", percent(share));
+        let name = format!("most that can be won: {}", most_percent(share));
         legend.push((Swatch::Line("ceiling"), name));
     }
     legend

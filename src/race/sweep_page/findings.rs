@@ -7,6 +7,7 @@ use crate::race::record::JudgedRecord;
 use crate::race::sweep::record::CertificatePoint;
 use crate::report::shell::Headline;
 use crate::report::text::{count, lower, number, percent, percents, upper};
+use crate::scenario::ledger::total;
 
 /// What a sweep came to.
 pub(super) struct Findings {
@@ -226,7 +227,7 @@ fn held(all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
 }
 
 fn certificate_limits(all: &[Certified<'_, '_>]) -> Vec<String> {
-    let total: f64 = all.iter().map(|one| one.certificate.beta_total).sum();
+    let total = total(all.iter().map(|one| one.certificate.beta_total));
     let together = if total < 1.0 {
         format!(
             "Each certificate has its own confidence. All {} hold together with confidence at \

@@ -19,7 +19,7 @@ use crate::report::figure::Figure;
 use crate::report::palette;
 use crate::report::shell::{self, HATCH, SHEET_STYLE, Scripts, WEAVES, items};
 use crate::report::sortable::SCRIPT;
-use crate::report::text::{count, counted, escape, listed, percent, shorten};
+use crate::report::text::{count, counted, escape, listed, most_percent, shorten};
 use findings::Findings;
 use front::Front;
 use grid::Grid;
@@ -150,7 +150,7 @@ fn setting(record: &SweepRecord) -> String {
                 let starts = counted(safe as usize, "start is", "starts are");
                 format!(
                     ", under which {starts} safe before anyone moves: at most {}",
-                    percent(share)
+                    most_percent(share)
                 )
             });
         format!("The judge is {}{ceiling}. ", judge.name())

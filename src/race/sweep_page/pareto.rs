@@ -8,7 +8,7 @@ use crate::report::figure::{Figure, Swatch};
 use crate::report::plot::{Labels, Plot, coordinate};
 use crate::report::scale::Scale;
 use crate::report::span::Span;
-use crate::report::text::{escape, percent, shorten};
+use crate::report::text::{escape, most_percent, shorten};
 
 /// Width and height.
 const SIZE: [f64; 2] = [440.0, 280.0];
@@ -106,7 +106,10 @@ fn legend(grid: &Grid<'_>, front: &Front, ceiling: Option<f64>) -> Vec<(Swatch, 
         legend.push((Swatch::Mark(KNEE.to_owned()), "knee of the front".to_owned()));
     }
     if let Some(share) = ceiling {
-        legend.push((Swatch::Line("ceiling"), format!("most that can be won: {}", percent(share))));
+        legend.push((
+            Swatch::Line("ceiling"),
+            format!("most that can be won: {}", most_percent(share)),
+        ));
     }
     legend
 }

@@ -7,6 +7,7 @@ mod vector_x86;
 mod x86;
 
 use std::marker::PhantomData;
+use std::sync::OnceLock;
 
 use super::Lanes;
 pub(crate) use body::{Body, Formulas, Simd};
@@ -78,6 +79,23 @@ impl Instructions {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => "AVX2",
             Self::Baseline => "baseline instructions",
+        }
+    }
+
+    /// The fastest that the processor has.
+    pub(crate) fn fastest() -> Self {
+        static FASTEST: OnceLock<Instructions> = OnceLock::new();
+        *FASTEST.get_or_init(|| Self::detect().remove(0))
+    }
+
+    /// Runs `body` with these instructions.
+    pub(crate) fn run<B: Body>(self, body: B) -> B::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(kernel) => kernel.call(body),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(kernel) => kernel.call(body),
+            Self::Baseline => Portable.call(body),
         }
     }
 

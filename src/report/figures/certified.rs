@@ -5,7 +5,7 @@ use crate::report::figure::{Figure, Swatch, cross, diamond, dot};
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
-use crate::report::text::{number, ordinary};
+use crate::report::text::{lower, ordinary};
 use crate::report::words;
 use crate::scenario::record::{GrowthOutcome, Record};
 
@@ -131,7 +131,7 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
                 GrowthOutcome::Verified => "verified ball",
                 _ => "last ball tried, which is not verified,",
             };
-            let radius = number(ball.radius);
+            let radius = lower(ball.radius);
             caption += &format!(" The {kind} has radius {radius} in {varied} coordinates");
             caption += match ball.section {
                 Some(_) if !ball.shadowed() => ".",
@@ -154,7 +154,7 @@ fn without_slice(record: &Record) -> String {
     let set = format!("{} of {} starts drawn are certified.", global.accepted, global.draws);
     match record.growth.outcome {
         GrowthOutcome::Verified => {
-            format!("{set} The verified ball has radius {}.", number(record.growth.radius))
+            format!("{set} The verified ball has radius {}.", lower(record.growth.radius))
         }
         GrowthOutcome::Exhausted => format!("{set} No ball is verified."),
         GrowthOutcome::NoBoundary => format!("{set} No boundary of the set was found."),

@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, Swatch};
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
-use crate::report::text::{lower, number, ordinary, upper};
+use crate::report::text::{lower, ordinary, upper};
 use crate::report::words;
 use crate::scenario::record::Record;
 use crate::scenario::settings::DeviationSource;
@@ -40,7 +40,7 @@ fn caption(record: &Record) -> String {
         "Euclidean distance over all {} states between a rollout and one that starts within {} \
          of it; {}. Joint over the steps: {}.",
         record.system.states.len(),
-        number(deviation.radius),
+        lower(deviation.radius),
         words::control(deviation.control),
         words::joint(deviation.joint)
     );
@@ -91,10 +91,10 @@ fn values(record: &Record, step: usize) -> String {
         text += &format!(", bound {}", upper(bound));
     }
     if let Some(largest) = at(&deviation.largest) {
-        text += &format!(", largest seen {}", number(largest));
+        text += &format!(", largest seen {}", upper(largest));
     }
     if let Some(exact) = deviation.exact.as_deref().and_then(at) {
-        text += &format!(", exact {}", number(exact));
+        text += &format!(", exact {}", upper(exact));
     }
     text
 }

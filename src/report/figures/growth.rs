@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, Swatch, cross, dot};
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
-use crate::report::text::{count, number, ordinary};
+use crate::report::text::{count, lower, ordinary};
 use crate::report::words;
 use crate::scenario::record::{GrowthOutcome, Record};
 
@@ -69,7 +69,7 @@ fn drawing(record: &Record) -> String {
                 "<title>round {}: radius {}, {} failures among {}</title>{mark}\
                  <text class=\"tick\" y=\"-11\" text-anchor=\"middle\">{label}</text>",
                 index + 1,
-                number(round.radius),
+                lower(round.radius),
                 count(round.failures),
                 count(round.scenarios)
             ),
@@ -82,7 +82,7 @@ fn drawing(record: &Record) -> String {
 
 fn description(record: &Record) -> String {
     let rounds = record.growth.rounds.iter().map(|round| {
-        let radius = number(round.radius);
+        let radius = lower(round.radius);
         format!("radius {radius} with {} failures", round.failures)
     });
     format!("Rounds of growth: {}.", rounds.collect::<Vec<_>>().join(", then "))

@@ -49,7 +49,7 @@ impl Replayed {
             x = model.next(&x, &controls, step);
             states.push(x.clone());
         }
-        replay::fold(model, &states, spec, &Tightening::none(spec))
+        replay::fold_states(model, &states, spec, &Tightening::none(spec))
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::race::sweep::record::{
     CertificatePoint, PointRecord, PointResult, RacePoint, SweepRecord,
 };
+use crate::rounding::{interval, lower, number, upper};
 
 /// One line per point, and where the files are.
 pub(super) fn text(record: &SweepRecord, files: &[PathBuf]) -> String {
@@ -79,26 +80,25 @@ fn row(record: &SweepRecord, point: &PointRecord) -> Vec<String> {
 fn race_cells(record: &SweepRecord, point: &RacePoint) -> Vec<String> {
     let judged = point.judged.iter().find(|judged| Some(judged.judge) == record.judge);
     let success = judged.map_or(String::new(), |judged| {
-        let [low, high] = judged.interval.map(|share| 100.0 * share);
-        format!("{:.1} % ({low:.1} to {high:.1})", 100.0 * judged.rate)
+        let ends = judged.interval.map(|share| 100.0 * share);
+        format!("{} % ({})", number(100.0 * judged.rate), interval(ends))
     });
-    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
+    let or_dash = |value: Option<f64>| value.map_or("-".to_owned(), number);
     let latency = &point.latency;
     let seconds = [latency.median_seconds, latency.p95_seconds, latency.p99_seconds];
-    let plans = [number(point.effective_samples), number(point.best_cost)];
-    let milliseconds = seconds.map(|seconds| format!("{:.3}", 1e3 * seconds));
+    let plans = [or_dash(point.effective_samples), or_dash(point.best_cost)];
+    let milliseconds = seconds.map(|seconds| number(1e3 * seconds));
     std::iter::once(success).chain(plans).chain(milliseconds).collect()
 }
 
 /// Scenario count, certified set and growth.
 fn certificate_cells(point: &CertificatePoint) -> Vec<String> {
-    let [low, high] = point.share_interval;
     vec![
         point.deviation_scenarios.to_string(),
-        format!("{low:.4} to {high:.4}"),
-        format!("{:.4}", point.deviation_bound),
+        interval(point.share_interval),
+        upper(point.deviation_bound),
         point.growth.name().to_owned(),
-        format!("{:.4}", point.radius),
+        lower(point.radius),
         if point.holds { "yes" } else { "no" }.to_owned(),
     ]
 }

@@ -1,0 +1,184 @@
+//! Pairs in f64, many side by side: what [`super::replay`] gives one at a time, in the same bits.
+
+use super::replay::{Margins, fold};
+use super::spec::{PairControl, RolloutSpec, Tightening};
+use crate::model::{Model, Plant};
+use crate::real::Wide;
+
+/// Pairs of a group.
+pub(crate) const GROUP: usize = 16;
+
+/// Numbers of all pairs of a group.
+type Lane = Wide<GROUP>;
+
+/// The rollouts of at most [`GROUP`] pairs.
+pub(crate) struct PairGroup {
+    /// States of the nominal and of the perturbed rollouts, `[2, T + 1, states]`.
+    states: [Vec<Vec<Lane>>; 2],
+    /// Pairs that there are.
+    count: usize,
+}
+
+impl PairGroup {
+    /// Rolls out `pairs`, each a nominal and a perturbed start.
+    ///
+    /// # Panics
+    /// If there is no pair, or there are more than [`GROUP`].
+    pub(crate) fn new(
+        plant: &Plant,
+        pairs: &[[Vec<f32>; 2]],
+        horizon: u32,
+        control: PairControl,
+    ) -> Self {
+        assert!((1..=GROUP).contains(&pairs.len()), "a group of 1 to {GROUP} pairs");
+        // What lies beyond the pairs repeats the last one.
+        let pair = |lane: usize| &pairs[lane.min(pairs.len() - 1)];
+        let start = |side: usize| -> Vec<Lane> {
+            let at = |i| Wide(std::array::from_fn(|lane| f64::from(pair(lane)[side][i])));
+            (0..plant.model.states.len()).map(at).collect()
+        };
+        let mut states = [0, 1].map(|side| vec![start(side)]);
+        for step in 0..horizon {
+            let [nominal, perturbed] = states.each_ref().map(|states| &states[step as usize]);
+            let control_at = |x: &[Lane]| plant.control(x, step);
+            let driven = control_at(nominal);
+            let feedback = (control == PairControl::ClosedLoop).then(|| control_at(perturbed));
+            let next = plant.model.next(nominal, &driven, step);
+            let beside = plant.model.next(perturbed, feedback.as_ref().unwrap_or(&driven), step);
+            states[0].push(next);
+            states[1].push(beside);
+        }
+        Self { states, count: pairs.len() }
+    }
+
+    /// Pairs that there are.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Measures `[nominal, perturbed]` of each pair, as [`super::PairMeasure`] has them.
+    pub(crate) fn measures(
+        &self,
+        model: &Model,
+        spec: &RolloutSpec,
+        tightening: &Tightening,
+    ) -> Vec<[f64; 2]> {
+        let plain = Tightening::none(spec);
+        let [nominal, perturbed] = [(0, tightening), (1, &plain)].map(|(side, tightening)| {
+            let states = &self.states[side];
+            let margins = (0..).zip(states).map(|(step, x)| margins(model, x, step));
+            let margins: Vec<[Lane; 2]> = margins.collect();
+            let one = |lane: usize| {
+                let steps = margins.iter().zip(states).map(|([target, constraint], x)| {
+                    let finite = x.iter().all(|x| x.0[lane].is_finite());
+                    let [target, constraint] = [target, constraint]
+                        .map(|margin| if finite { margin.0[lane] } else { f64::NAN });
+                    Margins { target, constraint }
+                });
+                fold(steps, spec, tightening)
+            };
+            (0..self.count).map(one).collect::<Vec<f64>>()
+        });
+        nominal
+            .into_iter()
+            .zip(perturbed)
+            .map(|(nominal, perturbed)| [nominal, perturbed])
+            .collect()
+    }
+
+    /// Euclidean distance of the rollouts of a pair at each step, `[T + 1]`; infinite where a state is
+    /// not finite.
+    pub(crate) fn distances(&self, pair: usize) -> Vec<f64> {
+        let [nominal, perturbed] = &self.states;
+        let length = |(a, b): (&Vec<Lane>, &Vec<Lane>)| {
+            let square = |(a, b): (&Lane, &Lane)| (a.0[pair] - b.0[pair]).powi(2);
+            let length = a.iter().zip(b).map(square).sum::<f64>().sqrt();
+            if length.is_finite() { length } else { f64::INFINITY }
+        };
+        nominal.iter().zip(perturbed).map(length).collect()
+    }
+
+    /// States of each pair before its nominal rollout violates its constraint, or is not finite.
+    pub(crate) fn safe_steps(&self, model: &Model) -> Vec<usize> {
+        let [nominal, _] = &self.states;
+        let constraint = (0..).zip(nominal).map(|(step, x)| model.constraint_at(x, step));
+        let constraint: Vec<Lane> = constraint.collect();
+        let safe = |pair: usize, step: usize| {
+            constraint[step].0[pair] > 0.0 && nominal[step].iter().all(|x| x.0[pair].is_finite())
+        };
+        let steps = |pair| (0..nominal.len()).take_while(|step| safe(pair, *step)).count();
+        (0..self.count).map(steps).collect()
+    }
+
+    /// The states `[nominal, perturbed]` of a pair at `step`.
+    pub(crate) fn states(&self, pair: usize, step: usize) -> [Vec<f64>; 2] {
+        self.states.each_ref().map(|side| side[step].iter().map(|x| x.0[pair]).collect())
+    }
+}
+
+/// Target and constraint margin at `x`.
+fn margins(model: &Model, x: &[Lane], step: u32) -> [Lane; 2] {
+    [model.target_at(x, step), model.constraint_at(x, step)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+    use crate::race::system::DroneRace;
+    use crate::rollout::replay::{pair_measures, states};
+
+    /// A network with weights that are no round numbers.
+    fn network() -> Mlp {
+        let layer = |inputs: usize, outputs: usize| Layer {
+            weight: (0..inputs * outputs).map(|i| (0.7 * i as f32).sin() * 0.4).collect(),
+            bias: (0..outputs).map(|i| (0.3 * i as f32).cos() * 0.1).collect(),
+            inputs,
+            outputs,
+        };
+        let layers = vec![layer(12, 20), layer(20, 20), layer(20, 3)];
+        Mlp::new(layers, Activation::Silu, OutputActivation::Tanh).unwrap()
+    }
+
+    #[test]
+    fn side_by_side_has_the_bits_of_one_at_a_time() {
+        let plant = Plant::under(&std::sync::Arc::new(Model::of(DroneRace::default())), network());
+        let spec = RolloutSpec::new(30, 0.95).unwrap();
+        let tightening = Tightening { target: vec![0.1; 31], constraint: vec![0.2; 31] };
+        let coordinate = |pair: usize, i: usize| (1.3 * (pair * 12 + i) as f32).sin();
+        let pairs: Vec<[Vec<f32>; 2]> = (0..GROUP - 3)
+            .map(|pair| {
+                let nominal: Vec<f32> = (0..12).map(|i| coordinate(pair, i)).collect();
+                let perturbed = nominal.iter().map(|x| x + 0.05 * (7.0 * x).sin()).collect();
+                [nominal, perturbed]
+            })
+            .collect();
+        for control in [PairControl::Replay, PairControl::ClosedLoop] {
+            let group = PairGroup::new(&plant, &pairs, spec.horizon, control);
+            let measures = group.measures(&plant.model, &spec, &tightening);
+            assert_eq!(measures.len(), pairs.len());
+            for (i, pair) in pairs.iter().enumerate() {
+                let both = [&*pair[0], &*pair[1]];
+                let (nominal, perturbed) = pair_measures(&plant, both, &spec, &tightening, control);
+                assert_eq!(measures[i], [nominal, perturbed], "pair {i}, {control:?}");
+                let alone = states::<f64>(&plant, &pair[0], spec.horizon);
+                assert_eq!(group.states(i, 30)[0], alone[30], "pair {i}, {control:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_state_that_is_not_finite_fails_its_pair_alone() {
+        let plant = Plant::under(&std::sync::Arc::new(Model::of(DroneRace::default())), network());
+        let spec = RolloutSpec::new(3, 0.95).unwrap();
+        let mut far = vec![0.0; 12];
+        far[1] = f32::INFINITY;
+        let pairs = [[vec![0.0; 12], vec![0.0; 12]], [vec![0.0; 12], far]];
+        let group = PairGroup::new(&plant, &pairs, 3, PairControl::Replay);
+        assert!(group.distances(0).iter().all(|distance| *distance == 0.0));
+        assert_eq!(group.distances(1)[0], f64::INFINITY);
+        let measures = group.measures(&plant.model, &spec, &Tightening::none(&spec));
+        assert_eq!(measures[1][1], f64::from(crate::rollout::NON_FINITE));
+        assert_ne!(measures[0][1], measures[1][1]);
+    }
+}

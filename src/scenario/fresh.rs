@@ -1,0 +1,166 @@
+//! The claims of a stored certificate on samples that it has not seen.
+//!
+//! A claim is refuted only where the samples leave less than 1e-6 to chance: a true one is called false
+//! no more often than that, each.
+
+use super::bound::{interval, lower_bound};
+use super::finding::{Figure, Finding};
+use super::record::{DeviationRecord, GlobalRecord, Record};
+use super::settings::{Joint, Settings};
+use super::tier::verified_ball;
+use super::{Context, global, pairs_f64, purpose, sets, whole_box};
+use crate::error::Result;
+use crate::rollout::side_by_side::PairGroup;
+use crate::rollout::{
+    Ball, Keep, Pairs, Query, ReachAvoidTask, Region, Starts, Stream, Tightening,
+};
+
+/// Fresh starts that a verified ball is tried with.
+const STARTS: u64 = 20_000;
+/// Fresh pairs that the deviation bound is tried with: a risk of a tenth in the place of 0.04 shows.
+const PAIRS: u64 = 4_000;
+/// Pairs after which the work may be stopped.
+const AT_ONCE: u64 = 256;
+/// Distance beyond a bound, relative to it, that the bound's own f32 rounding may make.
+const ROUNDING: f64 = 1e-5;
+/// Chance that a check calls a true claim false, each.
+const FALSE_ALARM: f64 = 1e-6;
+
+/// What fresh samples of `seed` say of the claims of `record`.
+pub(super) fn findings(
+    context: Context<'_>,
+    record: &Record,
+    settings: &Settings,
+    seed: u64,
+) -> Result<Vec<Finding>> {
+    let settings = &Settings { seed, ..settings.clone() };
+    let mut findings = Vec::from_iter(beyond(context, settings, &record.deviation)?);
+    let tightening = sets::tightening(record, &settings.spec);
+    let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
+    let fresh = global::conditional(context, settings, &tightening, purposes)?;
+    let (failures, accepted) = (fresh.claim.failures, fresh.accepted);
+    let name = "conditional failure on fresh pairs";
+    findings.push(refuted(name, record.global.claim.certified_risk, failures, accepted));
+    findings.push(share(&record.global, &fresh));
+    if let Some(stored) = &record.whole_box {
+        let band = record.global.band;
+        findings.push(whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?);
+    }
+    if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
+        let failures = in_ball(context, settings, ball)?;
+        let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
+        findings.push(refuted("failures in the verified ball", risk, failures, STARTS));
+    }
+    Ok(findings)
+}
+
+/// Whether `failures` of `trials` refute a risk of at most `risk`.
+fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
+    refuted_at(FALSE_ALARM, name, risk, failures, trials)
+}
+
+/// The same where a true claim is called false with probability at most `chance`.
+fn refuted_at(chance: f64, name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
+    let least = lower_bound(failures, trials, chance);
+    Finding {
+        name: name.to_owned(),
+        stored: Figure::AtMost { at_most: risk },
+        found: Figure::Trials { failures, trials, at_least: least },
+        holds: least <= risk,
+    }
+}
+
+/// Whether the stored interval of the certified share may hold the share that fresh draws show.
+///
+/// Where the share lies in the stored interval, an interval around the fresh draws that misses it with
+/// probability 1e-6 meets the stored one with that confidence, whatever the stored one's own.
+fn share(stored: &GlobalRecord, fresh: &GlobalRecord) -> Finding {
+    let [low, high] = stored.share_interval;
+    let (fresh_low, fresh_high) = interval(fresh.accepted, fresh.draws, FALSE_ALARM);
+    Finding {
+        name: "certified share on fresh pairs".to_owned(),
+        stored: Figure::Interval(stored.share_interval),
+        found: Figure::Interval([fresh_low, fresh_high]),
+        holds: low <= fresh_high && fresh_low <= high,
+    }
+}
+
+/// Whether fresh pairs leave the deviation bound more often than its claim says; nothing of a bound
+/// that is none.
+fn beyond(
+    context: Context<'_>,
+    settings: &Settings,
+    stored: &DeviationRecord,
+) -> Result<Option<Finding>> {
+    if stored.non_finite > 0 {
+        return Ok(None);
+    }
+    let counts = pairs_beyond(context, settings, &stored.bound)?;
+    let risk = stored.claim.certified_risk;
+    let worst = counts.by_step.iter().copied().max().unwrap_or(0);
+    let steps = f64::from(settings.spec.horizon);
+    Ok(Some(match stored.joint {
+        // Each step is a claim of its own.
+        Joint::Separate => {
+            let name = "fresh pairs beyond the deviation bound, at the worst step";
+            refuted_at(FALSE_ALARM / steps, name, risk, worst, PAIRS)
+        }
+        _ => refuted("fresh pairs beyond the deviation bound", risk, counts.anywhere, PAIRS),
+    }))
+}
+
+/// Fresh pairs that leave a bound.
+struct Beyond {
+    /// At some step.
+    anywhere: u64,
+    /// At each step, `[T + 1]`.
+    by_step: Vec<u64>,
+}
+
+/// Counts fresh pairs beyond `bound`; step 0 is bounded by the radius that they are drawn with.
+fn pairs_beyond(context: Context<'_>, settings: &Settings, bound: &[f64]) -> Result<Beyond> {
+    context.watch.begin("fresh deviation pairs", PAIRS);
+    let stream = |purpose| Stream::new(settings.seed, purpose, 0);
+    let region = Region::new_box(&*settings.low, &*settings.high)?;
+    let pairs = Pairs {
+        nominal: Starts::Drawn { region, stream: stream(purpose::FRESH_NOMINAL) },
+        radius: settings.deviation.radius,
+        stream: stream(purpose::FRESH_PERTURBATION),
+    };
+    let of = |group: &PairGroup| -> Vec<Vec<bool>> {
+        let beyond = |pair: usize| {
+            let far = |(distance, bound): (f64, &f64)| distance > bound * (1.0 + ROUNDING);
+            let steps = group.distances(pair).into_iter().zip(bound).map(far);
+            steps.enumerate().map(|(step, far)| far && step > 0).collect()
+        };
+        (0..group.count()).map(beyond).collect()
+    };
+    let mut counts = Beyond { anywhere: 0, by_step: vec![0; bound.len()] };
+    for first in (0..PAIRS).step_by(AT_ONCE as usize) {
+        let indices: Vec<u64> = (first..PAIRS.min(first + AT_ONCE)).collect();
+        let (plant, horizon) = (context.plant(), settings.spec.horizon);
+        let control = settings.deviation.control;
+        for pair in pairs_f64::groups(plant, &pairs, &indices, horizon, control, of).concat() {
+            counts.anywhere += u64::from(pair.contains(&true));
+            counts.by_step.iter_mut().zip(pair).for_each(|(count, far)| *count += u64::from(far));
+        }
+        context.watch.advance(indices.len() as u64)?;
+    }
+    Ok(counts)
+}
+
+/// Failures among fresh starts in the verified ball.
+fn in_ball(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
+    context.watch.begin("fresh starts in the ball", STARTS);
+    let stream = Stream::new(settings.seed, purpose::CHECK, 1);
+    let tightening = Tightening::none(&settings.spec);
+    let task = ReachAvoidTask {
+        starts: Starts::Drawn { region: Region::Ball(ball), stream },
+        range: 0..STARTS,
+        spec: settings.spec,
+        tightening: &tightening,
+        query: Query::Sign,
+    };
+    let advance = &mut |count| context.watch.advance(count);
+    Ok(context.program.tally_told(&task, Keep::Counts, advance)?.counts().failures())
+}

@@ -1,0 +1,64 @@
+//! The least ball that f32 has points enough for.
+
+use super::sampling::spacing;
+use super::settings::Settings;
+use crate::error::{Error, Result};
+use crate::rollout::Ball;
+
+/// Spacings of the largest coordinate that a radius has at least: with fewer, draws from a ball fall on
+/// a coarse grid, and are not the uniform ones that a claim speaks of.
+const LEAST: f64 = 4_000.0;
+
+/// The least radius of a ball whose coordinates that vary come to these numbers.
+fn least_radius(coordinates: impl Iterator<Item = f32>) -> f64 {
+    let largest = coordinates.map(|x| f64::from(x.abs())).fold(0.0, f64::max);
+    LEAST * spacing(largest)
+}
+
+/// Whether f32 has points enough for the ball.
+pub(super) fn is_fine(ball: &Ball) -> bool {
+    let vary = ball.center.iter().zip(&ball.varies).filter(|(_, varies)| **varies);
+    f64::from(ball.radius) >= least_radius(vary.map(|(x, _)| *x))
+}
+
+/// Refuses the radius at `key` where f32 is too coarse for it, `varies` in the box of `settings`.
+fn check_radius(key: &str, radius: f32, settings: &Settings, varies: &[bool]) -> Result<()> {
+    let sides = settings.low.iter().zip(&settings.high).zip(varies);
+    let vary = sides.filter(|(_, varies)| **varies);
+    let least = least_radius(vary.flat_map(|((low, high), _)| [*low, *high]));
+    if f64::from(radius) >= least {
+        return Ok(());
+    }
+    let problem = format!(
+        "{radius} is below {least:e}, {LEAST} times the distance of neighbouring f32 at the largest \
+         coordinate of the box: draws would not be uniform; take a larger radius, or coordinates relative \
+         to an origin nearby"
+    );
+    Err(Error::invalid(key, problem))
+}
+
+/// Refuses radii that f32 is too coarse for; a perturbation moves every coordinate.
+pub(super) fn check(settings: &Settings) -> Result<()> {
+    let all = vec![true; settings.low.len()];
+    check_radius("deviation.radius", settings.deviation.radius, settings, &all)?;
+    check_radius("growth.radius", settings.growth.radius, settings, &settings.growth.varies)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_radius_follows_the_largest_coordinate_that_varies() {
+        let ball = |radius: f32, varies: [bool; 2]| Ball {
+            center: vec![1.0, 1e5],
+            radius,
+            varies: varies.to_vec(),
+        };
+        // Around 1 f32 lie 2^-23 apart, around 1e5 2^-7.
+        let near = 4_000.0 * f32::EPSILON;
+        assert!(is_fine(&ball(near, [true, false])));
+        assert!(!is_fine(&ball(near.next_down(), [true, false])));
+        assert!(is_fine(&ball(31.25, [true, true])) && !is_fine(&ball(31.0, [true, true])));
+    }
+}
