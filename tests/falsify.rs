@@ -14,11 +14,11 @@ use reachcast::backend::Backend;
 use reachcast::model::Plant;
 use reachcast::model::text::{Description, read};
 use reachcast::rollout::{
-    Ball, Keep, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening,
-    replay,
+    Ball, Keep, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Stream,
+    Tightening, replay,
 };
-use reachcast::scenario::Unwatched;
 use reachcast::scenario::falsify::{FalsifyRecord, FalsifySettings, falsify};
+use reachcast::scenario::{Unwatched, purpose};
 use serde_json::Value;
 
 /// Rollouts within which the failures of both plants are found.
@@ -160,6 +160,29 @@ fn a_search_stays_within_its_ball() {
     let found = search(&cpu(2), &searched, BUDGET, 1);
     assert_found(&searched, &found, "ball");
     assert!(found.starts.iter().all(|start| start.x[3] == -0.4));
+}
+
+/// What only f32 takes for a failure is none.
+#[test]
+fn a_failure_in_f32_alone_does_not_count() {
+    let wall = "min(1 - abs(position), apart - trap)";
+    let lost = "0.001 + (position + 100000 - 100000 - position)";
+    let tried = search(&cpu(2), &plant(TRAP, [wall, lost]), 2000, 1);
+    assert!(!tried.found && tried.unconfirmed > 100 && tried.starts.is_empty(), "{tried:?}");
+    assert!(tried.best.unwrap().measure > 0.0 && tried.rollouts == 2000);
+}
+
+/// The worst start of a ball lies at its rim, where rounding may put it outside.
+#[test]
+fn the_rim_of_a_ball_is_not_left() {
+    let (plant, _, spec) = plant(TRAP, ["value = 0.01", "value = -1.0"]);
+    for seed in 1..=10 {
+        let center = vec![0.4, 0.2, 0.1, 0.7];
+        let ball = Ball { center, radius: 0.1, varies: vec![true; 4] };
+        let searched = (plant.clone(), Region::Ball(ball.clone()), spec);
+        let x = search(&cpu(2), &searched, 4000, seed).best.unwrap().x;
+        assert!(ball.contains(&x) && ball.distance(&x) > 0.0999, "{seed}: {x:?}");
+    }
 }
 
 /// The columns of a table by their names.
@@ -309,8 +332,27 @@ fn the_whole_box_stands_beside_the_certified_set() {
             assert_eq!(row["parameter:target"], 0.25);
         }
         assert!(measures.is_sorted() && measures[0] < 0.0, "{measures:?}");
+        if backend == "cpu" {
+            let (failed, worst) = box_by_hand();
+            assert_eq!(count("failures"), failed as f64);
+            assert!(worst.iter().zip(&measures).all(|(a, b)| *a == *b as f32), "{worst:?}");
+        }
         assert!(done(&["check", &out, "--backend", backend]).contains("the certificate holds"));
     }
+}
+
+/// How many of the 4000 nominal starts fail, and their smallest measures, counted here.
+fn box_by_hand() -> (usize, Vec<f32>) {
+    let (plant, region, spec) = plant("configs/models/double_integrator.toml", AS_IT_IS);
+    let stream = Stream::new(1, purpose::CONDITIONAL_NOMINAL, 0);
+    let starts: Vec<Vec<f32>> = (0..4000).map(|index| region.point(stream, index)).collect();
+    let list = StateList::new(2).with(&starts);
+    let backend = cpu(1);
+    let mut measures = backend.prepare(&plant).unwrap().measures(&list, &spec).unwrap();
+    measures.sort_by(f32::total_cmp);
+    let failed = measures.iter().filter(|measure| **measure <= 0.0).count();
+    measures.truncate(20);
+    (failed, measures)
 }
 
 #[test]
@@ -340,7 +382,7 @@ fn failing_pairs_are_replayed_under_their_controls() {
     let pairs = record["whole_box"]["pairs"].as_array().unwrap();
     assert!(!pairs.is_empty(), "{}", record["global"]["claim"]);
     let path = format!("{out}/counterexamples_replayed.csv");
-    let rows = table(&path);
+    let (rows, (dubins, ..)) = (table(&path), plant(config, AS_IT_IS));
     for backend in ["cpu", "gpu"] {
         let measures = rolled_out(config, &path, backend, &[], &folder);
         assert_eq!([pairs.len(), rows.len()], [measures.len(); 2]);
@@ -352,6 +394,10 @@ fn failing_pairs_are_replayed_under_their_controls() {
                 (of(name) - of(&format!("nominal:{name}"))).powi(2)
             });
             assert!(away.iter().sum::<f64>().sqrt() <= 0.300_001, "{row}");
+            let nominal = ["x", "y", "heading"].map(|name| &row[format!("nominal:{name}")]);
+            let nominal = nominal.map(|value| f64::from(value.as_f64().unwrap() as f32));
+            let first = dubins.control(&nominal, 0)[0] as f32;
+            assert_eq!(row["control:0:turn_rate"].as_f64().unwrap() as f32, first, "{row}");
         }
     }
     let checked = done(&["check", &out, "--backend", "cpu"]);

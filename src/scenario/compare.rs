@@ -1,5 +1,7 @@
 //! Compares a stored record with the one computed again from its seed, field by field.
 
+use std::collections::BTreeSet;
+
 use serde_json::Value;
 
 use super::finding::{Figure, Finding};
@@ -97,10 +99,14 @@ impl Walk {
             return;
         }
         match (was, is) {
-            (Value::Object(was_map), Value::Object(is_map)) if was_map.len() == is_map.len() => {
-                for (key, was) in was_map {
+            (Value::Object(was_map), Value::Object(is_map)) => {
+                // A field that one of them lacks is named, too.
+                let keys: BTreeSet<&String> = was_map.keys().chain(is_map.keys()).collect();
+                for key in keys {
                     let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                    self.compare(&inner, was, is_map.get(key).unwrap_or(&Value::Null));
+                    let [was, is] =
+                        [was_map, is_map].map(|map| map.get(key).unwrap_or(&Value::Null));
+                    self.compare(&inner, was, is);
                 }
             }
             (Value::Array(was_list), Value::Array(is_list)) if was_list.len() == is_list.len() => {

@@ -1,6 +1,5 @@
 //! Where a failing start is looked for, in coordinates from -1 to 1.
 
-use super::trials::Candidate;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{Ball, Region};
@@ -87,11 +86,15 @@ impl Domain {
         self.varying.iter().map(at).collect()
     }
 
-    /// The coordinates of those of `candidates` that lie `apart` from all before them, in the root mean
-    /// square over the coordinates.
-    pub(super) fn apart(&self, candidates: &[Candidate], apart: f64) -> Vec<Vec<f64>> {
+    /// Those of the places `all` that lie `apart` from the ones kept before them, in the root mean square
+    /// over the coordinates.
+    pub(super) fn apart<'a>(
+        &self,
+        all: impl IntoIterator<Item = &'a Vec<f64>>,
+        apart: f64,
+    ) -> Vec<Vec<f64>> {
         let mut kept: Vec<Vec<f64>> = Vec::new();
-        for Candidate { u, .. } in candidates {
+        for u in all {
             let far = |other: &Vec<f64>| {
                 let square: f64 = other.iter().zip(u).map(|(a, b)| (a - b).powi(2)).sum();
                 square > self.dimension() as f64 * apart * apart

@@ -90,7 +90,7 @@ impl Search<'_> {
     /// Follows one cloud after the other until a failure is found or the budget is spent: that of the
     /// best uniform draws first, then one around each of them, then around fresh ones.
     fn restart_until_over(&mut self, pool: Vec<Candidate>) -> Result<()> {
-        let mut centres = self.domain.apart(&pool, CLOUD).into_iter();
+        let mut centres = self.domain.apart(pool.iter().map(|tried| &tried.u), CLOUD).into_iter();
         let mut cloud = pool;
         while !self.trials.is_over() {
             self.restarts += 1;
