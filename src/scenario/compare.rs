@@ -1,5 +1,7 @@
 //! Compares a stored record with the one computed again from its seed, field by field.
 
+use std::collections::BTreeSet;
+
 use serde_json::Value;
 
 use super::finding::{Figure, Finding};
