@@ -190,7 +190,7 @@ fn the_certificate_is_the_same_on_threads_and_holds_when_checked() {
     let drops = one.drops.as_ref().expect("drops");
     let by_constants = drops.by_constants.expect("constants");
     assert!(share.inside > drops.share.inside && drops.share.point() > 0.05);
-    assert!(by_constants.inside as f64 / (by_constants.draws as f64) < drops.share.point());
+    assert!(by_constants.inside as f64 / (by_constants.draws as f64) < share.point());
     let backend = cpu(2);
     let program = backend.prepare(&plant).expect("a program");
     let sealed = one.clone().sealed().expect("sealed");
