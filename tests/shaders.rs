@@ -1,5 +1,6 @@
 //! Without a GPU: every composed kernel is valid WGSL and agrees with the Rust side.
 
+mod drivers;
 mod learned;
 mod models;
 
@@ -334,6 +335,67 @@ fn bindings_are_those_that_rust_lists() {
         }
         assert_eq!(declared, listed.len(), "{name}: listed but not declared");
     });
+}
+
+#[test]
+fn no_two_types_have_one_shape() {
+    each_kernel(|name, _, module, _| drivers::assert_types_differ(name, module));
+}
+
+/// An array under a name of its own: valid WGSL, and invalid SPIR-V where it is passed for the array.
+const ALIASED: &str = "
+alias Pair = array<f32, 2>;
+@group(0) @binding(0) var<storage, read_write> sink: array<f32>;
+fn added(x: array<f32, 2>) -> f32 {
+    return x[0] + x[1];
+}
+@compute @workgroup_size(1)
+fn main() {
+    let x = Pair(sink[0], sink[1]);
+    sink[0] = added(x);
+}
+";
+
+#[test]
+#[should_panic(expected = "two types of the shape")]
+fn an_array_with_a_name_is_a_second_type() {
+    let (module, _) = validated("aliased", ALIASED);
+    drivers::assert_types_differ("aliased", &module);
+}
+
+#[test]
+fn an_array_with_a_name_is_invalid_spir_v() {
+    if drivers::validator_is_there() {
+        let (module, info) = validated("aliased", ALIASED);
+        let folder = tempfile::tempdir().expect("a folder");
+        let complaint = drivers::complaint(&module, &info, folder.path());
+        assert!(complaint.is_some_and(|text| text.contains("OpFunctionCall")), "it is taken");
+    }
+}
+
+#[test]
+fn kernels_are_written_for_metal_and_direct3d() {
+    each_kernel(|name, (kernel, ..), module, info| {
+        for text in drivers::translate(name, module, info) {
+            assert!(text.contains(kernel.entry()), "{name}:\n{text}");
+        }
+    });
+}
+
+#[test]
+fn kernels_are_valid_spir_v() {
+    if !drivers::validator_is_there() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut seen, mut wrong) = (0, Vec::new());
+    each_kernel(|name, _, module, info| {
+        seen += 1;
+        let complaint = drivers::complaint(module, info, folder.path());
+        wrong.extend(complaint.map(|complaint| format!("{name}: {complaint}")));
+    });
+    println!("{seen} kernels through spirv-val, {} invalid", wrong.len());
+    assert!(wrong.is_empty() && seen > 100, "{} of {seen}:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 #[test]
