@@ -20,7 +20,7 @@ use crate::{drawn, each_way, gpu, ramp, random_network, whole_box};
 
 /// Stays where it is: the measure is the state, and what is no number fails.
 #[derive(Clone)]
-struct Still;
+pub(crate) struct Still;
 
 impl System<1, 1> for Still {
     fn name(&self) -> &str {

@@ -21,6 +21,7 @@ mod measures;
 #[path = "../models/mod.rs"]
 mod models;
 mod mppi;
+mod narrowed;
 mod networks;
 #[path = "../oracle/mppi.rs"]
 mod oracle;
