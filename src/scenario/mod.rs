@@ -24,6 +24,7 @@ pub mod ledger;
 pub(crate) mod limits;
 pub mod linear;
 pub mod lipschitz;
+mod membership;
 mod origin;
 pub mod purpose;
 pub mod record;
