@@ -1,11 +1,7 @@
-//! Sections of margin drops: what tightens the margins, and the claims that go with it.
+//! Keys of margin drops: what tightens the margins, and the claims that go with it.
 
 use serde::de::{Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-use super::section::{Config, Profile};
-use crate::error;
-use crate::scenario::drops_settings::{DropSettings, SampleSettings};
 
 /// What tightens the margins; configurations that were stored without the key knew the last alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -113,46 +109,4 @@ pub(super) fn share_draws() -> u64 {
 /// The conditional risk that asks for none.
 pub(super) fn no_risk() -> f64 {
     1.0
-}
-
-/// Tightening and conditional risk of a profile.
-pub(super) fn of_profile(profile: Profile) -> (TighteningSource, f64) {
-    match profile {
-        Profile::Rigorous => (TighteningSource::Drops, 0.005),
-        Profile::Paper | Profile::Study => (TighteningSource::Lipschitz, no_risk()),
-    }
-}
-
-impl Config {
-    /// Margin drops, where these tighten the margins.
-    pub(super) fn drop_settings(&self) -> error::Result<Option<DropSettings>> {
-        if self.global.tightening != TighteningSource::Drops {
-            return Ok(None);
-        }
-        let DropsSection { pilot, epsilon, beta, scenarios, discards } = self.drops;
-        let calibration = &self.calibration;
-        let calibrated = (calibration.epsilon < 1.0).then(|| {
-            let CalibrationSection { epsilon, beta, scenarios, discards } = *calibration;
-            sample(epsilon, beta, scenarios, discards)
-        });
-        let settings = DropSettings {
-            pilot,
-            sample: sample(epsilon, beta, scenarios, discards),
-            calibration: calibrated,
-            risk: (self.global.risk < no_risk()).then_some(self.global.risk),
-            share_draws: self.global.share_draws,
-        };
-        settings.check().map(|()| Some(settings))
-    }
-}
-
-/// A claim with its pairs; a claim that no count supports is left to whoever checks it.
-fn sample(epsilon: f64, beta: f64, scenarios: Count, discards: u64) -> SampleSettings {
-    let needed =
-        || SampleSettings::new(epsilon, beta, discards).map_or(0, |sample| sample.scenarios);
-    let scenarios = match scenarios {
-        Count::Needed => needed(),
-        Count::Given(count) => count,
-    };
-    SampleSettings { epsilon, beta, scenarios, discards }
 }

@@ -1,6 +1,7 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
 mod counts;
+mod drop_settings;
 mod drops;
 mod keys;
 mod layers;

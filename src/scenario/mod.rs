@@ -32,6 +32,7 @@ pub mod ledger;
 pub(crate) mod limits;
 pub mod linear;
 pub mod lipschitz;
+mod membership;
 mod origin;
 mod pairs_f64;
 mod probe;
