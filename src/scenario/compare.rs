@@ -1,7 +1,5 @@
 //! Compares a stored record with the one computed again from its seed, field by field.
 
-use std::collections::BTreeSet;
-
 use serde_json::Value;
 
 use super::finding::{Figure, Finding};
