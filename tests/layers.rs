@@ -10,7 +10,7 @@ use modules::{Import, Modules};
 /// Layer of each top-level module; a file may name its own layer and those below it.
 ///
 /// The study goes through all of them; its parts that stand elsewhere than with the experiments are named.
-const LAYERS: [(&str, u32); 26] = [
+const LAYERS: [(&str, u32); 27] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -22,6 +22,7 @@ const LAYERS: [(&str, u32); 26] = [
     ("tile", 2),
     ("model", 2),
     ("rollout", 3),
+    ("tube", 4),
     ("backend", 4),
     ("scenario", 5),
     ("control", 5),

@@ -1,6 +1,7 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
 mod counts;
+mod deterministic;
 mod keys;
 mod layers;
 mod model;
@@ -16,6 +17,7 @@ pub(crate) mod train;
 mod value;
 
 pub use crate::studies::SystemSection;
+pub use deterministic::{AsDeviation, DeterministicSection, Driving, Enclosing, Radius};
 pub use model::copy_name;
 pub use plant::PolicySource;
 pub use section::{

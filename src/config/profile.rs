@@ -1,5 +1,6 @@
 //! Defaults: the numbers of each profile that plants share, and those of the double integrator.
 
+use super::deterministic::DeterministicSection;
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
@@ -92,6 +93,7 @@ pub(crate) fn common(
             source: DeviationSource::Scenario,
         },
         global: GlobalSection { draws: 20_000, beta },
+        deterministic: DeterministicSection::default(),
         slice,
         state: by_name(states, |_, i| state[i]),
         growth: GrowthSection {

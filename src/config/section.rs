@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::deterministic::DeterministicSection;
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
@@ -46,6 +47,9 @@ pub struct Config {
     pub deviation: DeviationSection,
     /// The certified set and its conditional failure.
     pub global: GlobalSection,
+    /// What is certified without samples.
+    #[serde(default)]
+    pub deterministic: DeterministicSection,
     /// The two coordinates of the slice.
     pub slice: SliceSection,
     /// The state that slice, boundary search and growth start from.

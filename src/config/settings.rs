@@ -61,6 +61,7 @@ impl Config {
             },
             deviation: self.deviation_settings()?,
             global: self.global_settings()?,
+            deterministic: self.deterministic_settings()?,
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,

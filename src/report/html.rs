@@ -1,5 +1,6 @@
 //! The page: verdict, statements, figures and numbers of a record.
 
+use super::deterministic;
 use super::figures;
 use super::palette;
 use super::shell::{self, HATCH, Scripts, items};
@@ -157,7 +158,7 @@ fn numbers(record: &Record) -> String {
          <details><summary>Deviation bound at each step</summary>\n{}</details>\n\
          {}</section>\n",
         table::claims(record),
-        table::narrow(record),
+        table::narrow(record) + &deterministic::table(record),
         table::wide(record),
         table::steps(record),
         shell::configuration(&record.provenance)

@@ -10,7 +10,11 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
     let rounds = f64::from(growth.rounds);
     let global = settings.global.beta;
-    let budget = settings.deviation.beta + 2.0 * global + rounds * growth.round_beta();
+    let deterministic = settings.deterministic.map(|asked| asked.beta);
+    let budget = settings.deviation.beta
+        + 2.0 * global
+        + deterministic.unwrap_or(0.0)
+        + rounds * growth.round_beta();
     let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
     let claims = [
         ("deviation", "bound", settings.deviation.beta),
@@ -19,7 +23,9 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     ];
     let rounds = (0..growth.rounds).map(|round| ("growth", "round", round, growth.round_beta()));
     let once = claims.into_iter().map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
-    for (claim, purpose, round, beta) in once.chain(rounds) {
+    let deterministic =
+        deterministic.map(|beta| ("deterministic", "interval of the certified share", 0, beta));
+    for (claim, purpose, round, beta) in once.chain(deterministic).chain(rounds) {
         let entry =
             Entry { claim: claim.to_owned(), purpose: purpose.to_owned(), call: 0, round, beta };
         if let Spend::Refused { left } = ledger.spend(entry) {

@@ -14,7 +14,7 @@ use super::record::{
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
-use super::{Context, Watch, boundary, claims, deviation, global, growth};
+use super::{Context, Watch, boundary, claims, deterministic_set, deviation, global, growth};
 use crate::backend::Program;
 use crate::error::Result;
 use crate::model::Plant;
@@ -49,15 +49,19 @@ pub fn certify(
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
+    let deterministic = deterministic_set::record(context, settings)?;
     let mut statements = claims::statements(settings, &deviation, &global, &growth);
+    statements.extend(claims::of_deterministic(deterministic.as_ref()));
     statements.extend(claims::of_samples(plant, settings, &picture));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
+        + settings.deterministic.map_or(0, |asked| asked.starts)
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
     Ok(Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
-        holds: claims::holds(&deviation, &global, &growth),
+        holds: claims::holds(&deviation, &global, &growth)
+            && claims::deterministic_holds(deterministic.as_ref()),
         statements,
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),
@@ -66,6 +70,7 @@ pub fn certify(
         constants,
         deviation,
         global,
+        deterministic,
         state,
         slice,
         growth,

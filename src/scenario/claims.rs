@@ -1,6 +1,8 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
-use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
+use super::record::{
+    DeterministicRecord, DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord,
+};
 use super::sampling;
 use super::settings::Settings;
 use crate::model::Plant;
@@ -32,6 +34,16 @@ pub(super) fn statements(
     statements.extend(growth_statement(growth));
     statements.extend(broken_statement(deviation));
     statements
+}
+
+/// Whether the deterministic certificate, where one was asked for, certifies any start.
+pub(super) fn deterministic_holds(record: Option<&DeterministicRecord>) -> bool {
+    record.is_none_or(|record| record.certified > 0)
+}
+
+/// The deterministic certificate in words.
+pub(super) fn of_deterministic(record: Option<&DeterministicRecord>) -> Option<String> {
+    record.map(|record| record.statement.clone())
 }
 
 /// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is

@@ -26,7 +26,7 @@ const OF_THE_DEVICE: [&str; 5] =
 const OF_THE_VERSION: [&str; 3] =
     ["schema", "provenance.physics_sha256", "provenance.policy_sha256"];
 /// Counts of rollouts, in which a measure may have crossed zero.
-const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
+const COUNTS: [&str; 5] = ["accepted", "certified", "failures", "reached", "non_finite"];
 
 /// One finding: whether every field of the record is what its seed and configuration give.
 ///

@@ -1,13 +1,13 @@
 //! What of a record follows from its settings and its own counts, without a rollout.
 
 use super::budget::{ledger, spendings};
-use super::claims::{holds, of_samples, statements};
+use super::claims::{deterministic_holds, holds, of_deterministic, of_samples, statements};
 use super::constants::constants;
 use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{deviation, global, growth};
+use super::{deterministic_set, deviation, global, growth};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::GENERATOR;
@@ -33,13 +33,16 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.constants = constants(model, settings)?;
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;
     record.global = global::derived(model, settings, &stored.global)?;
+    record.deterministic = deterministic_set::derived(settings, stored.deterministic.as_ref());
     record.growth = growth::derived(model, settings, &stored.growth)?;
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);
     record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    record.statements.extend(of_deterministic(record.deterministic.as_ref()));
     record.statements.extend(of_samples(plant, settings, &record.picture));
-    record.holds = holds(&record.deviation, &record.global, &record.growth);
+    record.holds = holds(&record.deviation, &record.global, &record.growth)
+        && deterministic_holds(record.deterministic.as_ref());
     Ok(record)
 }
 

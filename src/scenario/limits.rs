@@ -1,5 +1,6 @@
 //! What the numbers of settings may be, one rule for settings from a file and those made by hand.
 
+use super::deterministic_settings::DeterministicSettings;
 use super::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings,
 };
@@ -85,6 +86,15 @@ impl GlobalSettings {
     }
 }
 
+impl DeterministicSettings {
+    /// Refuses numbers out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        positive_f32("deterministic.radius", self.radius.into())?;
+        sample_size("deterministic.starts", self.starts)?;
+        share("deterministic.beta", self.beta)
+    }
+}
+
 impl GrowthSettings {
     /// Refuses numbers out of range, and growth in no coordinate.
     pub(crate) fn check(&self) -> Result<()> {
@@ -127,6 +137,7 @@ impl Settings {
         self.constants.check()?;
         self.deviation.check()?;
         self.global.check()?;
+        self.deterministic.as_ref().map_or(Ok(()), DeterministicSettings::check)?;
         self.growth.check()
     }
 }
@@ -157,6 +168,7 @@ mod tests {
                 source: DeviationSource::Scenario,
             },
             global: GlobalSettings { draws: 100, beta: 1e-3 },
+            deterministic: None,
             slice: Some([axis(0), axis(1)]),
             state: vec![0.0; 2],
             growth: GrowthSettings {

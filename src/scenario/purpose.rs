@@ -24,3 +24,7 @@ pub const CHECK: Purpose = Purpose::numbered(10);
 pub const CHECK_PERTURBATION: Purpose = Purpose::numbered(11);
 /// The rollouts drawn in a report.
 pub const PICTURE: Purpose = Purpose::numbered(12);
+/// Perturbations that certified starts of a deterministic certificate are checked with.
+pub const DETERMINISTIC_ADVERSARY: Purpose = Purpose::numbered(23);
+/// Starts of the certified share of a deterministic certificate.
+pub const DETERMINISTIC: Purpose = Purpose::numbered(24);

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use super::claim::Claim;
+pub use super::deterministic_record::{DeterministicRecord, RadiiRecord};
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 /// The oldest version that is read. Its physics were hashed with parameters as literals, which no
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
@@ -58,6 +59,9 @@ pub struct Record {
     pub deviation: DeviationRecord,
     /// The certified set.
     pub global: GlobalRecord,
+    /// The deterministic certificate, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deterministic: Option<DeterministicRecord>,
     /// The state that slice and growth start from.
     pub state: StateRecord,
     /// The slice through that state.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
+use super::deterministic_settings::DeterministicSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
@@ -134,6 +135,8 @@ pub struct Settings {
     pub deviation: DeviationSettings,
     /// Certified set.
     pub global: GlobalSettings,
+    /// The deterministic certificate, where there is to be one.
+    pub deterministic: Option<DeterministicSettings>,
     /// The slice: the axis across the columns, then the axis along the rows; none where there is but
     /// one state.
     pub slice: Option<[SliceAxis; 2]>,
@@ -235,6 +238,7 @@ impl Settings {
                 source: DeviationSource::Scenario,
             },
             global: GlobalSettings { draws: 20_000, beta },
+            deterministic: None,
             slice,
             state,
             growth: GrowthSettings {

@@ -13,7 +13,7 @@ use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier, verified_ball};
 use super::tightened::tightening;
-use super::{Context, Unwatched, Watch, compare, global};
+use super::{Context, Unwatched, Watch, compare, deterministic_set, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
@@ -171,6 +171,7 @@ pub fn check(
     ));
     let share = global::share_overlaps(&record.global, &fresh);
     findings.push(share);
+    findings.extend(deterministic_set::adversaries(context, settings)?);
     if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
         let failures = fresh_failures(context, settings, ball)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);

@@ -147,6 +147,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             constants: constants(self.constants),
             deviation: deviation(&bound, self.deviation, NX),
             global: global(NX),
+            deterministic: None,
             state: StateRecord {
                 x: short(&self.state),
                 tier: if self.measure(self.state, &bound) > 0.0 { 1 } else { 2 },
