@@ -190,7 +190,7 @@
 //! # Where what is
 //!
 //! The layers, each importing only from those before it: [`real`], [`error`] and [`digest`]; [`formula`],
-//! [`system`], [`policy`], [`cost`] and [`model`]; [`rollout`]; [`backend`]; [`scenario`] and [`control`];
+//! [`system`], [`policy`], [`cost`] and [`model`]; [`rollout`]; [`backend`] and [`tube`]; [`scenario`] and [`control`];
 //! then what is the program's. The mathematics is in `docs/method.md`, the architecture in
 //! `ARCHITECTURE.md`.
 
@@ -222,6 +222,7 @@ pub mod system;
 mod tile;
 #[cfg(feature = "cli")]
 pub mod train;
+pub mod tube;
 
 #[doc(hidden)]
 pub use race as experiment;

@@ -23,6 +23,7 @@ const LAYERS: [(&str, u32); 27] = [
     ("tile", 2),
     ("model", 2),
     ("rollout", 3),
+    ("tube", 4),
     ("backend", 4),
     ("scenario", 5),
     ("control", 5),

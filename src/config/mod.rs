@@ -1,6 +1,7 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
 mod counts;
+mod deterministic;
 mod drop_settings;
 mod drops;
 mod keys;
@@ -18,6 +19,7 @@ pub(crate) mod train;
 mod value;
 
 pub use crate::studies::SystemSection;
+pub use deterministic::{AsDeviation, DeterministicSection, Driving, Enclosing, Radius};
 pub use drops::{CalibrationSection, Count, DropsSection, TighteningSource};
 pub use model::copy_name;
 pub use plant::PolicySource;

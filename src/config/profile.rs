@@ -1,5 +1,6 @@
 //! Defaults: the numbers of each profile that plants share, and those of the double integrator.
 
+use super::deterministic::DeterministicSection;
 use super::drops::{self, CalibrationSection, DropsSection, TighteningSource};
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
@@ -107,6 +108,7 @@ pub(crate) fn common(
         },
         drops: DropsSection::default(),
         calibration: CalibrationSection::default(),
+        deterministic: DeterministicSection::default(),
         slice,
         state: by_name(states, |_, i| state[i]),
         growth: GrowthSection {

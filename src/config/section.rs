@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::deterministic::DeterministicSection;
 use super::drops::{CalibrationSection, DropsSection, TighteningSource, no_risk, share_draws};
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
@@ -54,6 +55,9 @@ pub struct Config {
     /// Calibration of the score.
     #[serde(default)]
     pub calibration: CalibrationSection,
+    /// What is certified without samples.
+    #[serde(default)]
+    pub deterministic: DeterministicSection,
     /// The two coordinates of the slice.
     pub slice: SliceSection,
     /// The state that slice, boundary search and growth start from.

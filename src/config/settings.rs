@@ -66,6 +66,7 @@ impl Config {
             global: self.global_settings()?,
             whole_box: Some(self.box_settings()?),
             drops: self.drop_settings()?,
+            deterministic: self.deterministic_settings()?,
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,

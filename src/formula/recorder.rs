@@ -156,7 +156,7 @@ impl Graph {
     }
 
     /// Calls `see` with all that a node is computed from, the arguments of a network included.
-    pub(super) fn operands(&self, node: u32, see: impl FnMut(u32)) {
+    pub(crate) fn operands(&self, node: u32, see: impl FnMut(u32)) {
         match self.nodes[node as usize] {
             Node::Said(call, _) => {
                 self.calls[call as usize].arguments.iter().copied().for_each(see);

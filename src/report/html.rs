@@ -1,5 +1,6 @@
 //! The page: verdict, statements, figures and numbers of a record.
 
+use super::deterministic;
 use super::figures;
 use super::palette;
 use super::sets;
@@ -164,7 +165,7 @@ fn numbers(record: &Record) -> String {
          {}</section>\n",
         table::claims(record),
         sets::sets(record),
-        table::narrow(record),
+        table::narrow(record) + &deterministic::table(record),
         sets::drops(record),
         table::wide(record),
         table::steps(record),

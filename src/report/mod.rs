@@ -6,6 +6,7 @@
 //! neither the reader's light or dark setting nor a phone's width.
 
 mod contour;
+mod deterministic;
 pub(crate) mod figure;
 mod figures;
 mod html;

@@ -31,7 +31,10 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let global = settings.global.beta;
     let whole_box =
         settings.whole_box.map(|asked| ("box", "interval of the failing share", asked.beta));
-    let more: Vec<_> = whole_box.into_iter().chain(drops_claims(settings)).collect();
+    let share = "interval of the certified share";
+    let deterministic = settings.deterministic.map(|asked| ("deterministic", share, asked.beta));
+    let more: Vec<_> =
+        whole_box.into_iter().chain(drops_claims(settings)).chain(deterministic).collect();
     let of_more: f64 = more.iter().map(|(.., beta)| beta).sum();
     let deviation = settings.deviation.spent(settings.spec.horizon);
     let budget = deviation + 2.0 * global + of_more + rounds * growth.round_beta();

@@ -15,7 +15,9 @@ use super::sets::{self, Sets};
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
-use super::{Context, Watch, boundary, claims, deviation, global, growth, whole_box};
+use super::{
+    Context, Watch, boundary, claims, deterministic_set, deviation, global, growth, whole_box,
+};
 use crate::backend::Program;
 use crate::error::Result;
 use crate::model::Plant;
@@ -63,9 +65,11 @@ pub fn certify(
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
+    let deterministic = deterministic_set::record(context, settings)?;
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + whole_box.as_ref().map_or(0, |found| found.draws)
         + slice.check_margin.len() as u64
+        + settings.deterministic.map_or(0, |asked| asked.starts)
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
     let mut record = Record {
         schema: SCHEMA,
@@ -83,6 +87,7 @@ pub fn certify(
         drops,
         sequence,
         calibration,
+        deterministic,
         state,
         slice,
         growth,

@@ -1,7 +1,9 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
 use super::box_record::BoxRecord;
-use super::record::{GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record};
+use super::record::{
+    DeterministicRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record,
+};
 use super::settings::Settings;
 use super::{empty, probe, sampling, sets, side};
 use crate::model::Plant;
@@ -17,6 +19,7 @@ pub(super) fn holds(record: &Record) -> bool {
         && global.claim.is_obtained()
         && growth.outcome == GrowthOutcome::Verified
         && box_holds(record.whole_box.as_ref())
+        && deterministic_holds(record.deterministic.as_ref())
 }
 
 /// Whether the risk of the whole box is at most the one asked for, where one was.
@@ -46,6 +49,7 @@ pub(super) fn statements(plant: &Plant, settings: &Settings, record: &Record) ->
     statements.insert(2, share_statement(global, settings));
     statements.extend(of_the_box(record.whole_box.as_ref()));
     statements.extend(sets::statements(record, settings.global.draws));
+    statements.extend(record.deterministic.as_ref().map(|found| found.statement.clone()));
     if global.accepted == 0 {
         statements.extend(empty::reasons(model, record, &settings.spec));
     }
@@ -58,6 +62,11 @@ pub(super) fn statements(plant: &Plant, settings: &Settings, record: &Record) ->
     statements.extend(probe::statement(global));
     statements.extend(of_samples(plant, settings, picture));
     statements
+}
+
+/// Whether the deterministic certificate, where one was asked for, certifies any start.
+fn deterministic_holds(record: Option<&DeterministicRecord>) -> bool {
+    record.is_none_or(|record| record.certified > 0)
 }
 
 /// What is to be said of the pictured rollouts: that they are looked at at samples, and where f32 is

@@ -40,7 +40,7 @@ const OF_THE_VERSION: [&str; 4] =
 /// its own beta.
 const OF_SEPARATE_STEPS: [&str; 2] = ["ledger", "beta_total"];
 /// Counts of rollouts, in which a measure may have crossed zero.
-const COUNTS: [&str; 4] = ["accepted", "failures", "reached", "non_finite"];
+const COUNTS: [&str; 5] = ["accepted", "certified", "failures", "reached", "non_finite"];
 
 /// One finding: whether every field of the record is what its seed and configuration give.
 ///

@@ -6,7 +6,7 @@ use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{constants, deviation, global, growth, sets, whole_box};
+use super::{constants, deterministic_set, deviation, global, growth, sets, whole_box};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::GENERATOR;
@@ -37,6 +37,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     }
     record.whole_box =
         whole_box::derived(model, settings, &record.global, stored.whole_box.as_ref())?;
+    record.deterministic = deterministic_set::derived(settings, stored.deterministic.as_ref());
     record.growth = growth::derived(model, settings, &stored.growth)?;
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());

@@ -8,7 +8,7 @@ use super::finding::{Figure, Finding};
 use super::record::{DeviationRecord, GlobalRecord, Record};
 use super::settings::{Joint, Settings};
 use super::tier::verified_ball;
-use super::{Context, global, pairs_f64, purpose, sets, whole_box};
+use super::{Context, deterministic_set, global, pairs_f64, purpose, sets, whole_box};
 use crate::error::Result;
 use crate::rollout::side_by_side::PairGroup;
 use crate::rollout::{
@@ -46,6 +46,7 @@ pub(super) fn findings(
         let band = record.global.band;
         findings.push(whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?);
     }
+    findings.extend(deterministic_set::adversaries(context, settings)?);
     if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
         let failures = in_ball(context, settings, ball)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);

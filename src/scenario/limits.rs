@@ -1,5 +1,6 @@
 //! What the numbers of settings may be, one rule for settings from a file and those made by hand.
 
+use super::deterministic_settings::DeterministicSettings;
 use super::drops_settings::DropSettings;
 use super::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings,
@@ -95,6 +96,15 @@ impl GlobalSettings {
     }
 }
 
+impl DeterministicSettings {
+    /// Refuses numbers out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        positive_f32("deterministic.radius", self.radius.into())?;
+        sample_size("deterministic.starts", self.starts)?;
+        share("deterministic.beta", self.beta)
+    }
+}
+
 impl GrowthSettings {
     /// Refuses numbers out of range, and growth in no coordinate.
     pub(crate) fn check(&self) -> Result<()> {
@@ -137,6 +147,7 @@ impl Settings {
         self.constants.check()?;
         self.deviation.check()?;
         self.global.check()?;
+        self.deterministic.as_ref().map_or(Ok(()), DeterministicSettings::check)?;
         self.whole_box.map_or(Ok(()), |asked| asked.check())?;
         self.drops.as_ref().map_or(Ok(()), DropSettings::check)?;
         self.growth.check()?;
@@ -172,6 +183,7 @@ mod tests {
             global: GlobalSettings { draws: 100, beta: 1e-3 },
             whole_box: None,
             drops: None,
+            deterministic: None,
             slice: Some([axis(0), axis(1)]),
             state: vec![0.0; 2],
             growth: GrowthSettings {

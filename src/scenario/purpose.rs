@@ -44,3 +44,7 @@ pub const CALIBRATION_PERTURBATION: Purpose = Purpose::numbered(36);
 pub const FRESH_NOMINAL: Purpose = Purpose::numbered(24);
 /// Their perturbations.
 pub const FRESH_PERTURBATION: Purpose = Purpose::numbered(25);
+/// Perturbations that certified starts of a deterministic certificate are checked with.
+pub const DETERMINISTIC_ADVERSARY: Purpose = Purpose::numbered(23);
+/// Starts of the certified share of a deterministic certificate.
+pub const DETERMINISTIC: Purpose = Purpose::numbered(26);

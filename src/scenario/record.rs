@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::box_record::BoxRecord;
 pub use super::claim::Claim;
 pub use super::constant_record::{Assumption, ConstantRecord, ConstantsRecord, VisitedRecord};
+pub use super::deterministic_record::{DeterministicRecord, RadiiRecord};
 use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
@@ -75,6 +76,9 @@ pub struct Record {
     /// The calibration of the score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationRecord>,
+    /// The deterministic certificate, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deterministic: Option<DeterministicRecord>,
     /// The state that slice and growth start from.
     pub state: StateRecord,
     /// The slice through that state.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::bound::CountRule;
 use super::box_settings::BoxSettings;
 use super::constant_record::Assumption;
+use super::deterministic_settings::DeterministicSettings;
 use super::drops_settings::DropSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -156,6 +157,8 @@ pub struct Settings {
     pub whole_box: Option<BoxSettings>,
     /// Margin drops, where these tighten the margins and not constants times the deviation bound.
     pub drops: Option<DropSettings>,
+    /// The deterministic certificate, where there is to be one.
+    pub deterministic: Option<DeterministicSettings>,
     /// The slice: the axis across the columns, then the axis along the rows; none where there is but
     /// one state.
     pub slice: Option<[SliceAxis; 2]>,
@@ -259,6 +262,7 @@ impl Settings {
             global: GlobalSettings { draws: 20_000, beta },
             whole_box: Some(BoxSettings { risk: None, beta }),
             drops: None,
+            deterministic: None,
             slice,
             state,
             growth: GrowthSettings {

@@ -151,6 +151,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             drops: None,
             sequence: None,
             calibration: None,
+            deterministic: None,
             state: StateRecord {
                 x: short(&self.state),
                 tier: if self.measure(self.state, &bound) > 0.0 { 1 } else { 2 },

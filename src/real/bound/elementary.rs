@@ -45,12 +45,12 @@ fn wave(x: Interval, crest: f64, function: fn(f64) -> f64) -> Interval {
 }
 
 /// Sines of the angles in `x`, radians.
-pub(super) fn sin(x: Interval) -> Interval {
+pub(crate) fn sin(x: Interval) -> Interval {
     wave(x, 0.25, f64::sin)
 }
 
 /// Cosines of the angles in `x`, radians.
-pub(super) fn cos(x: Interval) -> Interval {
+pub(crate) fn cos(x: Interval) -> Interval {
     wave(x, 0.0, f64::cos)
 }
 
@@ -61,18 +61,18 @@ pub(crate) fn tanh(x: Interval) -> Interval {
 }
 
 /// Natural logarithms of `x`, which must be above zero.
-pub(super) fn ln(x: Interval) -> Interval {
+pub(crate) fn ln(x: Interval) -> Interval {
     rising(x, f64::ln)
 }
 
 /// Exponentials of `x`.
-pub(super) fn exp(x: Interval) -> Interval {
+pub(crate) fn exp(x: Interval) -> Interval {
     let range = rising(x, f64::exp);
     Interval::new(range.low.max(0.0), range.high)
 }
 
 /// Values of the logistic function, and its slopes.
-pub(super) fn sigmoid(x: Interval) -> (Interval, Interval) {
+pub(crate) fn sigmoid(x: Interval) -> (Interval, Interval) {
     let value = |x: f64| match x < 0.0 {
         true => x.exp() / (1.0 + x.exp()),
         false => 1.0 / (1.0 + (-x).exp()),
@@ -87,18 +87,18 @@ pub(super) fn sigmoid(x: Interval) -> (Interval, Interval) {
 }
 
 /// Whether no angle of `x` is an odd quarter of a turn.
-pub(super) fn tan_defined(x: Interval) -> bool {
+pub(crate) fn tan_defined(x: Interval) -> bool {
     x.magnitude() <= FAR && !passes(x, 0.25) && !passes(x, 0.75)
 }
 
 /// Tangents of the angles in `x`, which must be between two poles, and their slopes.
-pub(super) fn tan(x: Interval) -> (Interval, Interval) {
+pub(crate) fn tan(x: Interval) -> (Interval, Interval) {
     let range = rising(x, f64::tan);
     (range, Interval::ONE + range.square())
 }
 
 /// Whether `x` lies in `[-1, 1]`.
-pub(super) fn within_one(x: Interval) -> bool {
+pub(crate) fn within_one(x: Interval) -> bool {
     x.magnitude() <= 1.0
 }
 
@@ -109,23 +109,23 @@ fn asin_slope(x: Interval) -> Interval {
 }
 
 /// Arc sines of `x` in `[-1, 1]`, and their slopes.
-pub(super) fn asin(x: Interval) -> (Interval, Interval) {
+pub(crate) fn asin(x: Interval) -> (Interval, Interval) {
     (rising(x, f64::asin), asin_slope(x))
 }
 
 /// Arc cosines of `x` in `[-1, 1]`, and their slopes.
-pub(super) fn acos(x: Interval) -> (Interval, Interval) {
+pub(crate) fn acos(x: Interval) -> (Interval, Interval) {
     (outward(x.high.acos(), x.low.acos()), -asin_slope(x))
 }
 
 /// Arc tangents of `x`, and their slopes.
-pub(super) fn atan(x: Interval) -> (Interval, Interval) {
+pub(crate) fn atan(x: Interval) -> (Interval, Interval) {
     (rising(x, f64::atan), (Interval::ONE + x.square()).reciprocal())
 }
 
 /// Angles of the points `(x, y)`, none of them the origin or on the two sides of the cut: the largest
 /// and the smallest are those of corners.
-pub(super) fn atan2(y: Interval, x: Interval) -> Interval {
+pub(crate) fn atan2(y: Interval, x: Interval) -> Interval {
     let corners = [(y.low, x.low), (y.low, x.high), (y.high, x.low), (y.high, x.high)];
     // A negative zero plus zero is zero.
     let angles = corners.map(|(y, x)| f64::atan2(y + 0.0, x + 0.0));
@@ -135,14 +135,14 @@ pub(super) fn atan2(y: Interval, x: Interval) -> Interval {
 }
 
 /// Turns to take off all angles of `x` that bring them into `[-pi, pi)`, if one number does.
-pub(super) fn turns(x: Interval) -> Option<f64> {
+pub(crate) fn turns(x: Interval) -> Option<f64> {
     let low = (x.low / TAU + 0.5 - SLACK).floor();
     let high = (x.high / TAU + 0.5 + SLACK).floor();
     (x.magnitude() <= FAR && low == high).then_some(low)
 }
 
 /// The angles of `x` in `[-pi, pi)`.
-pub(super) fn wrap(x: Interval) -> Interval {
+pub(crate) fn wrap(x: Interval) -> Interval {
     let half_turn = PI.next_up();
     // The float is below the true number.
     let turn = Interval::new(TAU, TAU.next_up());
@@ -178,14 +178,14 @@ fn power(x: Interval, exponent: i64) -> Interval {
 }
 
 /// The powers of `x` with a whole exponent, and their slopes; no 0 in `x` where that is negative.
-pub(super) fn powi(x: Interval, exponent: i32) -> (Interval, Interval) {
+pub(crate) fn powi(x: Interval, exponent: i32) -> (Interval, Interval) {
     let exponent = i64::from(exponent);
     let slope = Interval::point(exponent as f64) * power(x, exponent - 1);
     (power(x, exponent), slope)
 }
 
 /// The powers of `x >= 0`, above 0 where `exponent` is negative, and their slopes; both are monotone.
-pub(super) fn powf(x: Interval, exponent: f64) -> (Interval, Interval) {
+pub(crate) fn powf(x: Interval, exponent: f64) -> (Interval, Interval) {
     let value = |x: f64| outward(x.powf(exponent), x.powf(exponent));
     let beyond = Interval::point(exponent) * Interval::new(f64::MAX, f64::INFINITY);
     let slope = |x: f64| match (x == 0.0, x == f64::INFINITY) {

@@ -2,7 +2,7 @@
 
 mod branch;
 mod direction;
-mod elementary;
+pub(crate) mod elementary;
 mod interval;
 mod pieces;
 #[cfg(test)]

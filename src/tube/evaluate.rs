@@ -1,0 +1,136 @@
+//! Values of graphs and networks over affine forms.
+
+use super::affine::{Affine, Symbols};
+use super::choice;
+use super::curve::Curve;
+use crate::formula::{Call, Function, Graph, Node};
+use crate::policy::{Activation, Mlp, OutputActivation};
+
+/// The outputs of `graph` for `inputs`.
+pub(super) fn outputs(graph: &Graph, inputs: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
+    let values = values(graph, inputs, symbols);
+    graph.outputs.iter().map(|output| values[*output as usize].clone()).collect()
+}
+
+/// The values of all nodes of `graph`.
+pub(super) fn values(graph: &Graph, inputs: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
+    let mut values: Vec<Affine> = Vec::with_capacity(graph.nodes.len());
+    let mut said: Vec<Option<Vec<Affine>>> = vec![None; graph.calls.len()];
+    for node in &graph.nodes {
+        let value = match *node {
+            Node::Said(number, output) => {
+                let said = &mut said[number as usize];
+                let call = || called(&graph.calls[number as usize], &values, symbols);
+                said.get_or_insert_with(call)[output as usize].clone()
+            }
+            node => value(node, inputs, &values, symbols),
+        };
+        values.push(value);
+    }
+    values
+}
+
+/// What a network says to its arguments.
+fn called(call: &Call, values: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
+    let arguments = call.arguments.iter().map(|at| values[*at as usize].clone());
+    network(&call.network, arguments.collect(), symbols)
+}
+
+/// The value of a node, given those of the earlier ones.
+fn value(node: Node, inputs: &[Affine], values: &[Affine], symbols: &mut Symbols) -> Affine {
+    let at = |i: u32| &values[i as usize];
+    match node {
+        Node::Input(i) => inputs[i as usize].clone(),
+        Node::Literal(bits) => Affine::constant(f64::from(f32::from_bits(bits))),
+        Node::Add(a, b) => at(a).plus(at(b)),
+        Node::Sub(a, b) if a == b && at(a).known() => Affine::constant(0.0),
+        Node::Sub(a, b) => at(a).minus(at(b)),
+        Node::Mul(a, b) if a == b => Curve::Whole(2).of(at(a), symbols),
+        Node::Mul(a, b) => at(a).times(at(b), symbols),
+        Node::Div(a, b) => {
+            let inverse = Curve::Reciprocal.of(at(b), symbols);
+            at(a).times(&inverse, symbols)
+        }
+        Node::Neg(a) => at(a).negated(),
+        Node::Abs(a) => choice::abs(at(a), symbols),
+        Node::Sqrt(a) => Curve::Root.of(at(a), symbols),
+        Node::Floor(a) => choice::floor(at(a), symbols),
+        Node::Sign(a) => choice::sign(at(a), symbols),
+        Node::Min(a, b) => choice::min(at(a), at(b), symbols),
+        Node::Max(a, b) => choice::max(at(a), at(b), symbols),
+        Node::Clamp(a, low, high) => choice::clamp(at(a), [at(low), at(high)], symbols),
+        Node::IfLt(a, b, yes, no) | Node::SelectLt(a, b, yes, no) => {
+            branch([a, b, yes, no], values, symbols)
+        }
+        Node::Hypot(a, b) => choice::hypot(at(a), at(b), symbols),
+        Node::Atan2(a, b) => choice::atan2(at(a), at(b), symbols),
+        Node::Powi(a, exponent) => power(at(a), exponent, symbols),
+        Node::Powf(a, bits) => constant_power(at(a), f32::from_bits(bits), symbols),
+        Node::Apply(Function::Wrap, a) => choice::wrap(at(a), symbols),
+        Node::Apply(function, a) => Curve::Apply(function).of(at(a), symbols),
+        Node::Said(..) => panic!("outputs of networks come from the calls of the graph"),
+    }
+}
+
+/// A branch; the patterns of minimum and maximum are these.
+fn branch([a, b, yes, no]: [u32; 4], values: &[Affine], symbols: &mut Symbols) -> Affine {
+    let at = |i: u32| &values[i as usize];
+    match (yes, no) {
+        (yes, no) if (yes, no) == (a, b) => choice::min(at(a), at(b), symbols),
+        (yes, no) if (yes, no) == (b, a) => choice::max(at(a), at(b), symbols),
+        _ => choice::if_lt([at(a), at(b)], [at(yes), at(no)], symbols),
+    }
+}
+
+/// A whole power.
+fn power(x: &Affine, exponent: i32, symbols: &mut Symbols) -> Affine {
+    match exponent {
+        0 if x.known() => Affine::constant(1.0),
+        1 => x.clone(),
+        _ => Curve::Whole(exponent).of(x, symbols),
+    }
+}
+
+/// A constant power: a whole one or a root where it is that.
+fn constant_power(x: &Affine, exponent: f32, symbols: &mut Symbols) -> Affine {
+    let whole = exponent as i32;
+    if whole as f32 == exponent && whole.unsigned_abs() < 1 << 24 {
+        return power(x, whole, symbols);
+    }
+    let curve = if exponent == 0.5 { Curve::Root } else { Curve::Power(exponent) };
+    curve.of(x, symbols)
+}
+
+/// The outputs of a network.
+pub(super) fn network(network: &Mlp, mut x: Vec<Affine>, symbols: &mut Symbols) -> Vec<Affine> {
+    let last = network.layers().len() - 1;
+    for (i, layer) in network.layers().iter().enumerate() {
+        let sums = Affine::dense(&layer.weight, &layer.bias, &x);
+        let activated = sums.iter().map(|sum| match i == last {
+            true => output(network.output(), sum, symbols),
+            false => hidden(network.activation(), sum, symbols),
+        });
+        x = activated.collect();
+    }
+    x
+}
+
+/// The activation of a hidden neuron.
+fn hidden(activation: Activation, sum: &Affine, symbols: &mut Symbols) -> Affine {
+    match activation {
+        Activation::Relu => choice::positive_part(sum, symbols),
+        Activation::Tanh => Curve::Apply(Function::Tanh).of(sum, symbols),
+        Activation::Silu => {
+            let logistic = Curve::Apply(Function::Sigmoid).of(sum, symbols);
+            sum.times(&logistic, symbols)
+        }
+    }
+}
+
+/// The activation of an output.
+fn output(activation: OutputActivation, sum: &Affine, symbols: &mut Symbols) -> Affine {
+    match activation {
+        OutputActivation::Tanh => Curve::Apply(Function::Tanh).of(sum, symbols),
+        OutputActivation::Identity => sum.clone(),
+    }
+}
