@@ -1,13 +1,6 @@
-//! The section of the deterministic certificate.
+//! Keys of the deterministic certificate.
 
 use serde::{Deserialize, Serialize};
-
-use super::section::Config;
-use crate::error::{Error, Result};
-use crate::rollout::PairControl;
-use crate::scenario::deterministic::Kind;
-use crate::scenario::deterministic_settings::DeterministicSettings;
-use crate::scenario::limits::positive_f32;
 
 /// What is certified without samples, and how much work goes into it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,11 +39,11 @@ impl Default for DeterministicSection {
 pub enum Enclosing {
     /// Not at all: nothing is certified without samples.
     None,
-    /// See [`Kind::Pieces`].
+    /// See [`crate::scenario::deterministic::Kind::Pieces`].
     Pieces,
-    /// See [`Kind::Tube`].
+    /// See [`crate::scenario::deterministic::Kind::Tube`].
     Tube,
-    /// See [`Kind::Lipschitz`].
+    /// See [`crate::scenario::deterministic::Kind::Lipschitz`].
     Lipschitz,
 }
 
@@ -82,33 +75,4 @@ pub enum Driving {
     Replay,
     /// By the policy in feedback.
     ClosedLoop,
-}
-
-impl Config {
-    /// The deterministic certificate, where there is to be one.
-    pub(super) fn deterministic_settings(&self) -> Result<Option<DeterministicSettings>> {
-        let DeterministicSection { starts, radii, beta, .. } = self.deterministic;
-        let kind = match self.deterministic.kind {
-            Enclosing::None => return Ok(None),
-            Enclosing::Pieces => Kind::Pieces,
-            Enclosing::Tube => Kind::Tube,
-            Enclosing::Lipschitz => Kind::Lipschitz,
-        };
-        let radius = match self.deterministic.radius {
-            Radius::Named(AsDeviation::Deviation) => self.deviation.radius,
-            Radius::Given(radius) => radius,
-        };
-        let control = match self.deterministic.control {
-            Driving::Deviation => self.deviation.control,
-            Driving::Replay => PairControl::Replay,
-            Driving::ClosedLoop => PairControl::ClosedLoop,
-        };
-        if kind == Kind::Pieces && control == PairControl::ClosedLoop {
-            let problem = "`pieces` needs replayed controls; use `tube`, or `control = \"replay\"`";
-            return Err(Error::invalid("deterministic.kind", problem));
-        }
-        let radius = positive_f32("deterministic.radius", radius)?;
-        let settings = DeterministicSettings { kind, radius, control, starts, radii, beta };
-        settings.check().map(|()| Some(settings))
-    }
 }

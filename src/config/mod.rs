@@ -2,6 +2,7 @@
 
 mod counts;
 mod deterministic;
+mod deterministic_settings;
 mod drop_settings;
 mod drops;
 mod keys;
