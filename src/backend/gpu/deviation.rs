@@ -4,7 +4,7 @@ use super::attempt::Attempt;
 use super::batch::Batch;
 use super::chain::ChainStep;
 use super::chunking::{Chunking, Work};
-use super::compose::{Kernel, Slot};
+use super::compose::Slot;
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
 use super::params::Params;
@@ -79,7 +79,7 @@ fn roll(job: &mut Job<'_>, params: Params) -> Result<Rolled> {
     let Workspace { inputs, readback, buffers, kernels, .. } = space;
     let kernels = &kernels[0];
     let mut batch = Batch::default();
-    batch.push_columns(Kernel::Sample, &kernels.sample, &params);
+    batch.push_columns(&kernels.sample, &params);
     let mut step = 0;
     while step <= params.horizon {
         let count = chunking.segment.min(params.horizon + 1 - step);
@@ -127,7 +127,7 @@ fn segment<'a>(
             let columns = if params.closed_loop == 0 { params.columns } else { chunking.row };
             kernels.drive(batch, buffers, columns, chunking.row, step);
         }
-        batch.push_columns(Kernel::Deviation, &kernels.rollout, &params.over(step, steps));
+        batch.push_columns(&kernels.rollout, &params.over(step, steps));
         step += steps;
     }
     if let Some(reduce) = &kernels.after {

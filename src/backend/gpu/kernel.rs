@@ -13,9 +13,19 @@ use crate::error::Result;
 /// Changes the text of a kernel before it is compiled.
 pub(super) type Edit = Arc<dyn Fn(&str) -> String + Send + Sync>;
 
+/// A kernel before it is compiled.
+pub(super) struct Composed {
+    pub(super) kernel: Kernel,
+    pub(super) bindings: Vec<(Slot, Access)>,
+    /// Columns of a workgroup.
+    pub(super) columns: u32,
+    pub(super) text: String,
+}
+
 /// A compiled kernel and what it binds.
 pub(super) struct Pipeline {
     kernel: Kernel,
+    columns: u32,
     layout: wgpu::BindGroupLayout,
     bindings: Vec<(Slot, Access)>,
     pipeline: wgpu::ComputePipeline,
@@ -41,20 +51,15 @@ impl Pipelines {
         Self { edit: Some(edit), ..Self::default() }
     }
 
-    /// The pipeline of `kernel` with the text `composed`, from the cache or built now.
+    /// The pipeline of a kernel, from the cache or built now.
     ///
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if the driver refuses the text.
-    pub(super) fn pipeline(
-        &self,
-        device: &Device,
-        kernel: Kernel,
-        bindings: Vec<(Slot, Access)>,
-        composed: String,
-    ) -> Result<Arc<Pipeline>> {
+    pub(super) fn pipeline(&self, device: &Device, composed: Composed) -> Result<Arc<Pipeline>> {
+        let Composed { kernel, bindings, columns, text } = composed;
         let text = match &self.edit {
-            Some(edit) => edit(&composed),
-            None => composed,
+            Some(edit) => edit(&text),
+            None => text,
         };
         let key = (kernel, text);
         let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
@@ -64,7 +69,8 @@ impl Pipelines {
         device.counters.add(Count::Pipeline);
         let module = self.module(device, kernel, &key.1);
         let cache = self.cache.as_ref().map(PipelineCache::handle);
-        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module, cache));
+        let built_now = Pipeline::new(device, kernel, bindings, &module, cache);
+        let pipeline = Arc::new(Pipeline { columns, ..built_now });
         device.check()?;
         built.insert(key, Arc::clone(&pipeline));
         Ok(pipeline)
@@ -126,7 +132,7 @@ impl Pipeline {
             },
             cache,
         });
-        Self { kernel, layout, bindings, pipeline }
+        Self { kernel, columns: kernel.workgroup(), layout, bindings, pipeline }
     }
 
     /// Binds the buffer that `buffer` names for each slot.
@@ -160,6 +166,11 @@ impl Bound {
     /// Name of the kernel's entry point.
     pub(super) fn kernel(&self) -> &'static str {
         self.pipeline.kernel.entry()
+    }
+
+    /// Columns of a workgroup.
+    pub(super) fn columns(&self) -> u32 {
+        self.pipeline.columns
     }
 
     /// Runs `groups` workgroups with the parameters at `offset`.

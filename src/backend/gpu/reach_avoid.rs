@@ -6,7 +6,7 @@ use super::attempt::Attempt;
 use super::batch::Batch;
 use super::chain::ChainStep;
 use super::chunking::{Chunking, Work};
-use super::compose::{Kernel, Slot};
+use super::compose::Slot;
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
 use super::params::Params;
@@ -57,7 +57,7 @@ fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
     let Job { flight, chunking, space, .. } = job;
     let Workspace { inputs, readback, buffers, kernels, .. } = space;
     let mut batch = Batch::default();
-    batch.push_columns(Kernel::Sample, &kernels[0].sample, &params);
+    batch.push_columns(&kernels[0].sample, &params);
     let (mut step, mut set) = (0, 0);
     loop {
         let end = params.horizon.saturating_add(1).min(step + chunking.segment);
@@ -66,7 +66,7 @@ fn roll(job: &mut Job<'_>, mut params: Params) -> Result<Vec<f32>> {
         let last = step > params.horizon;
         let compacted = kernels[set].after.as_ref().filter(|_| !last);
         if let Some(compact) = compacted {
-            batch.push_columns(Kernel::Compact, compact, &params);
+            batch.push_columns(compact, &params);
         }
         inputs.write(&flight.device, &batch);
         let clear = |encoder: &mut _| {
@@ -120,7 +120,7 @@ fn segment<'a>(
         if step < params.horizon {
             kernels.drive(batch, buffers, columns, row, step);
         }
-        batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params.over(step, count));
+        batch.push_columns(&kernels.rollout, &params.over(step, count));
         step += count;
     }
 }

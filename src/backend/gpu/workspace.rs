@@ -68,7 +68,8 @@ impl Workspace {
         let inputs = Inputs::new(device, pool, sizes);
         let buffers = Buffers::new(flight, compiled, network, shape);
         let sets = if shape.work == Work::Sign { 2 } else { 1 };
-        let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers };
+        let columns = chunking.stride;
+        let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers, columns };
         let kernels =
             (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(chunking.stride);
@@ -194,7 +195,7 @@ impl Kernels {
     ) {
         if let Some(observe) = &self.observe {
             let params = Params { columns, stride: row, step, ..Params::default() };
-            batch.push_columns(Kernel::Observe, observe, &params);
+            batch.push_columns(observe, &params);
         }
         if let Some(layers) = &buffers.layers {
             layers.forward(batch, &self.layers, columns, row);
@@ -208,6 +209,8 @@ struct Binder<'a> {
     compiled: &'a Compiled,
     inputs: &'a Inputs,
     buffers: &'a Buffers,
+    /// Most columns of a chunk.
+    columns: u32,
 }
 
 impl Binder<'_> {
@@ -236,7 +239,7 @@ impl Binder<'_> {
 
     /// Formulas that call networks.
     fn chain(&self, set: usize) -> Result<Option<BoundChain>> {
-        let Self { flight, compiled, inputs, buffers } = *self;
+        let Self { flight, compiled, inputs, buffers, .. } = *self;
         let both = compiled.text.chain().zip(buffers.chain.as_ref());
         let bind = |(chain, buffers)| {
             let state = self.buffers.of_set(Slot::State, set);
@@ -255,7 +258,7 @@ impl Binder<'_> {
 
     /// `kernel` with its buffers; `ends` are its source and its sink, where it has such.
     fn bind(&self, kernel: Kernel, set: usize, ends: Option<[&Buffer; 2]>) -> Result<Bound> {
-        let pipeline = self.compiled.pipeline(&self.flight.device, kernel)?;
+        let pipeline = self.compiled.pipeline(&self.flight.device, kernel, self.columns)?;
         let buffer = |slot| match (slot, ends) {
             (Slot::Source, Some([source, _])) => source,
             (Slot::Sink, Some([_, sink])) => sink,

@@ -1,10 +1,11 @@
 //! The text of the kernels of measures, pairs and networks.
 
 use super::chain::ChainText;
+use super::fused::{Fused, fused_text};
 use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
 use super::kernels::{Access, Kernel, Slot};
-use super::layers::{Fused, activation_glue, fused_text, layer_text};
+use super::layers::layer_text;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
@@ -22,6 +23,9 @@ const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
 const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
+
+/// `begin_drive` where a thread keeps nothing for its steps.
+const NOTHING_TO_BEGIN: &str = "fn begin_drive(lane: u32) {\n}\n";
 
 /// The texts of the kernels of a model and who drives it; values of parameters and weights are no
 /// part of them.
@@ -120,7 +124,15 @@ impl PlantText {
         list
     }
 
-    /// Threads of a workgroup of `kernel`, which has [`Kernel::workgroup`] trajectories.
+    /// Trajectories of a workgroup of `kernel`.
+    pub fn columns(&self, kernel: Kernel) -> u32 {
+        match (kernel, self.fused()) {
+            (Kernel::ReachAvoid | Kernel::Deviation, Some(fused)) => fused.trajectories(),
+            _ => kernel.workgroup(),
+        }
+    }
+
+    /// Threads of a workgroup of `kernel`, which has [`PlantText::columns`] trajectories.
     pub fn lanes(&self, kernel: Kernel) -> u32 {
         match (kernel, self.fused()) {
             (Kernel::ReachAvoid | Kernel::Deviation, Some(fused)) => fused.lanes(),
@@ -174,14 +186,18 @@ impl PlantText {
     /// What judges and drives a rollout.
     fn rollout(&self, kernel: Kernel) -> String {
         let lanes = format!(
-            "const LANES: u32 = {}u;\n// Whether `drive` is called by all threads together.\n\
-             const TOGETHER: bool = {};\n",
+            "const LANES: u32 = {}u;\nconst COLUMNS: u32 = {}u;\n\
+             // Whether `drive` is called by all threads together.\nconst TOGETHER: bool = {};\n",
             self.lanes(kernel),
+            self.columns(kernel),
             self.fused().is_some()
         );
         let states = self.outline.states;
         let moves = match &self.chain {
-            Some(_) => [store_glue(states), ChainText::rollout_glue(&self.outline)].concat(),
+            Some(_) => {
+                let glue = ChainText::rollout_glue(&self.outline);
+                [&store_glue(states), &glue, NOTHING_TO_BEGIN].concat()
+            }
             None => [state_glue(states), self.functions(kernel), self.drive()].join("\n"),
         };
         [FINITE, FOLD, &lanes, &finite_glue(states), &moves, JUDGE].join("\n")
@@ -258,11 +274,11 @@ impl PlantText {
         let Some(driving) = &self.outline.driving else {
             return "fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {\n    \
                     return control_of(x, t);\n}\n"
-                .to_owned();
+                .to_owned()
+                + NOTHING_TO_BEGIN;
         };
         if let Some(fused) = &driving.fused {
-            let glue = activation_glue(driving.inputs, driving.outputs);
-            return fused_text(driving.activations, fused, &glue);
+            return fused_text(driving.activations, fused, driving.outputs);
         }
         let slot = Slot::Control as u32;
         let mut text = format!(
@@ -274,7 +290,8 @@ impl PlantText {
             text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
         }
         let all: Vec<String> = (0..driving.outputs).map(component).collect();
-        text + &format!("    return acted(x, Outputs({}), t);\n}}\n", all.join(", "))
+        text += &format!("    return acted(x, Outputs({}), t);\n}}\n", all.join(", "));
+        text + NOTHING_TO_BEGIN
     }
 }
 
