@@ -11,7 +11,7 @@
 @group(0) @binding(8) var<storage, read_write> distances: array<f32>;
 
 // Distance of two states; HUGE where something is not finite.
-fn gap(nominal: State, perturbed: State) -> f32 {
+fn gap(nominal: array<f32, NX>, perturbed: array<f32, NX>) -> f32 {
     let distance = state_distance(nominal, perturbed);
     let sound = state_finite(nominal) && state_finite(perturbed) && finite(distance);
     return select(HUGE, distance, sound);
@@ -32,13 +32,13 @@ fn deviation(
     var nominal_fold = folds[column];
     var perturbed_fold = folds[second];
     for (var t = params.step; t < params.step + params.steps; t += 1u) {
-        let row = schedule[t].xyz;
+        let row = schedule[t];
         if writes {
             let place = (t - params.segment_start) * params.stride + column;
             distances[place] = gap(nominal, perturbed);
         }
         nominal_fold = judge(nominal_fold, nominal, t, row);
-        perturbed_fold = judge(perturbed_fold, perturbed, t, vec3<f32>(row.x, 0.0, 0.0));
+        perturbed_fold = judge(perturbed_fold, perturbed, t, vec4<f32>(row.x, 0.0, 0.0, 0.0));
         if t < params.horizon {
             let replayed = drive(lane, column, nominal, t);
             if params.closed_loop != 0u {

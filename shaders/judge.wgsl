@@ -10,11 +10,17 @@ fn bounded(margin: f32) -> f32 {
     return select(margin, bitcast<f32>(bits - 1u), (bits & MAGNITUDE) == EXPONENT);
 }
 
+// A margin that loses `number`, or is multiplied with it.
+fn act(margin: f32, number: f32, multiplied: bool) -> f32 {
+    return bounded(select(margin - number, margin * number, multiplied));
+}
+
 // Adds the margins at `x`, the state at step `t`, to a fold. `row` of the schedule: discount, then
-// what the target margin and the constraint margin lose.
-fn judge(fold: Fold, x: State, t: u32, row: vec3<f32>) -> Fold {
-    let target_margin = bounded(target_at(x, t) - row.y);
-    let constraint_margin = bounded(constraint_at(x, t) - row.z);
+// what the target margin and the constraint margin lose, or their factors where the last is not 0.
+fn judge(fold: Fold, x: array<f32, NX>, t: u32, row: vec4<f32>) -> Fold {
+    let multiplied = row.w != 0.0;
+    let target_margin = act(target_at(x, t), row.y, multiplied);
+    let constraint_margin = act(constraint_at(x, t), row.z, multiplied);
     if !(state_finite(x) && finite(target_margin) && finite(constraint_margin)) {
         return fold_fail(fold);
     }

@@ -3,7 +3,7 @@
 // [NU, stride]
 @group(0) @binding(23) var<storage, read_write> carry: array<f32>;
 
-var<private> correlated: Control;
+var<private> correlated: array<f32, NU>;
 
 fn resume_noise(column: u32) {
     if params.step > 0u {
@@ -13,7 +13,7 @@ fn resume_noise(column: u32) {
     }
 }
 
-fn noise_at(t: u32) -> Control {
+fn noise_at(t: u32) -> array<f32, NU> {
     let fresh = draw(t);
     if t == 0u {
         correlated = fresh;

@@ -3,7 +3,7 @@
 fn resume_noise(column: u32) {
 }
 
-fn noise_at(t: u32) -> Control {
+fn noise_at(t: u32) -> array<f32, NU> {
     return draw(t);
 }
 

@@ -12,7 +12,7 @@ struct SplineRow {
 // [H]
 @group(0) @binding(22) var<storage, read> spline: array<SplineRow>;
 
-var<private> knots: array<Control, 4>;
+var<private> knots: array<array<f32, NU>, 4>;
 // The knot after the window.
 var<private> next_knot: u32;
 
@@ -20,7 +20,7 @@ fn resume_noise(column: u32) {
     next_knot = spline[params.step].first;
 }
 
-fn noise_at(t: u32) -> Control {
+fn noise_at(t: u32) -> array<f32, NU> {
     let row = spline[t];
     while next_knot < row.first + SUPPORT {
         knots[0] = knots[1];

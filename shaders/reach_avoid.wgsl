@@ -25,7 +25,7 @@ fn reach_avoid(
             break;
         }
         if !settled {
-            fold = judge(fold, x, t, schedule[t].xyz);
+            fold = judge(fold, x, t, schedule[t]);
         }
         if t < params.horizon {
             x = advance(x, drive(lane, column, x, t), t);

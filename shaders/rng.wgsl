@@ -50,8 +50,6 @@ fn unit(word: u32) -> f32 {
 
 // a * b, rounded before anything is added to it: a driver that contracts a * b + c would draw
 // other starts than the host. It cannot know that `zero` is 0, so it must form the product's bits.
-// Division and square root stay as they are: where a GPU does not round them correctly (WGSL
-// allows 2.5 ulp and more), starts in a ball can still differ in the last bits.
 fn product(a: f32, b: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(a * b) ^ params.zero);
 }

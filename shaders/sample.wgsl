@@ -19,23 +19,28 @@ fn sample_index(column: u32) -> vec2<u32> {
     return vec2<u32>(low, params.first_high + select(0u, 1u, low < column));
 }
 
-fn box_start(index: vec2<u32>) -> State {
+fn box_start(index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.key_low, params.key_high);
-    var x: State;
+    var x: array<f32, NX>;
     var words: vec4<u32>;
     for (var i = 0u; i < NX; i += 1u) {
         if i % BLOCK_WORDS == 0u {
             words = philox(vec4<u32>(index, i / BLOCK_WORDS, params.stream), key);
         }
-        x[i] = region[i].x + product(unit(words[i % BLOCK_WORDS]), region[i].y);
+        x[i] = sum(region[i].x, product(unit(words[i % BLOCK_WORDS]), region[i].y));
     }
     return x;
 }
 
 // Uniform offset in the unit ball: z / sqrt(|z|^2 + 2 E), see rollout/sample.rs. `everywhere`
 // lets all coordinates vary, else only those that the region marks.
-fn ball_offset(key: vec2<u32>, stream: u32, index: vec2<u32>, everywhere: bool) -> State {
-    var normal: State;
+fn ball_offset(
+    key: vec2<u32>,
+    stream: u32,
+    index: vec2<u32>,
+    everywhere: bool,
+) -> array<f32, NX> {
+    var normal: array<f32, NX>;
     var square = 0.0;
     var words: vec4<u32>;
     for (var pair = 0u; pair < NORMAL_PAIRS; pair += 1u) {
@@ -49,7 +54,7 @@ fn ball_offset(key: vec2<u32>, stream: u32, index: vec2<u32>, everywhere: bool) 
             if everywhere || region[i].z > 0.0 {
                 let z = both[i - at];
                 normal[i] = z;
-                square += product(z, z);
+                square = sum(square, product(z, z));
             }
         }
     }
@@ -57,29 +62,29 @@ fn ball_offset(key: vec2<u32>, stream: u32, index: vec2<u32>, everywhere: bool) 
     if last % BLOCK_WORDS == 0u {
         words = philox(vec4<u32>(index, last / BLOCK_WORDS, stream), key);
     }
-    square -= product(2.0, ln_unit(1.0 - unit(words[last % BLOCK_WORDS])));
-    let scale = 1.0 / sqrt(square);
+    square = sum(square, product(-2.0, ln_unit(1.0 - unit(words[last % BLOCK_WORDS]))));
+    let scale = quotient(1.0, root(square));
     for (var i = 0u; i < NX; i += 1u) {
         normal[i] = product(normal[i], scale);
     }
     return normal;
 }
 
-fn ball_start(index: vec2<u32>) -> State {
+fn ball_start(index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.key_low, params.key_high);
     var x = ball_offset(key, params.stream, index, false);
     for (var i = 0u; i < NX; i += 1u) {
-        x[i] = region[i].x + product(region[i].y, x[i]);
+        x[i] = sum(region[i].x, product(region[i].y, x[i]));
     }
     return x;
 }
 
-fn perturb(nominal: State, index: vec2<u32>) -> State {
+fn perturb(nominal: array<f32, NX>, index: vec2<u32>) -> array<f32, NX> {
     let key = vec2<u32>(params.pair_key_low, params.pair_key_high);
     var x = ball_offset(key, params.pair_stream, index, true);
     var center = nominal;
     for (var i = 0u; i < NX; i += 1u) {
-        x[i] = center[i] + product(params.pair_radius, x[i]);
+        x[i] = sum(center[i], product(params.pair_radius, x[i]));
     }
     return x;
 }
@@ -91,7 +96,7 @@ fn sample(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let index = sample_index(column);
-    var start: State;
+    var start: array<f32, NX>;
     if params.region_kind == REGION_BOX {
         start = box_start(index);
     } else if params.region_kind == REGION_BALL {

@@ -6,6 +6,8 @@ mod command;
 mod common;
 
 use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
 
 use command::{done, refused};
 use reachcast::bench::record::{BENCH_SCHEMA, BenchRecord};
@@ -44,7 +46,31 @@ fn every_field_of_the_record_makes_sense() {
         // Above one only as far as others slow the machine down while its limit is measured.
         assert!(one.share > 0.0 && one.share < 20.0, "{one:?}");
     }
-    assert!(record.scaling.is_empty() && record.left_out.is_empty());
+    assert!(record.scaling.is_empty() && record.left_out.is_empty() && record.to_come.is_empty());
+}
+
+/// Killed after its first workload: what it measured is there, and what it did not is named.
+#[test]
+fn a_killed_benchmark_leaves_what_it_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let stored = folder.path().join("bench.json");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_reachcast"))
+        .args(["bench", "--backend", "cpu", "--threads", "2", "-q", "--workload", "/158", "--out"])
+        .arg(folder.path())
+        .spawn()
+        .unwrap();
+    while !stored.exists() {
+        assert!(program.try_wait().unwrap().is_none(), "it ended without a record");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    program.kill().unwrap();
+    program.wait().unwrap();
+    let record: BenchRecord =
+        serde_json::from_str(&std::fs::read_to_string(stored).unwrap()).unwrap();
+    let names: Vec<&str> = record.workloads.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["rollout/3x64/158"]);
+    assert!(record.workloads[0].share > 0.0, "{:?}", record.workloads[0]);
+    assert_eq!(record.to_come, ["rollout/3x128/158 on cpu", "rollout/4x512/158 on cpu"]);
 }
 
 /// By hand, per step: two operations per weight and 40 of the physics, of which 5 multiply parameters;

@@ -73,6 +73,7 @@ fn a_certificate_is_written_queried_and_checked() {
     assert_eq!(record, stored(&out));
     let files = [
         "certificate.json",
+        "counterexamples.csv",
         "deviation.csv",
         "experiment.json",
         "policy.safetensors",

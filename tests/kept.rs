@@ -168,6 +168,7 @@ fn races_and_sweeps_make_way_when_they_are_told_to() {
     names.sort();
     let expected = [
         "certificate.json",
+        "counterexamples.csv",
         "deviation.csv",
         "experiment.json",
         "policy.safetensors",

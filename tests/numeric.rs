@@ -6,9 +6,9 @@
 
 mod common;
 
-use common::{backends, settings};
-use reachcast::backend::gpu::{Gpu, NetworkKernels};
-use reachcast::backend::{Backend, gpu::Choice};
+use common::{adapter, backends, settings};
+use reachcast::backend::Backend;
+use reachcast::backend::gpu::NetworkKernels;
 use reachcast::cost::Cost;
 use reachcast::model::Plant;
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
@@ -130,7 +130,7 @@ fn starts() -> Vec<[f32; 1]> {
 fn every_way() -> Vec<Backend> {
     let mut all = backends();
     if all.len() > 1 {
-        let gpu = Gpu::open(&Choice::Any).expect("it opened before");
+        let gpu = adapter().expect("it opened before");
         all.push(Backend::Gpu(gpu.with_networks(NetworkKernels::Fused)));
     }
     all

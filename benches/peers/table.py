@@ -31,18 +31,20 @@ PAUSE = 0.3
 
 
 class Ours:
-    """This program: a process for each turn."""
+    """This program: a process for each turn, which compiles before its clock starts."""
 
-    def __init__(self):
-        self.title = "Reachcast"
+    def __init__(self, backend):
+        self.title, self.backend = "Reachcast", backend
 
     def ask(self, workload):
-        words = ["bench", "--quick", "--backend", "cpu", "--json", "--workload", workload]
+        words = ["bench", "--quick", "--backend", self.backend, "--json", "--workload", workload]
         done = subprocess.run([PROGRAM, *words], stdout=subprocess.PIPE, check=True)
         record = json.loads(done.stdout)
         machine = record["machine"]
         self.title = f"Reachcast {record['version']}"
         self.machine = f"{machine['cpu']}, {machine['cores']} cores, {machine['instructions']}"
+        if self.backend == "gpu":
+            self.machine += f", {record['backends'][0]['device']}"
         (found,) = [one for one in record["workloads"] if one["name"] == workload]
         return {"rate": found["units_per_second"]}
 
@@ -120,6 +122,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="two rounds, no large workload")
     parser.add_argument("--workload", default="", help="only those whose name contains this")
+    parser.add_argument("--backend", choices=("cpu", "gpu"), default="cpu", help="ours; cpu")
     parser.add_argument("--rounds", type=int, default=5, help="most rounds of a workload")
     return parser.parse_args()
 
@@ -133,14 +136,14 @@ def main():
         chosen = [name for name in chosen if name not in LARGE]
     folder = TARGET / "peers"
     subprocess.run([PROGRAM, "bench", "-q", "--export", folder], check=True)
-    ours, scripts = Ours(), [Peer(name, script, folder) for name, script in PEERS.items()]
+    ours, scripts = Ours(asked.backend), [Peer(name, script, folder) for name, script in PEERS.items()]
     peers = [peer for peer in scripts if not peer.absent]
     most = min(asked.rounds, 2) if asked.quick else asked.rounds
     rows = [row(name, rounds_of(name, [ours, *peers], most)) for name in chosen]
     for peer in scripts:
         peer.close()
     print(f"{ours.machine}; {platform.system()}, Python {platform.python_version()}; "
-          f"{', '.join([ours.title, *(peer.title for peer in scripts)])}; all on all cores.\n"
+          f"{', '.join([ours.title, *(peer.title for peer in scripts)])}; processors on all cores.\n"
           "Units per second: median (smallest to largest) over rounds in which each takes its turn; "
           "ratio: this program over the peer within a round.\n")
     heads = [head for peer in peers for head in (peer.title, "ratio")]

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::{Event, MeasureSink, PairSink};
+use super::Event;
+use super::sink::{PairsSink, StartSink};
 use crate::error::{Error, Result};
 use crate::model::Plant;
 use crate::rollout::{DeviationTask, Farthest, MppiTask, PlanTally, Planning, ReachAvoidTask};
@@ -62,7 +63,7 @@ impl Prepared<'_> {
     pub(super) fn reach_avoid(
         &self,
         _task: &ReachAvoidTask<'_>,
-        _sink: MeasureSink<'_>,
+        _sink: StartSink<'_>,
     ) -> Result<()> {
         match *self.0 {}
     }
@@ -70,7 +71,7 @@ impl Prepared<'_> {
     pub(super) fn deviation(
         &self,
         _task: &DeviationTask<'_>,
-        _sink: PairSink<'_>,
+        _sink: PairsSink<'_>,
     ) -> Result<Vec<Farthest>> {
         match *self.0 {}
     }

@@ -1,5 +1,6 @@
 //! A program: a plant prepared on a backend once, and called any number of times.
 
+use super::sink::{PairsSink, StartSink};
 use super::task::check_task;
 use super::{Backend, MeasureSink, PairSink, cpu, gpu};
 use crate::error::{Error, Result};
@@ -52,9 +53,20 @@ impl Program<'_> {
     /// [`Error::Invalid`] where the parts of the task do not fit, those of the device, and the first
     /// of the sink.
     pub fn reach_avoid(&self, task: &ReachAvoidTask<'_>, sink: MeasureSink<'_>) -> Result<()> {
+        self.roll_out(task, StartSink::Each(sink))
+    }
+
+    /// [`Program::reach_avoid`], of which each measure is asked for or what they count up to.
+    pub(super) fn roll_out(
+        &self,
+        task: &ReachAvoidTask<'_>,
+        mut sink: StartSink<'_>,
+    ) -> Result<()> {
         self.check(&task.starts, task.range.end, task.tightening, &task.spec)?;
         match &self.prepared {
-            Prepared::Cpu(cpu, prepared) => prepared.reach_avoid(cpu, task, sink),
+            Prepared::Cpu(cpu, prepared) => {
+                prepared.reach_avoid(cpu, task, &mut |first, values| sink.take(first, values))
+            }
             Prepared::Gpu(prepared) => prepared.reach_avoid(task, sink),
         }
     }
@@ -65,9 +77,20 @@ impl Program<'_> {
     /// # Errors
     /// Those of [`Program::reach_avoid`].
     pub fn deviation(&self, task: &DeviationTask<'_>, sink: PairSink<'_>) -> Result<Vec<Farthest>> {
+        self.roll_out_pairs(task, PairsSink::Each(sink))
+    }
+
+    /// [`Program::deviation`], of which the measures of each pair are asked for or what they count up to.
+    pub(super) fn roll_out_pairs(
+        &self,
+        task: &DeviationTask<'_>,
+        mut sink: PairsSink<'_>,
+    ) -> Result<Vec<Farthest>> {
         self.check(&task.pairs.nominal, task.range.end, task.tightening, &task.spec)?;
         match &self.prepared {
-            Prepared::Cpu(cpu, prepared) => prepared.deviation(cpu, task, sink),
+            Prepared::Cpu(cpu, prepared) => {
+                prepared.deviation(cpu, task, &mut |first, pairs| sink.take(first, pairs))
+            }
             Prepared::Gpu(prepared) => prepared.deviation(task, sink),
         }
     }

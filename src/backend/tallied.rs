@@ -1,6 +1,7 @@
 //! Starts and pairs of a program as tallies: ranges that are cut anywhere and merged again.
 
 use super::Program;
+use super::sink::{PairsSink, StartSink};
 use crate::error::Result;
 use crate::rollout::{DeviationTask, Keep, MeasureTally, PairTally, ReachAvoidTask};
 
@@ -60,10 +61,19 @@ impl Program<'_> {
         told: Told<'_>,
     ) -> Result<MeasureTally> {
         let mut tally = MeasureTally::new(keep);
-        self.reach_avoid(task, &mut |first, values| {
-            tally.add(first, values)?;
-            told(values.len() as u64)
-        })?;
+        match keep {
+            Keep::Counts => self.roll_out(
+                task,
+                StartSink::Counts(&mut |first, counts| {
+                    tally.add_counts(first, counts)?;
+                    told(counts.starts)
+                }),
+            ),
+            Keep::Measures => self.reach_avoid(task, &mut |first, values| {
+                tally.add(first, values)?;
+                told(values.len() as u64)
+            }),
+        }?;
         Ok(tally)
     }
 
@@ -84,10 +94,19 @@ impl Program<'_> {
         told: Told<'_>,
     ) -> Result<PairTally> {
         let mut tally = PairTally::new(task.spec.horizon, keep);
-        let farthest = self.deviation(task, &mut |first, pairs| {
-            tally.add(first, pairs)?;
-            told(pairs.len() as u64)
-        })?;
+        let farthest = match keep {
+            Keep::Counts => self.roll_out_pairs(
+                task,
+                PairsSink::Counts(&mut |first, counts| {
+                    tally.add_counts(first, counts)?;
+                    told(counts.pairs)
+                }),
+            ),
+            Keep::Measures => self.deviation(task, &mut |first, pairs| {
+                tally.add(first, pairs)?;
+                told(pairs.len() as u64)
+            }),
+        }?;
         tally.reach(&farthest);
         Ok(tally)
     }

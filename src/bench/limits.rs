@@ -195,6 +195,8 @@ impl AdapterLimits {
             query: Query::Measure,
         };
         let program = backend.prepare(&Plant::of(system, policy))?;
+        // Compiles the kernels, which no later call does.
+        program.reach_avoid(&task, &mut |_, _| Ok(()))?;
         let round_trip = measure(protocol, || program.reach_avoid(&task, &mut |_, _| Ok(())))?;
         Ok(Some(Self { round_trip, device: gpu.measure_limits()? }))
     }

@@ -32,6 +32,10 @@ pub struct BenchRecord {
     pub left_out: Vec<LeftOutRecord>,
     /// Batches of growing size.
     pub scaling: Vec<ScalingRecord>,
+    /// What was still to come when this was written, each with its backend: something where the
+    /// benchmark was interrupted.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub to_come: Vec<String>,
 }
 
 /// The machine in words.
@@ -95,8 +99,8 @@ pub struct WorkloadRecord {
     /// CPU, multiply-adds in the adapter's registers.
     #[serde(with = "crate::files::number")]
     pub share: f64,
-    /// Time on the adapter by kernel, of one more call; empty on the CPU, and where the adapter has
-    /// no timestamps.
+    /// Time on the adapter by kernel, the median of further calls; empty on the CPU, and where the
+    /// adapter has no timestamps.
     pub kernels: Vec<KernelRecord>,
 }
 
@@ -106,9 +110,9 @@ pub struct WorkloadRecord {
 pub struct KernelRecord {
     /// Entry point.
     pub kernel: String,
-    /// How often it was dispatched.
+    /// How often a call dispatches it.
     pub dispatches: u64,
-    /// Time of all of them, s.
+    /// Time of all of these, s.
     #[serde(with = "crate::files::number")]
     pub seconds: f64,
 }

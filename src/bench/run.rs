@@ -2,7 +2,7 @@
 //! scaling.
 
 use super::limits::{AdapterLimits, HostLimits};
-use super::measure::{Protocol, measure};
+use super::measure::{Protocol, measure, quantile};
 use super::record::{
     BENCH_SCHEMA, BackendRecord, BenchRecord, KernelRecord, LeftOutRecord, MachineRecord,
     WorkloadRecord,
@@ -21,6 +21,8 @@ const SCALING: &str = "scaling";
 const SOFTWARE_FLOPS: f64 = 10e9;
 /// Most operations of a call in a quick benchmark.
 const QUICK_FLOPS: f64 = 150e9;
+/// Calls of which the times of kernels are medians.
+const KERNEL_CALLS: usize = 5;
 /// How many of the growing batches a quick benchmark runs.
 const QUICK_SIZES: usize = 2;
 
@@ -74,7 +76,8 @@ impl Asked {
     }
 }
 
-/// Measures the machine, then what was asked for of `work` on each of `backends`.
+/// Measures the machine, then what was asked for of `work` on each of `backends`; `note` is given the
+/// record whenever something is done, so that an interruption loses no more than it must.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a filter that fits nothing; those of the backends; interruption.
@@ -83,6 +86,7 @@ pub fn run(
     work: Work,
     backends: &[Backend],
     watch: &dyn Watch,
+    note: &mut dyn FnMut(&BenchRecord) -> Result<()>,
 ) -> Result<BenchRecord> {
     let Work { workloads, batch } = work;
     let workloads = asked.chosen(workloads)?;
@@ -101,17 +105,22 @@ pub fn run(
         workloads: Vec::new(),
         left_out: Vec::new(),
         scaling: Vec::new(),
+        to_come: to_come(asked, &workloads, backends),
     };
     for backend in backends {
         record.add_backend(backend)?;
         for workload in &workloads {
             match asked.leaves_out(workload, backend) {
                 Some(reason) => record.leave_out(&workload.name, backend, reason),
-                None => record.add_workload(workload, backend, watch)?,
+                None => {
+                    record.add_workload(workload, backend, watch)?;
+                    record.is_done(note)?;
+                }
             }
         }
         if asked.names(SCALING) {
             record.add_scaling(asked, backend, &batch, watch)?;
+            record.is_done(note)?;
         }
     }
     watch.begin("limits", 1);
@@ -122,7 +131,25 @@ pub fn run(
     Ok(record)
 }
 
+/// What is to be done, in its order.
+fn to_come(asked: &Asked, workloads: &[Workload], backends: &[Backend]) -> Vec<String> {
+    let of = |backend: &Backend| {
+        let kept = workloads.iter().filter(|one| asked.leaves_out(one, backend).is_none());
+        let names =
+            kept.map(|one| one.name.as_str()).chain(asked.names(SCALING).then_some(SCALING));
+        names.map(|name| format!("{name} on {}", backend.name())).collect::<Vec<_>>()
+    };
+    backends.iter().flat_map(of).collect()
+}
+
 impl BenchRecord {
+    /// What comes first is done, and the record as it is handed to `note`.
+    fn is_done(&mut self, note: &mut dyn FnMut(&Self) -> Result<()>) -> Result<()> {
+        self.to_come.remove(0);
+        self.hold_against_limits();
+        note(self)
+    }
+
     /// Measures and notes a backend.
     fn add_backend(&mut self, backend: &Backend) -> Result<()> {
         let adapter = AdapterLimits::measure(&self.protocol, backend)?;
@@ -157,6 +184,10 @@ impl BenchRecord {
     ) -> Result<()> {
         watch.begin(&workload.name, 1);
         let prepared = workload.prepare(backend)?;
+        if let Backend::Gpu(_) = backend {
+            // Compiles the kernels, which no later call does.
+            prepared.call()?;
+        }
         let timing = measure(&self.protocol, || prepared.call())?;
         watch.advance(1)?;
         // Before, between or after failures: these are not the adapter's times.
@@ -208,19 +239,29 @@ impl BenchRecord {
     }
 }
 
-/// Times on the adapter of one call of `workload`.
+/// Times on the adapter of a call of `workload`.
 fn kernel_times(workload: &PreparedWorkload<'_>, backend: &Backend) -> Result<Vec<KernelRecord>> {
     let Backend::Gpu(gpu) = backend else { return Ok(Vec::new()) };
     gpu.time_kernels(true);
-    let called = workload.call();
+    let timed = |_| workload.call().map(|()| gpu.take_kernel_times());
+    let calls: Result<Vec<_>> = (0..KERNEL_CALLS).map(timed).collect();
     gpu.time_kernels(false);
-    called?;
-    let record = |time: KernelTime| KernelRecord {
-        kernel: time.kernel.to_owned(),
-        dispatches: time.dispatches,
-        seconds: time.seconds,
+    Ok(medians(&calls?))
+}
+
+/// The median over `calls` of the time of each kernel.
+fn medians(calls: &[Vec<KernelTime>]) -> Vec<KernelRecord> {
+    let record = |one: &KernelTime| {
+        let same = calls.iter().flatten().filter(|time| time.kernel == one.kernel);
+        let mut seconds: Vec<f64> = same.map(|time| time.seconds).collect();
+        seconds.sort_by(f64::total_cmp);
+        KernelRecord {
+            kernel: one.kernel.to_owned(),
+            dispatches: one.dispatches,
+            seconds: quantile(&seconds, 0.5),
+        }
     };
-    Ok(gpu.take_kernel_times().into_iter().map(record).collect())
+    calls.first().into_iter().flatten().map(record).collect()
 }
 
 /// Whether `backend` is an adapter that the processor plays.
@@ -239,5 +280,19 @@ fn machine(host: &Cpu) -> MachineRecord {
         instructions: host.instructions().to_owned(),
         threads: host.threads(),
         platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_kernels_are_medians_of_calls() {
+        let call = |seconds| vec![KernelTime { kernel: "sample", dispatches: 2, seconds }];
+        let kernels = medians(&[call(9.0), call(1.0), call(2.0)]);
+        let found: Vec<_> = kernels.iter().map(|one| (one.dispatches, one.seconds)).collect();
+        assert_eq!(found, [(2, 2.0)]);
+        assert!(medians(&[]).is_empty());
     }
 }

@@ -10,7 +10,7 @@ use crate::backend::{Backend, Program};
 use crate::error::Result;
 use crate::files::{CONFIG_BYTES, read_text};
 use crate::rollout::{Query, ReachAvoidTask, Starts, Tightening};
-use crate::scenario::Watch;
+use crate::scenario::{Unwatched, Watch};
 
 /// Sizes of the batches.
 pub const SIZES: [u64; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
@@ -27,6 +27,8 @@ pub fn scaling(
     watch: &dyn Watch,
 ) -> Result<Vec<ScalingRecord>> {
     let program = backend.prepare(&batch.plant)?;
+    // Compiles the kernels, which no later batch does.
+    roll(&program, batch, 1, &Unwatched)?;
     let timed = |&rollouts: &u64| {
         reset_peak();
         watch.begin(&format!("{rollouts} rollouts"), rollouts);

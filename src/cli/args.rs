@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::falsify::FalsifyArguments;
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::files::Existing;
 use crate::policy::{Activation, OutputActivation};
@@ -37,6 +38,7 @@ Examples:
   reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures measures.npy
   reachcast query reachcast-out --states configs/race_starts_500.csv
   reachcast check reachcast-out
+  reachcast falsify configs/models/dubins.toml
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
   reachcast train configs/train/race.toml
@@ -48,7 +50,7 @@ Exit codes:
   0  done
   1  failed
   2  wrong usage, configuration or input
-  3  ran, but the claim asked for was not obtained";
+  3  ran, but the claim asked for was not obtained, or a failing start was found";
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -124,6 +126,21 @@ Example:
         /// Folder that `certify` wrote
         folder: PathBuf,
     },
+    /// Look for a start that fails: within the box, or where a certificate claims something
+    ///
+    /// Uniform draws first, then from the best of them cross-entropy and descent along differences of
+    /// the measure, again and again until a start fails or the budget is spent. Writes falsify.json and,
+    /// where something fails, counterexamples.csv (for `rollout --starts`) to the folder of --out. Exit
+    /// code 3: a failing start was found.
+    #[command(after_help = "\
+It finds what the measure slopes to. Where it finds nothing it says what it tried, which proves nothing.
+A certificate allows for failures: one that is found is compared with the risk that is claimed.
+
+Examples:
+  reachcast falsify configs/models/dubins.toml
+  reachcast falsify configs/race.toml --budget 1000000 --seed 2 --out search
+  reachcast falsify --around reachcast-out --within ball")]
+    Falsify(FalsifyArguments),
     #[command(flatten)]
     Study(StudyCommand),
     /// Train a policy, or a network that tells its value
@@ -194,6 +211,7 @@ impl Command {
             | Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
             Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
+            Self::Falsify(asked) => own(asked.changes.clone(), &asked.out, asked.replace),
             Self::Study(asked) => asked.options(),
             Self::Policy(PolicyCommand::Import(asked)) => {
                 own(no_seed(&asked.keys), &asked.out, asked.replace)

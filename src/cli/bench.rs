@@ -40,15 +40,24 @@ pub(super) fn run(global: &Global, asked: &BenchArguments) -> Result<Outcome> {
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     global.out.as_deref().map_or(Ok(()), |out| check_room(out, RECORD_BYTES))?;
     let backends = devices::all(global)?;
-    let record = benchmark::run(&asked, studies::work(seed)?, &backends, &progress)?;
+    let mut note = |record: &BenchRecord| match &global.out {
+        Some(out) => publish(record, Staged::new(out)?),
+        None => Ok(()),
+    };
+    let record = benchmark::run(&asked, studies::work(seed)?, &backends, &progress, &mut note)?;
     progress.finish();
     backends.iter().for_each(|backend| devices::note_events(global, backend));
-    if let Some(mut staged) = staged {
-        staged.add(RECORD, json(RECORD, &record)?.as_bytes())?;
-        staged.publish()?;
+    if let Some(staged) = staged {
+        publish(&record, staged)?;
     }
     report(global, &record, || text(&record))?;
     Ok(Outcome::Done)
+}
+
+/// Writes the record, in the place of one that said less.
+fn publish(record: &BenchRecord, mut staged: Staged) -> Result<()> {
+    staged.add(RECORD, json(RECORD, record)?.as_bytes())?;
+    staged.publish().map(drop)
 }
 
 /// What `bench --export --json` prints.
@@ -99,6 +108,9 @@ fn text(record: &BenchRecord) -> String {
     for left_out in &record.left_out {
         let (name, backend, reason) = (&left_out.name, &left_out.backend, &left_out.reason);
         let _ = writeln!(text, "left out on {backend}: {name} ({reason})");
+    }
+    if !record.to_come.is_empty() {
+        let _ = writeln!(text, "interrupted before: {}", record.to_come.join(", "));
     }
     text
 }

@@ -13,9 +13,10 @@ use crate::files::{Existing, MANIFEST, Staged, check_room, is_free, json, make_w
 use crate::model::Plant;
 use crate::model::text::NetworkFile;
 use crate::scenario;
-use crate::scenario::check_settings;
+use crate::scenario::counterexamples::{COUNTEREXAMPLES, REPLAYED, replayed_csv, starts_csv};
 use crate::scenario::record::{DeviationRecord, Record};
 use crate::scenario::settings::Settings;
+use crate::scenario::{BoxRecord, check_settings};
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-out";
@@ -121,14 +122,33 @@ fn stage(
 }
 
 /// The files that say again what the record says.
-pub(super) fn derived_files(record: &Record) -> [(&'static str, Vec<u8>); 3] {
+pub(super) fn derived_files(record: &Record) -> Vec<(&'static str, Vec<u8>)> {
     let slice = &record.slice;
     let shape = [slice.y.values.len(), slice.x.values.len()];
-    [
+    let mut files = vec![
         ("slice.npy", npy_bytes(&slice.check_margin, shape)),
         ("deviation.csv", deviation_csv(&record.deviation).into_bytes()),
         ("report.html", crate::report::html(record).into_bytes()),
-    ]
+    ];
+    files.extend(counterexamples(record));
+    files
+}
+
+/// The tables of starts and pairs that fail, each where there are any.
+fn counterexamples(record: &Record) -> Vec<(&'static str, Vec<u8>)> {
+    let Some(BoxRecord { parameters, starts, pairs, .. }) = &record.whole_box else {
+        return Vec::new();
+    };
+    let (states, controls) = (&record.system.states, &record.system.controls);
+    let mut files = Vec::new();
+    if !starts.is_empty() {
+        files.push((COUNTEREXAMPLES, starts_csv(states, parameters, starts).into_bytes()));
+    }
+    if !pairs.is_empty() {
+        let table = replayed_csv([states, controls], parameters, pairs);
+        files.push((REPLAYED, table.into_bytes()));
+    }
+    files
 }
 
 /// The bounds of each step; the column `exact` is empty for a system that is not linear.

@@ -4,11 +4,13 @@ mod args;
 mod bench;
 mod certify;
 pub(crate) mod devices;
+mod falsify;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
 mod policy;
 pub(crate) mod progress;
+mod replayed;
 mod rollout;
 mod scenarios;
 mod stored;
@@ -54,7 +56,9 @@ fn told(error: &Error) -> String {
         Error::DeviceFailed { .. } => {
             "; `--fallback` goes on on the CPU where an adapter fails, `--backend cpu` starts there"
         }
-        Error::Interrupted => " (what `race`, `sweep` and `train` have done is kept)",
+        Error::Interrupted => {
+            " (what `race`, `sweep`, `train` and `bench --out` have done is kept)"
+        }
         _ => "",
     };
     format!("{error}{remedy}")
@@ -70,6 +74,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
         Command::Check { folder } => stored::check(global, folder),
+        Command::Falsify(asked) => falsify::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::inputs::{inputs, networks};
 use super::options::Global;
 use super::progress::Progress;
-use super::{Outcome, devices, document, folder_of, report};
+use super::{Outcome, devices, document, folder_of, replayed, report};
 use crate::backend::{Event, Program};
 use crate::config::Config;
 use crate::error::Result;
@@ -78,6 +78,25 @@ struct Rollout<'a> {
 
 impl Rollout<'_> {
     fn run(self, plant: &Plant) -> Result<Summary> {
+        match replayed::measures(self.starts, &plant.model, &self.spec)? {
+            Some(measures) => self.write_replayed(&measures),
+            None => self.roll_out(plant),
+        }
+    }
+
+    /// Writes the measures of starts that came with their controls.
+    fn write_replayed(self, measures: &[f32]) -> Result<Summary> {
+        let begun = Instant::now();
+        let mut writer = MeasureWriter::create(self.measures)?;
+        writer.add(measures)?;
+        writer.publish()?;
+        let mut tally = MeasureTally::new(Keep::Counts);
+        tally.add(0, measures)?;
+        let done = Done { notes: vec![replayed::NOTE.to_owned()], begun, tally };
+        Ok(self.summary(done, ["cpu".to_owned(), "the host, in f64".to_owned()], Vec::new()))
+    }
+
+    fn roll_out(self, plant: &Plant) -> Result<Summary> {
         let names = plant.model.states.iter().map(|axis| axis.name.clone()).collect();
         let mut reader = StateReader::open(self.starts, names)?;
         let backend = devices::open(self.global)?;
@@ -106,9 +125,16 @@ impl Rollout<'_> {
         }
         writer.publish()?;
         devices::note_events(self.global, &backend);
+        let ran_on = [backend.name().to_owned(), backend.device()];
+        Ok(self.summary(Done { notes, begun, tally }, ran_on, backend.events()))
+    }
+
+    /// What is reported of rollouts that are done.
+    fn summary(self, done: Done, [backend, device]: [String; 2], events: Vec<Event>) -> Summary {
+        let Done { notes, begun, tally } = done;
         let MeasureCounts { starts, successes, non_finite, .. } = *tally.counts();
         let (low, high) = interval(successes, starts, BETA);
-        Ok(Summary {
+        Summary {
             starts,
             successes,
             non_finite,
@@ -116,13 +142,20 @@ impl Rollout<'_> {
             horizon: self.spec.horizon,
             gamma: self.spec.gamma,
             measures: self.measures.display().to_string(),
-            backend: backend.name().to_owned(),
-            device: backend.device(),
-            events: backend.events(),
+            backend,
+            device,
+            events,
             notes,
             wall_seconds: begun.elapsed().as_secs_f64(),
-        })
+        }
     }
+}
+
+/// Rollouts that are done.
+struct Done {
+    notes: Vec<String>,
+    begun: Instant,
+    tally: MeasureTally,
 }
 
 /// Sends the measures of `starts` to `sink`, in order.

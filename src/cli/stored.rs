@@ -24,15 +24,15 @@ stored: what the certificate says; found: computed again from its seed, or on fr
 are drawn anew and may refute a claim, not prove it";
 
 /// A stored certificate with the configuration and the policy that it was made with.
-struct Stored {
-    record: Record,
-    config: Config,
-    policy: PolicySource,
+pub(super) struct Stored {
+    pub(super) record: Record,
+    pub(super) config: Config,
+    pub(super) policy: PolicySource,
 }
 
 impl Stored {
     /// Reads what `certify` wrote to `folder`.
-    fn read(folder: &Path) -> Result<Self> {
+    pub(super) fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CERTIFICATE);
         let text = read_text(&path, RECORD_BYTES).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;

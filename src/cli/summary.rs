@@ -24,9 +24,12 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     lines.push(TABLE.to_owned());
     lines.push(String::new());
     let [low, high] = record.global.share_interval;
+    let (inside, draws, what) = match record.global.share {
+        Some(share) => (share.inside, share.draws, "fresh starts"),
+        None => (record.global.accepted, record.global.draws, "draws"),
+    };
     lines.push(format!(
-        "certified set   {} of {} draws, P(V_global) within {low:.4} to {high:.4}",
-        record.global.accepted, record.global.draws
+        "certified set   {inside} of {draws} {what}, P(V_global) within {low:.4} to {high:.4}"
     ));
     lines.push(format!(
         "conditional     failure inside it at most {:.5} ({} failed)",
@@ -53,7 +56,9 @@ fn headline(record: &Record) -> String {
         false => "NOT all claims obtained",
     };
     let (system, policy) = (&record.system.name, &record.provenance.policy);
-    format!("{system} under {policy}, T = {}: {verdict}", record.horizon)
+    let whole = record.whole_box.as_ref().map(|found| format!("; {}", found.verdict));
+    let whole = whole.unwrap_or_default();
+    format!("{system} under {policy}, T = {}: {verdict}{whole}", record.horizon)
 }
 
 /// The counts behind each claim, a row each.
@@ -62,8 +67,7 @@ fn table(record: &Record) -> Vec<String> {
         "{:<12} {:>10} {:>8} {:>3} {:>8} {:>9} {:>8} {:>8} {:>10}",
         "claim", "N", "failed", "d", "epsilon", "beta", "simple", "exact", "risk"
     )];
-    let claims = [&record.deviation.claim, &record.global.claim];
-    rows.extend(claims.into_iter().chain(&record.growth.claim).map(row));
+    rows.extend(record.claims().into_iter().map(row));
     rows
 }
 

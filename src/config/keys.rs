@@ -78,6 +78,9 @@ pub(super) fn with_optional(defaults: &Table) -> Table {
         let policy = ["file", "formula"].map(|key| (key.to_owned(), Value::String(String::new())));
         valid.insert("policy".to_owned(), Value::Table(Table::from_iter(policy)));
     }
+    if let Some(Value::Table(global)) = valid.get_mut("global") {
+        global.insert("box_risk".to_owned(), Value::Float(0.0));
+    }
     with_tagged(&mut valid);
     valid
 }

@@ -1,6 +1,7 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
 mod counts;
+mod drops;
 mod keys;
 mod layers;
 mod model;
@@ -16,6 +17,7 @@ pub(crate) mod train;
 mod value;
 
 pub use crate::studies::SystemSection;
+pub use drops::{CalibrationSection, Count, DropsSection, TighteningSource};
 pub use model::copy_name;
 pub use plant::PolicySource;
 pub use section::{

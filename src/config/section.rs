@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::drops::{CalibrationSection, DropsSection, TighteningSource, no_risk, share_draws};
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
@@ -46,6 +47,12 @@ pub struct Config {
     pub deviation: DeviationSection,
     /// The certified set and its conditional failure.
     pub global: GlobalSection,
+    /// The bound on margin drops.
+    #[serde(default)]
+    pub drops: DropsSection,
+    /// Calibration of the score.
+    #[serde(default)]
+    pub calibration: CalibrationSection,
     /// The two coordinates of the slice.
     pub slice: SliceSection,
     /// The state that slice, boundary search and growth start from.
@@ -179,8 +186,20 @@ pub struct DeviationSection {
 pub struct GlobalSection {
     /// Pairs drawn from the box.
     pub draws: u64,
-    /// One minus the confidence of each of the two statements.
+    /// One minus the confidence of each of the statements, that about the whole box among them.
     pub beta: f64,
+    /// Largest risk that a start of the whole box may fail with, where that is asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_risk: Option<f64>,
+    /// What tightens the margins.
+    #[serde(default)]
+    pub tightening: TighteningSource,
+    /// Conditional risk that the certified set is to have, by margin drops; 1 asks for none.
+    #[serde(default = "no_risk")]
+    pub risk: f64,
+    /// Fresh starts that estimate the share of sets by margin drops.
+    #[serde(default = "share_draws")]
+    pub share_draws: u64,
 }
 
 /// The two coordinates of the slice.

@@ -5,6 +5,7 @@ use super::section::{Config, SliceAxisSection};
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
+use crate::scenario::BoxSettings;
 use crate::scenario::limits::{finite, positive, positive_f32};
 use crate::scenario::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings, SliceAxis,
@@ -61,6 +62,8 @@ impl Config {
             },
             deviation: self.deviation_settings()?,
             global: self.global_settings()?,
+            whole_box: Some(self.box_settings()?),
+            drops: self.drop_settings()?,
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
@@ -98,6 +101,12 @@ impl Config {
     /// The certified set.
     fn global_settings(&self) -> Result<GlobalSettings> {
         let settings = GlobalSettings { draws: self.global.draws, beta: self.global.beta };
+        settings.check().map(|()| settings)
+    }
+
+    /// The whole box.
+    fn box_settings(&self) -> Result<BoxSettings> {
+        let settings = BoxSettings { risk: self.global.box_risk, beta: self.global.beta };
         settings.check().map(|()| settings)
     }
 

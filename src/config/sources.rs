@@ -11,7 +11,7 @@ pub(super) type Layer = (String, Table);
 /// What errors about a described plant call the configuration where its text is not at hand.
 pub(super) const UNNAMED: &str = "configuration";
 /// Sections and keys that a configuration begins with.
-const SECTIONS: [&str; 15] = [
+const SECTIONS: [&str; 17] = [
     "profile",
     "seed",
     "system",
@@ -22,6 +22,8 @@ const SECTIONS: [&str; 15] = [
     "constants",
     "deviation",
     "global",
+    "drops",
+    "calibration",
     "slice",
     "state",
     "growth",

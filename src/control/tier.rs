@@ -4,11 +4,13 @@ use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::rollout::{Ball, Query, StateList, States};
 use crate::scenario::boundary::on_slice;
+use crate::scenario::drops_record::SequenceRecord;
 use crate::scenario::fit::check_sizes;
 use crate::scenario::global::{band, check_margins, slice_through};
 use crate::scenario::growth::{Growth, check_scenarios};
 use crate::scenario::growth_batch::{Request, grow_each};
 use crate::scenario::ledger::{Entry, Ledger, Spend};
+use crate::scenario::sets::chosen;
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, Tightened, Unwatched, tightened};
 
@@ -81,6 +83,7 @@ pub struct Certifier<'a> {
     program: &'a Program<'a>,
     settings: &'a Settings,
     tightened: Tightened,
+    sequence: Option<SequenceRecord>,
     band: f64,
     asked: Asked,
 }
@@ -97,14 +100,19 @@ impl<'a> Certifier<'a> {
         }
         check_sizes(settings, &program.plant().model)?;
         let context = Context { program, watch: &Unwatched };
-        let tightened = tightened(context, settings)?;
+        let mut tightened = tightened(context, settings)?;
+        let mut sequence = None;
+        if let (Some(drops), Some(bound)) = (&settings.drops, &tightened.drops) {
+            let (tightening, chosen) = chosen(context, settings, drops, bound)?;
+            (tightened.tightening, sequence) = (tightening, Some(chosen));
+        }
         let lost = tightened.deviation.non_finite;
-        if lost > 0 {
+        if lost > 0 && tightened.drops.is_none() {
             let problem = format!("{lost} rollouts of the deviation bound are not finite");
             return Err(Error::Refused(problem));
         }
         let band = band(context, settings, &tightened.tightening)?;
-        Ok(Self { program, settings, tightened, band, asked })
+        Ok(Self { program, settings, tightened, sequence, band, asked })
     }
 
     /// The settings of the certificates.
@@ -115,6 +123,11 @@ impl<'a> Certifier<'a> {
     /// Constants and deviation bound.
     pub fn tightened(&self) -> &Tightened {
         &self.tightened
+    }
+
+    /// The sequence of sets that tier 1 was chosen from, by margin drops.
+    pub fn sequence(&self) -> Option<&SequenceRecord> {
+        self.sequence.as_ref()
     }
 
     /// Measures this close to zero are run again in f64.

@@ -20,8 +20,9 @@ struct Kind {
 }
 
 /// Every kind of results that has a folder for itself.
-const KINDS: [Kind; 4] = [
+const KINDS: [Kind; 5] = [
     Kind { words: "a certificate", files: &CERTIFICATE, folder: None },
+    Kind { words: "a search for failures", files: &["falsify.json"], folder: None },
     Kind {
         words: "races",
         files: &["results.json", "timing.json"],
@@ -65,8 +66,9 @@ const CERTIFICATE: [&str; 12] = {
     [record, policy, "deviation.csv", "slice.npy", a, b, c, d, e, f, g, h]
 };
 
-/// Files that several kinds have: the page, and at last the manifest.
-const SHARED: [&str; 2] = ["report.html", MANIFEST];
+/// Files that several kinds have: the page, starts that fail, and at last the manifest.
+const SHARED: [&str; 4] =
+    ["report.html", "counterexamples.csv", "counterexamples_replayed.csv", MANIFEST];
 
 /// A folder that says which work it holds.
 ///

@@ -5,6 +5,8 @@ use std::io::{BufRead, BufReader, Read};
 
 /// Longest line, bytes.
 const LONGEST_LINE: u64 = 65_536;
+/// What the name of a column has that is a note beside the states.
+const NOTE: char = ':';
 /// First bytes of a text in UTF-16, as some spreadsheets save it.
 const UTF16: [[u8; 2]; 2] = [[0xff, 0xfe], [0xfe, 0xff]];
 
@@ -16,8 +18,8 @@ pub(super) struct Lines {
     number: u64,
     /// What separates fields, once a line has shown it.
     separator: Option<char>,
-    /// For each field the place of its number in the row, once that is settled.
-    order: Option<Vec<usize>>,
+    /// For each field the place of its number in the row, none where it is no state, once that is settled.
+    order: Option<Vec<Option<usize>>>,
 }
 
 impl Lines {
@@ -60,7 +62,7 @@ impl Lines {
                 }
                 None => {
                     self.refuse_numbered(&fields, names)?;
-                    self.order = Some((0..names.len()).collect());
+                    self.order = Some((0..names.len()).map(Some).collect());
                     return self.parse(&fields, row, names).map(|()| true);
                 }
                 // A header again, above the second of two files that were put together.
@@ -121,12 +123,13 @@ impl Lines {
     /// The numbers of a line, each in its place of `row`.
     fn parse(&self, fields: &[String], row: &mut [f32], names: &[String]) -> Result<(), String> {
         let number = self.number;
-        if fields.len() != row.len() {
-            return Err(self.other_width(fields, row.len()));
-        }
-        let in_order = (0..row.len()).collect::<Vec<_>>();
+        let in_order = (0..row.len()).map(Some).collect::<Vec<_>>();
         let places = self.order.as_ref().unwrap_or(&in_order);
-        for (&place, field) in places.iter().zip(fields) {
+        if fields.len() != places.len() {
+            return Err(self.other_width(fields, places.len()));
+        }
+        for (place, field) in places.iter().zip(fields) {
+            let Some(place) = *place else { continue };
             if field.is_empty() {
                 return Err(format!("line {number}: {} is empty", names[place]));
             }
@@ -202,15 +205,21 @@ fn is_header(fields: &[String]) -> bool {
     numbers == 0 || (fields[0].is_empty() && numbers + 1 == fields.len())
 }
 
-/// For each field of a header the place of the state that it names.
-fn order(fields: &[String], names: &[String]) -> Result<Vec<usize>, String> {
+/// For each field of a header the place of the state that it names; none for a note, which has a colon
+/// in its name (`measure:policy`).
+fn order(fields: &[String], names: &[String]) -> Result<Vec<Option<usize>>, String> {
     let (found, expected) = (fields.join(","), names.join(","));
     let refused = |problem: String| {
         format!("header `{found}`: {problem}; expected the states `{expected}`, in any order")
     };
     let mut order = Vec::new();
     for field in fields {
-        let Some(place) = names.iter().position(|name| name == field) else {
+        let found = names.iter().position(|name| name == field);
+        if found.is_none() && field.contains(NOTE) {
+            order.push(None);
+            continue;
+        }
+        let Some(place) = found else {
             let problem = match field.as_str() {
                 "" => {
                     "a column has no name (pandas writes row numbers so; index=False leaves them \
@@ -221,12 +230,12 @@ fn order(fields: &[String], names: &[String]) -> Result<Vec<usize>, String> {
             };
             return Err(refused(problem));
         };
-        if order.contains(&place) {
+        if order.contains(&Some(place)) {
             return Err(refused(format!("`{field}` is there twice")));
         }
-        order.push(place);
+        order.push(Some(place));
     }
-    match (0..names.len()).find(|place| !order.contains(place)) {
+    match (0..names.len()).find(|place| !order.contains(&Some(*place))) {
         Some(missing) => Err(refused(format!("`{}` is missing", names[missing]))),
         None => Ok(order),
     }

@@ -10,17 +10,20 @@ use super::{Call, Graph, Node};
 /// The functions that printed formulas call: choices that hand a NaN on.
 pub const CHOICES: &str = include_str!("../../shaders/choices.wgsl");
 
-/// How a product is printed.
+/// How sums, products, quotients and roots are printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Product<'a> {
-    /// `a * b`: a driver may contract it with a sum that follows.
+pub enum Arithmetic {
+    /// As operators: a driver may contract products, reorder sums, and miss quotients and roots by a few
+    /// units of the last place.
     Plain,
-    /// A call of the function of that name, which can keep the product from being contracted.
-    Call(&'a str),
+    /// Products as calls of `product`, which keeps them from being contracted.
+    Apart,
+    /// All four as calls of `sum`, `product`, `quotient` and `root`, which round as the host does.
+    Exact,
 }
 
 /// The WGSL function `name`, one `let` per operation of the expanded graph ([`Graph::expanded`]),
-/// products printed plainly. It calls what [`CHOICES`] holds.
+/// its arithmetic printed plainly. It calls what [`CHOICES`] holds.
 ///
 /// `arguments` are names and lengths of the array arguments, whose elements are the graph's
 /// inputs in order; an argument of length 1 is a plain f32. The result is an f32, or an array of
@@ -36,10 +39,10 @@ pub enum Product<'a> {
 /// # Panics
 /// If the arguments do not add up to the graph's inputs.
 pub fn function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
-    function_with(name, arguments, graph, Product::Plain)
+    function_with(name, arguments, graph, Arithmetic::Plain)
 }
 
-/// Like [`function`], with products as `product` says.
+/// Like [`function`], with arithmetic as `arithmetic` says.
 ///
 /// # Panics
 /// As [`function`] does.
@@ -47,9 +50,9 @@ pub fn function_with(
     name: &str,
     arguments: &[(&str, usize)],
     graph: &Graph,
-    product: Product<'_>,
+    arithmetic: Arithmetic,
 ) -> String {
-    printed(name, arguments, &graph.expanded(), product, None)
+    printed(name, arguments, &graph.expanded(), arithmetic, None)
 }
 
 /// Like [`function`], with every NaN kept, whatever a driver makes of `a - a` or `0 * a`: flags follow
@@ -59,7 +62,7 @@ pub fn function_with(
 /// As [`function`] does.
 pub fn careful_function(name: &str, arguments: &[(&str, usize)], graph: &Graph) -> String {
     let graph = graph.expanded();
-    printed(name, arguments, &graph, Product::Plain, Flags::of(&graph.nodes))
+    printed(name, arguments, &graph, Arithmetic::Plain, Flags::of(&graph.nodes))
 }
 
 /// The function of an expanded graph, with flags where there are any.
@@ -67,7 +70,7 @@ fn printed(
     name: &str,
     arguments: &[(&str, usize)],
     graph: &Graph,
-    product: Product<'_>,
+    arithmetic: Arithmetic,
     mut flags: Option<Flags<'_>>,
 ) -> String {
     let inputs: Vec<String> = arguments
@@ -93,7 +96,7 @@ fn printed(
                 let less = flags.as_ref().map_or(format!("v{a} < v{b}"), |flags| flags.less(a, b));
                 format!("    let v{i} = select(v{no}, v{yes}, {less});\n")
             }
-            node => format!("    let v{i} = {};\n", operation(node, &inputs, product)),
+            node => format!("    let v{i} = {};\n", operation(node, &inputs, arithmetic)),
         };
         text += &flags.as_mut().map_or(String::new(), Flags::next);
     }
@@ -113,15 +116,18 @@ fn float_type(length: usize) -> String {
 }
 
 /// The right-hand side of a primitive other than a literal.
-fn operation(node: Node, inputs: &[String], product: Product<'_>) -> String {
+fn operation(node: Node, inputs: &[String], arithmetic: Arithmetic) -> String {
+    use Arithmetic::{Exact, Plain};
     match node {
+        Node::Add(a, b) if arithmetic == Exact => format!("sum(v{a}, v{b})"),
+        Node::Sub(a, b) if arithmetic == Exact => format!("sum(v{a}, -v{b})"),
+        Node::Mul(a, b) if arithmetic != Plain => format!("product(v{a}, v{b})"),
+        Node::Div(a, b) if arithmetic == Exact => format!("quotient(v{a}, v{b})"),
+        Node::Sqrt(a) if arithmetic == Exact => format!("root(v{a})"),
         Node::Input(i) => inputs[i as usize].clone(),
         Node::Add(a, b) => format!("v{a} + v{b}"),
         Node::Sub(a, b) => format!("v{a} - v{b}"),
-        Node::Mul(a, b) => match product {
-            Product::Plain => format!("v{a} * v{b}"),
-            Product::Call(name) => format!("{name}(v{a}, v{b})"),
-        },
+        Node::Mul(a, b) => format!("v{a} * v{b}"),
         Node::Div(a, b) => format!("v{a} / v{b}"),
         Node::Neg(a) => format!("-v{a}"),
         Node::Abs(a) => format!("abs(v{a})"),

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::judge::{FailureClass, Judge};
 use crate::backend::Event;
+use crate::scenario::drops_record::{DropsRecord, SequenceRecord};
 use crate::scenario::record::{ConstantsRecord, DeviationRecord, Provenance};
 
 /// Version of the record's form.
@@ -56,6 +57,12 @@ pub struct BoundsRecord {
     pub constants: ConstantsRecord,
     /// The deviation bound and its claim.
     pub deviation: DeviationRecord,
+    /// The bound on margin drops, where these tighten the margins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drops: Option<DropsRecord>,
+    /// The sequence of sets that tier 1 was chosen from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<SequenceRecord>,
     /// Measures this close to zero were run again in f64.
     #[serde(with = "crate::files::number")]
     pub band: f64,

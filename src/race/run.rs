@@ -199,7 +199,12 @@ impl Experiment<'_> {
             _ => 1.0,
         };
         let call = if race.hybrid.local { certificates.growth.call_beta() } else { 0.0 };
-        [steps * deviation.beta, call]
+        // Tier 1 by margin drops rests on the sequence that chose its set.
+        let first = match certificates.drops {
+            Some(_) => certificates.global.beta,
+            None => steps * deviation.beta,
+        };
+        [first, call]
     }
 
     /// The races from `first` on: stored ones, or flown now and stored.
@@ -308,8 +313,9 @@ impl Experiment<'_> {
         let World { program, certificates, .. } = self.world;
         let asked = Asked { global: true, local: false, domain: Domain::Anywhere };
         let certifier = Certifier::new(program, certificates, asked)?;
-        let Tightened { constants, deviation, .. } = certifier.tightened().clone();
-        Ok(BoundsRecord { constants, deviation, band: certifier.band() })
+        let Tightened { constants, deviation, drops, .. } = certifier.tightened().clone();
+        let (sequence, band) = (certifier.sequence().cloned(), certifier.band());
+        Ok(BoundsRecord { constants, deviation, drops, sequence, band })
     }
 
     /// The race that is drawn: of the first batch with the first noise seed, the first of those

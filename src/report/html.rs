@@ -2,6 +2,7 @@
 
 use super::figures;
 use super::palette;
+use super::sets;
 use super::shell::{self, HATCH, Scripts, items};
 use super::table;
 use super::text::{escape, number, upper};
@@ -42,11 +43,16 @@ fn header(record: &Record) -> String {
     } else {
         ("bad", "✗", missing(&verdicts))
     };
+    let whole = record
+        .whole_box
+        .as_ref()
+        .map(|found| escape(&format!(" What is said of the box: {}.", found.verdict)));
+    let whole = whole.unwrap_or_default();
     let cards: String = verdicts.iter().map(card).collect();
     format!(
         "<header>\n<p class=\"brand\">Reachcast certificate</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">Policy: {}</p>\n\
-         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}</p>\n\
+         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}{whole}</p>\n\
          <div class=\"cards\">\n{cards}</div>\n</header>\n",
         escape(&record.system.name),
         escape(&record.provenance.policy),
@@ -153,11 +159,13 @@ fn numbers(record: &Record) -> String {
          <p class=\"hint\">Risks and bounds are rounded up, radii down, intervals outwards. The \
          equations are in <code>docs/method.md</code>, every digit is in \
          <code>certificate.json</code>.</p>\n\
-         {}<div class=\"tables\">\n{}</div>\n{}\
+         {}{}<div class=\"tables\">\n{}{}</div>\n{}\
          <details><summary>Deviation bound at each step</summary>\n{}</details>\n\
          {}</section>\n",
         table::claims(record),
+        sets::sets(record),
         table::narrow(record),
+        sets::drops(record),
         table::wide(record),
         table::steps(record),
         shell::configuration(&record.provenance)

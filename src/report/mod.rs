@@ -12,6 +12,7 @@ mod html;
 pub(crate) mod palette;
 pub(crate) mod plot;
 pub(crate) mod scale;
+mod sets;
 pub(crate) mod sheet;
 pub(crate) mod shell;
 mod slice;

@@ -2,6 +2,7 @@
 
 use super::text::{interval, lower, upper};
 use crate::rollout::PairControl;
+use crate::scenario::BoxRecord;
 use crate::scenario::record::{Claim, GrowthOutcome, Record};
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 
@@ -51,9 +52,28 @@ pub(crate) struct Verdict<'a> {
     pub(crate) claim: Option<&'a Claim>,
 }
 
-/// The three claims in the order of the method.
-pub(crate) fn verdicts(record: &Record) -> [Verdict<'_>; 3] {
-    [deviation(record), global(record), growth(record)]
+/// The claims in the order of the method.
+pub(crate) fn verdicts(record: &Record) -> Vec<Verdict<'_>> {
+    let whole_box = record.whole_box.as_ref().map(whole_box);
+    [deviation(record), global(record)]
+        .into_iter()
+        .chain(whole_box)
+        .chain([growth(record)])
+        .collect()
+}
+
+fn whole_box(found: &BoxRecord) -> Verdict<'_> {
+    let asked = match found.claim.epsilon {
+        Some(asked) => format!("a risk of {} was asked for", lower(asked)),
+        None => "no risk was asked for".to_owned(),
+    };
+    Verdict {
+        title: "Whole box",
+        obtained: found.claim.is_obtained(),
+        headline: format!("risk {}", interval(found.risk_interval)),
+        detail: format!("Chance that a start of the box fails, certified or not; {asked}."),
+        claim: Some(&found.claim),
+    }
 }
 
 fn deviation(record: &Record) -> Verdict<'_> {
@@ -76,7 +96,7 @@ fn global(record: &Record) -> Verdict<'_> {
     let found = global.accepted > 0;
     Verdict {
         title: "Certified set",
-        obtained: found,
+        obtained: found && global.claim.is_obtained(),
         headline: if found {
             format!("risk ≤ {}", upper(global.claim.certified_risk))
         } else {

@@ -42,16 +42,33 @@ impl<T: Copy> Held<T> {
     /// # Errors
     /// [`Error::Invalid`] if it has one of them, or there are no such indices; unchanged then.
     pub(super) fn add(&mut self, first: u64, values: &[T]) -> Result<()> {
-        let count = values.len() as u64;
+        self.enter(first, values.len() as u64)?;
+        if self.keep == Keep::Measures {
+            self.store(first, values);
+        }
+        Ok(())
+    }
+
+    /// Adds `count` indices from `first` on, whose values nobody sees.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] as [`Held::add`], and where values are kept; unchanged then.
+    pub(super) fn add_counted(&mut self, first: u64, count: u64) -> Result<()> {
+        if self.keep == Keep::Measures {
+            let problem = format!("it keeps the values of its {}; these are counts", self.unit);
+            return Err(Error::invalid("tally", problem));
+        }
+        self.enter(first, count)
+    }
+
+    /// Enters `count` indices from `first` on.
+    fn enter(&mut self, first: u64, count: u64) -> Result<()> {
         let Some(end) = first.checked_add(count) else {
             let problem = format!("{count} {} from number {first} on have no numbers", self.unit);
             return Err(Error::invalid("tally", problem));
         };
         self.check_free(&(first..end))?;
         self.cover(first..end);
-        if self.keep == Keep::Measures {
-            self.store(first, values);
-        }
         Ok(())
     }
 

@@ -57,8 +57,15 @@ impl MeasureCounts {
         }
     }
 
+    /// That of the starts `first..first + values.len()`.
+    pub(crate) fn of_all(first: u64, values: &[f32]) -> Self {
+        let mut all = Self::default();
+        (first..).zip(values).for_each(|(start, value)| all.merge(&Self::of(start, *value)));
+        all
+    }
+
     /// Adds other starts.
-    fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         self.starts += other.starts;
         self.successes += other.successes;
         self.non_finite += other.non_finite;
@@ -98,9 +105,17 @@ impl MeasureTally {
     /// [`crate::Error::Invalid`] if it has one of these starts; it is not changed then.
     pub fn add(&mut self, first: u64, values: &[f32]) -> Result<()> {
         self.held.add(first, values)?;
-        for (start, measure) in (first..).zip(values) {
-            self.counts.merge(&MeasureCounts::of(start, *measure));
-        }
+        self.counts.merge(&MeasureCounts::of_all(first, values));
+        Ok(())
+    }
+
+    /// Adds what the starts from `first` on came to, as many as `counts` has.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] as [`MeasureTally::add`], and if it keeps measures.
+    pub(crate) fn add_counts(&mut self, first: u64, counts: &MeasureCounts) -> Result<()> {
+        self.held.add_counted(first, counts.starts)?;
+        self.counts.merge(counts);
         Ok(())
     }
 

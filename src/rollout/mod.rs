@@ -1,5 +1,6 @@
 //! What a batch of rollouts is: starts, horizon, measure; no word about who runs it.
 
+pub mod drops;
 mod fold;
 mod held;
 mod measure_tally;
@@ -32,7 +33,7 @@ pub use planning::{
 pub use region::{Ball, Region, sample_ball};
 pub use sample::{GENERATOR, Purpose, Stream, normal_pair};
 pub use spec::{
-    DeviationTask, Farthest, MAX_HORIZON, PairControl, PairMeasure, Query, ReachAvoidTask,
+    DeviationTask, Effect, Farthest, MAX_HORIZON, PairControl, PairMeasure, Query, ReachAvoidTask,
     RolloutSpec, Tightening,
 };
 pub use starts::{Pairs, Starts};

@@ -23,6 +23,13 @@ pub struct PairCounts {
 }
 
 impl PairCounts {
+    /// That of `pairs`.
+    pub(crate) fn of_all(pairs: &[PairMeasure]) -> Self {
+        let mut all = Self::default();
+        all.add(pairs);
+        all
+    }
+
     /// Adds pairs.
     fn add(&mut self, pairs: &[PairMeasure]) {
         let broken = |measure: f32| measure.is_nan() || measure <= NON_FINITE;
@@ -37,7 +44,7 @@ impl PairCounts {
     }
 
     /// Adds other pairs.
-    fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         self.pairs += other.pairs;
         self.accepted += other.accepted;
         self.failures += other.failures;
@@ -83,6 +90,16 @@ impl PairTally {
     pub(crate) fn add(&mut self, first: u64, pairs: &[PairMeasure]) -> Result<()> {
         self.held.add(first, pairs)?;
         self.counts.add(pairs);
+        Ok(())
+    }
+
+    /// Adds how the pairs from `first` on fared, as many as `counts` has.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] as [`PairTally::add`], and if it keeps measures.
+    pub(crate) fn add_counts(&mut self, first: u64, counts: &PairCounts) -> Result<()> {
+        self.held.add_counted(first, counts.pairs)?;
+        self.counts.merge(counts);
         Ok(())
     }
 

@@ -22,6 +22,12 @@ pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Ti
     fold(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
 }
 
+/// The margins of the rollout from `start` in f64, `[T + 1]`.
+pub fn states_margins(plant: &Plant, start: &[f32], spec: &RolloutSpec) -> Vec<Margins> {
+    let states = states::<f64>(plant, start, spec.horizon);
+    margins(&plant.model, states.iter().map(Vec::as_slice))
+}
+
 /// Measures `(nominal, perturbed)` of a pair in f64, as [`super::PairMeasure`] has them.
 pub fn pair_measures(
     plant: &Plant,
@@ -30,32 +36,103 @@ pub fn pair_measures(
     tightening: &Tightening,
     control: PairControl,
 ) -> (f64, f64) {
-    let nominal = states::<f64>(plant, nominal, spec.horizon);
+    let PairMargins { nominal, perturbed } =
+        pair_margins(plant, [nominal, perturbed], spec, control);
+    (measure_of(&nominal, spec, tightening), measure_of(&perturbed, spec, &Tightening::none(spec)))
+}
+
+/// The margins of both rollouts of a pair in f64, `[T + 1]` each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairMargins {
+    /// Of the nominal rollout.
+    pub nominal: Vec<Margins>,
+    /// Of the perturbed one.
+    pub perturbed: Vec<Margins>,
+}
+
+/// The margins at one step; both NaN where the state is not finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// Target margin `r_t`.
+    pub target: f64,
+    /// Constraint margin `c_t`.
+    pub constraint: f64,
+}
+
+/// The margins of the pair `[nominal, perturbed]` in f64.
+pub fn pair_margins(
+    plant: &Plant,
+    [nominal, perturbed]: [&[f32]; 2],
+    spec: &RolloutSpec,
+    control: PairControl,
+) -> PairMargins {
+    let nominal = driven(plant, nominal, spec.horizon);
     let mut x: Vec<f64> = perturbed.iter().copied().map(f64::from).collect();
     let mut replayed = vec![x.clone()];
-    for (step, state) in (0..spec.horizon).zip(&nominal) {
-        let driver = match control {
-            PairControl::Replay => state,
-            PairControl::ClosedLoop => &x,
+    for (step, Driven { controls, .. }) in (0..spec.horizon).zip(&nominal) {
+        x = match control {
+            PairControl::Replay => plant.model.next(&x, controls, step),
+            PairControl::ClosedLoop => plant.model.next(&x, &plant.control(&x, step), step),
         };
-        x = plant.model.next(&x, &plant.control(driver, step), step);
         replayed.push(x.clone());
     }
-    let plain = Tightening::none(spec);
-    let model = &plant.model;
-    (fold(model, &nominal, spec, tightening), fold(model, &replayed, spec, &plain))
+    let nominal = nominal.iter().map(|driven| &*driven.state);
+    PairMargins {
+        nominal: margins(&plant.model, nominal),
+        perturbed: margins(&plant.model, replayed.iter().map(Vec::as_slice)),
+    }
+}
+
+/// A state and the controls there.
+struct Driven {
+    state: Vec<f64>,
+    /// None after the last step.
+    controls: Vec<f64>,
+}
+
+/// The states x_0..=x_T from `start` with the controls that lead on.
+fn driven(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Driven> {
+    let mut state: Vec<f64> = start.iter().copied().map(f64::from).collect();
+    let mut all = Vec::with_capacity(horizon as usize + 1);
+    for step in 0..horizon {
+        let controls = plant.control(&state, step);
+        let next = plant.model.next(&state, &controls, step);
+        all.push(Driven { state, controls });
+        state = next;
+    }
+    all.push(Driven { state, controls: Vec::new() });
+    all
+}
+
+/// The margins at each of `states`.
+fn margins<'a>(model: &Model, states: impl Iterator<Item = &'a [f64]>) -> Vec<Margins> {
+    let at = |(step, x): (u32, &[f64])| match x.iter().all(|x| x.is_finite()) {
+        true => {
+            Margins { target: model.target_at(x, step), constraint: model.constraint_at(x, step) }
+        }
+        false => Margins { target: f64::NAN, constraint: f64::NAN },
+    };
+    (0..).zip(states).map(at).collect()
 }
 
 /// Folds the margins of `states`; a state that is not finite, or a margin that is no number, fails
 /// the rollout from there on.
-fn fold(model: &Model, states: &[Vec<f64>], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
+pub(crate) fn fold(
+    model: &Model,
+    states: &[Vec<f64>],
+    spec: &RolloutSpec,
+    tightening: &Tightening,
+) -> f64 {
+    measure_of(&margins(model, states.iter().map(Vec::as_slice)), spec, tightening)
+}
+
+/// Reach-avoid measure of the margins of a rollout, `[T + 1]`, tightened.
+pub fn measure_of(margins: &[Margins], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
     let mut fold = Fold::new();
-    for (t, x) in states.iter().enumerate() {
-        let step = t as u32;
-        let target = model.target_at(x, step) - f64::from(tightening.target[t]);
-        let constraint = model.constraint_at(x, step) - f64::from(tightening.constraint[t]);
-        let number = !target.is_nan() && !constraint.is_nan();
-        if !(number && x.iter().all(|x| x.is_finite())) {
+    for (t, margins) in margins.iter().enumerate() {
+        let target = tightening.acted(margins.target, tightening.target[t]);
+        let constraint = tightening.acted(margins.constraint, tightening.constraint[t]);
+        if target.is_nan() || constraint.is_nan() {
             let so_far: f64 = fold.measure();
             return if so_far > 0.0 { so_far } else { f64::from(NON_FINITE) };
         }

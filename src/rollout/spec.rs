@@ -43,20 +43,46 @@ impl RolloutSpec {
     }
 }
 
-/// What both margins lose at each step: `L_r Delta_t` and `L_c Delta_t`, `[T + 1]` each.
-#[derive(Clone, Debug, PartialEq)]
+/// How the numbers of a [`Tightening`] act on the margins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effect {
+    /// They are taken off.
+    #[default]
+    Subtracted,
+    /// They are multiplied with: margins in units of their own at each step.
+    Multiplied,
+}
+
+/// What both margins lose at each step, `[T + 1]` each: `L_r Delta_t` and `L_c Delta_t`, or the drops that
+/// are allowed for; or the units that they are measured in, as [`Effect`] says.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tightening {
-    /// Taken off the target margin.
+    /// Taken off the target margin, or its factor.
     pub target: Vec<f32>,
-    /// Taken off the constraint margin.
+    /// Taken off the constraint margin, or its factor.
     pub constraint: Vec<f32>,
+    /// Which of both.
+    pub effect: Effect,
 }
 
 impl Tightening {
     /// Nothing taken off.
     pub fn none(spec: &RolloutSpec) -> Self {
         let zero = vec![0.0; spec.horizon as usize + 1];
-        Self { target: zero.clone(), constraint: zero }
+        Self::losing(zero.clone(), zero)
+    }
+
+    /// Margins that lose `target` and `constraint`, `[T + 1]` each.
+    pub fn losing(target: Vec<f32>, constraint: Vec<f32>) -> Self {
+        Self { target, constraint, effect: Effect::Subtracted }
+    }
+
+    /// `margin` with `number` taken off, or multiplied with it.
+    pub(crate) fn acted(&self, margin: f64, number: f32) -> f64 {
+        match self.effect {
+            Effect::Subtracted => margin - f64::from(number),
+            Effect::Multiplied => margin * f64::from(number),
+        }
     }
 }
 

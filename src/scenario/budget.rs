@@ -10,7 +10,11 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
     let rounds = f64::from(growth.rounds);
     let global = settings.global.beta;
-    let budget = settings.deviation.beta + 2.0 * global + rounds * growth.round_beta();
+    let whole_box =
+        settings.whole_box.map(|asked| ("box", "interval of the failing share", asked.beta));
+    let more: Vec<_> = whole_box.into_iter().chain(drops_claims(settings)).collect();
+    let of_more: f64 = more.iter().map(|(.., beta)| beta).sum();
+    let budget = settings.deviation.beta + 2.0 * global + of_more + rounds * growth.round_beta();
     let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
     let claims = [
         ("deviation", "bound", settings.deviation.beta),
@@ -18,7 +22,8 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
         ("global", "interval of the certified share", global),
     ];
     let rounds = (0..growth.rounds).map(|round| ("growth", "round", round, growth.round_beta()));
-    let once = claims.into_iter().map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
+    let once =
+        claims.into_iter().chain(more).map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
     for (claim, purpose, round, beta) in once.chain(rounds) {
         let entry =
             Entry { claim: claim.to_owned(), purpose: purpose.to_owned(), call: 0, round, beta };
@@ -28,6 +33,17 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
         }
     }
     Ok(ledger)
+}
+
+/// The claims that margin drops make beside the certified set's.
+fn drops_claims(settings: &Settings) -> Vec<(&'static str, &'static str, f64)> {
+    let Some(asked) = &settings.drops else { return Vec::new() };
+    let share = "interval of the share";
+    let drops = [("drops", "bound", asked.sample.beta), ("drops", share, asked.sample.beta)];
+    let calibration = asked
+        .calibration
+        .map(|sample| [("calibration", "level", sample.beta), ("calibration", share, sample.beta)]);
+    drops.into_iter().chain(calibration.into_iter().flatten()).collect()
 }
 
 /// The ledger's lines as records.

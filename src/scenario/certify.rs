@@ -11,10 +11,11 @@ use super::record::{
     GrowthRecord, PictureRecord, Record, RolloutRecord, SCHEMA, StateRecord, Timing, decimal,
     finite_margin,
 };
+use super::sets::{self, Sets};
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
-use super::{Context, Watch, boundary, claims, deviation, global, growth};
+use super::{Context, Watch, boundary, claims, deviation, global, growth, whole_box};
 use crate::backend::Program;
 use crate::error::Result;
 use crate::model::Plant;
@@ -41,23 +42,37 @@ pub fn certify(
     check_sizes(settings, &plant.model)?;
     check_settings(settings)?;
     let ledger = ledger(settings)?;
-    let Tightened { constants, deviation, tightening } = tightened(context, settings)?;
-    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-    let global = global::conditional(context, settings, &tightening, purposes)?;
+    let mut tightened = tightened(context, settings)?;
+    let mut drops = tightened.drops.take();
+    let (global, sequence, calibration) = match (&settings.drops, &mut drops) {
+        (Some(asked), Some(drops)) => {
+            let Sets { global, sequence, calibration } =
+                sets::sets(context, settings, asked, &mut tightened, drops)?;
+            (global, Some(sequence), calibration)
+        }
+        _ => {
+            let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
+            let lost = &tightened.tightening;
+            (global::conditional(context, settings, lost, purposes)?, None, None)
+        }
+    };
+    let Tightened { constants, deviation, tightening, .. } = tightened;
+    let whole_box = whole_box::record(context, settings, &tightening, &global)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
     let mut statements = claims::statements(settings, &deviation, &global, &growth);
-    statements.extend(claims::of_samples(plant, settings, &picture));
+    statements.extend(claims::of_the_box(whole_box.as_ref()));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
+        + whole_box.as_ref().map_or(0, |found| found.draws)
         + slice.check_margin.len() as u64
         + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
-    Ok(Record {
+    let mut record = Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
-        holds: claims::holds(&deviation, &global, &growth),
+        holds: claims::holds(&deviation, &global, &growth) && claims::box_holds(whole_box.as_ref()),
         statements,
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),
@@ -66,6 +81,10 @@ pub fn certify(
         constants,
         deviation,
         global,
+        whole_box,
+        drops,
+        sequence,
+        calibration,
         state,
         slice,
         growth,
@@ -73,8 +92,13 @@ pub fn certify(
         ledger: spendings(&ledger),
         picture,
         events: backend.events(),
-        timing: Timing { wall_seconds: begun.elapsed().as_secs_f64(), threads: 0, rollouts },
-    })
+        timing: Timing { wall_seconds: 0.0, threads: 0, rollouts },
+    };
+    record.statements.extend(sets::statements(&record, settings.global.draws));
+    record.statements.extend(claims::of_samples(plant, settings, &record.picture));
+    record.timing.rollouts += sets::rollouts(&record);
+    record.timing.wall_seconds = begun.elapsed().as_secs_f64();
+    Ok(record)
 }
 
 /// Refuses settings whose claims could not be made, as far as that shows without work: numbers out of

@@ -1,5 +1,6 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
+use super::box_record::BoxRecord;
 use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
 use super::sampling;
 use super::settings::Settings;
@@ -14,8 +15,26 @@ pub(super) fn holds(
 ) -> bool {
     deviation.non_finite == 0
         && global.accepted > 0
-        && deviation.claim.epsilon.is_some_and(|asked| global.claim.certified_risk <= asked)
+        && (global.claim.epsilon.or(deviation.claim.epsilon))
+            .is_some_and(|asked| global.claim.certified_risk <= asked)
         && growth.outcome == GrowthOutcome::Verified
+}
+
+/// Whether the risk of the whole box is at most the one asked for, where one was.
+pub(super) fn box_holds(found: Option<&BoxRecord>) -> bool {
+    found.is_none_or(|found| found.claim.is_obtained())
+}
+
+/// What is said of the whole box: its claim, and whether that is more than was asked for.
+pub(super) fn of_the_box(found: Option<&BoxRecord>) -> Option<String> {
+    found.map(|found| match box_holds(Some(found)) {
+        true => found.claim.statement.clone(),
+        false => format!(
+            "{} That is above the risk of {} that was asked for.",
+            found.claim.statement,
+            found.claim.stated_risk()
+        ),
+    })
 }
 
 /// The claims in words.
@@ -51,14 +70,16 @@ pub(super) fn of_samples(
 /// The certified share of the box in words.
 fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
     let [low, high] = global.share_interval;
+    let (inside, draws) =
+        global.share.map_or((global.accepted, global.draws), |share| (share.inside, share.draws));
     format!(
         "With confidence 1 - {}, the certified set holds between {:.3} % and {:.3} % of the box \
          ({} of {} starts).",
         settings.global.beta,
         100.0 * low,
         100.0 * high,
-        global.accepted,
-        global.draws
+        inside,
+        draws
     )
 }
 

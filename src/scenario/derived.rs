@@ -1,13 +1,13 @@
 //! What of a record follows from its settings and its own counts, without a rollout.
 
 use super::budget::{ledger, spendings};
-use super::claims::{holds, of_samples, statements};
+use super::claims::{box_holds, holds, of_samples, of_the_box, statements};
 use super::constants::constants;
 use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{deviation, global, growth};
+use super::{deviation, global, growth, sets, whole_box};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::GENERATOR;
@@ -32,14 +32,22 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.system = system_record(model, settings);
     record.constants = constants(model, settings)?;
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;
-    record.global = global::derived(model, settings, &stored.global)?;
+    match &settings.drops {
+        Some(asked) => sets::rederived(model, settings, asked, &mut record)?,
+        None => record.global = global::derived(model, settings, &stored.global)?,
+    }
+    record.whole_box =
+        whole_box::derived(model, settings, &record.global, stored.whole_box.as_ref())?;
     record.growth = growth::derived(model, settings, &stored.growth)?;
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);
     record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    record.statements.extend(of_the_box(record.whole_box.as_ref()));
+    record.statements.extend(sets::statements(&record, settings.global.draws));
     record.statements.extend(of_samples(plant, settings, &record.picture));
-    record.holds = holds(&record.deviation, &record.global, &record.growth);
+    record.holds = holds(&record.deviation, &record.global, &record.growth)
+        && box_holds(record.whole_box.as_ref());
     Ok(record)
 }
 

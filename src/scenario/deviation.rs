@@ -263,5 +263,5 @@ pub fn tightening(
         let loss = bound.iter().map(|bound| (constant * bound).min(f64::from(HUGE)) as f32);
         loss.map(f32::next_up).collect()
     };
-    Tightening { target: scaled(target_constant), constraint: scaled(constraint_constant) }
+    Tightening::losing(scaled(target_constant), scaled(constraint_constant))
 }

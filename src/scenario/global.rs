@@ -5,6 +5,8 @@ use rayon::prelude::*;
 use super::Context;
 use super::bound::{certified_risk, interval};
 use super::coordinates::{Coordinates, coordinates};
+use super::drops::pairs;
+use super::drops_record::{SequenceOutcome, SequenceRecord, ShareRecord};
 use super::finding::{Figure, Finding};
 use super::purpose;
 use super::record::{Claim, GlobalRecord, SliceAxisRecord, SliceRecord, finite_margin};
@@ -198,7 +200,63 @@ fn conclude(
         f32_error,
         band: count.band,
         f64_reruns: count.f64_reruns,
+        share: None,
     })
+}
+
+/// A set that was chosen among several by a sequence.
+pub(super) struct ChosenSet<'a> {
+    /// The sequence.
+    pub(super) sequence: &'a SequenceRecord,
+    /// Its share of the box, from fresh starts.
+    pub(super) share: ShareRecord,
+    /// Draws whose perturbed start reaches the target.
+    pub(super) reached: u64,
+    /// Perturbed rollouts that failed for a state that is not finite.
+    pub(super) non_finite: u64,
+    /// Measured f32 error of the measure with the set's tightening.
+    pub(super) f32_error: f64,
+    /// Draws decided in f64.
+    pub(super) f64_reruns: u64,
+}
+
+/// Claim and intervals of a set that was chosen among several.
+pub(super) fn of_sequence(
+    model: &Model,
+    settings: &Settings,
+    chosen: &ChosenSet<'_>,
+) -> Result<GlobalRecord> {
+    let &ChosenSet { sequence, share, reached, non_finite, f32_error, f64_reruns } = chosen;
+    let level = sequence.levels.get(sequence.chosen);
+    let accepted = level.and_then(|level| level.accepted).unwrap_or_default();
+    let failures = level.and_then(|level| level.failures).unwrap_or_default();
+    let band = band_of(f32_error);
+    let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
+    let mut global = conclude(model, settings, &count, f32_error)?;
+    if sequence.outcome != SequenceOutcome::Single {
+        (global.claim.epsilon, global.claim.required_exact) = (sequence.risk, sequence.required);
+    }
+    global.share_interval = share.interval;
+    global.volume_interval = share.interval.map(|end| end * global.box_volume);
+    global.share = Some(share);
+    Ok(global)
+}
+
+/// The f32 error of the measure with `tightening`, measured on pairs drawn from the box.
+pub(super) fn measured_error(
+    context: Context<'_>,
+    settings: &Settings,
+    tightening: &Tightening,
+) -> Result<f64> {
+    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
+    let task = DeviationTask {
+        pairs: pairs(settings, purposes)?,
+        range: 0..ERROR_SAMPLE,
+        spec: settings.spec,
+        tightening,
+        control: settings.deviation.control,
+    };
+    f32_error(context, &task)
 }
 
 /// Counts over the pairs.
@@ -239,34 +297,18 @@ fn pair_f64(plant: &Plant, task: &DeviationTask<'_>, index: u64) -> (f64, f64) {
 }
 
 /// The band around zero that a measured f32 error asks for.
-fn band_of(f32_error: f64) -> f64 {
+pub(super) fn band_of(f32_error: f64) -> f64 {
     (BAND_FACTOR * f32_error).max(LEAST_BAND)
 }
 
 /// The band around zero within which measures are run again in f64, from the f32 error measured
 /// on pairs drawn from the box.
 pub fn band(context: Context<'_>, settings: &Settings, tightening: &Tightening) -> Result<f64> {
-    let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
-    let task = DeviationTask {
-        pairs: Pairs {
-            nominal: Starts::Drawn {
-                region: Region::new_box(&*settings.low, &*settings.high)?,
-                stream: nominal,
-            },
-            radius: settings.deviation.radius,
-            stream: perturbation,
-        },
-        range: 0..ERROR_SAMPLE,
-        spec: settings.spec,
-        tightening,
-        control: settings.deviation.control,
-    };
-    Ok(band_of(f32_error(context, &task)?))
+    Ok(band_of(measured_error(context, settings, tightening)?))
 }
 
 /// The largest distance of an f32 measure from f64 over the first pairs, those that are finite.
-fn f32_error(context: Context<'_>, task: &DeviationTask<'_>) -> Result<f64> {
+pub(super) fn f32_error(context: Context<'_>, task: &DeviationTask<'_>) -> Result<f64> {
     let (range, plant) = (0..ERROR_SAMPLE.min(task.range.end), context.plant());
     let sample = DeviationTask { range: range.clone(), ..task.clone() };
     let pairs = context.program.tally_pairs(&sample, Keep::Measures)?.finish(range)?.values;

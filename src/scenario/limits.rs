@@ -1,5 +1,6 @@
 //! What the numbers of settings may be, one rule for settings from a file and those made by hand.
 
+use super::drops_settings::DropSettings;
 use super::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings,
 };
@@ -127,6 +128,8 @@ impl Settings {
         self.constants.check()?;
         self.deviation.check()?;
         self.global.check()?;
+        self.whole_box.map_or(Ok(()), |asked| asked.check())?;
+        self.drops.as_ref().map_or(Ok(()), DropSettings::check)?;
         self.growth.check()
     }
 }
@@ -157,6 +160,8 @@ mod tests {
                 source: DeviationSource::Scenario,
             },
             global: GlobalSettings { draws: 100, beta: 1e-3 },
+            whole_box: None,
+            drops: None,
             slice: Some([axis(0), axis(1)]),
             state: vec![0.0; 2],
             growth: GrowthSettings {

@@ -2,15 +2,23 @@
 
 pub mod bound;
 pub mod boundary;
+mod box_record;
+mod box_settings;
 mod budget;
+mod calibration;
 mod certify;
 mod claim;
 mod claims;
 mod compare;
 mod constants;
 mod coordinates;
+pub mod counterexamples;
 mod derived;
 pub mod deviation;
+pub mod drops;
+pub mod drops_record;
+pub mod drops_settings;
+pub mod falsify;
 mod finding;
 pub(crate) mod fit;
 pub mod global;
@@ -24,13 +32,19 @@ mod origin;
 pub mod purpose;
 pub mod record;
 pub mod sampling;
+pub mod sequence;
+pub(crate) mod sets;
 pub mod settings;
 mod stored;
 pub(crate) mod tail;
 pub mod tier;
 mod tightened;
+mod verdict;
 mod verify;
+mod whole_box;
 
+pub use box_record::BoxRecord;
+pub use box_settings::BoxSettings;
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
 #[cfg(feature = "cli")]

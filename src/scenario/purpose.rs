@@ -24,3 +24,19 @@ pub const CHECK: Purpose = Purpose::numbered(10);
 pub const CHECK_PERTURBATION: Purpose = Purpose::numbered(11);
 /// The rollouts drawn in a report.
 pub const PICTURE: Purpose = Purpose::numbered(12);
+/// Starts that a search for failures tries.
+pub const FALSIFY: Purpose = Purpose::numbered(22);
+/// Nominal starts of the pilot that fixes the shapes of margin drops, and the levels of the sequence.
+pub const DROPS_PILOT_NOMINAL: Purpose = Purpose::numbered(30);
+/// Their perturbations.
+pub const DROPS_PILOT_PERTURBATION: Purpose = Purpose::numbered(31);
+/// Nominal starts of the bound on margin drops.
+pub const DROPS_NOMINAL: Purpose = Purpose::numbered(32);
+/// Their perturbations.
+pub const DROPS_PERTURBATION: Purpose = Purpose::numbered(33);
+/// Fresh starts that estimate the share of sets that were chosen.
+pub const FRESH_SHARE: Purpose = Purpose::numbered(34);
+/// Nominal starts of the calibration of the score.
+pub const CALIBRATION_NOMINAL: Purpose = Purpose::numbered(35);
+/// Their perturbations.
+pub const CALIBRATION_PERTURBATION: Purpose = Purpose::numbered(36);

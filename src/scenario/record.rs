@@ -4,17 +4,21 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::box_record::BoxRecord;
 pub use super::claim::Claim;
+use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 /// The oldest version that is read. Its physics were hashed with parameters as literals, which no
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
+/// The oldest version whose physics and policies were hashed as they are today.
+pub(crate) const HASHED_ALIKE: u32 = 2;
 
 /// A margin as a record has it: the largest number stands for infinity, as it does in a measure.
 pub(crate) fn finite_margin(margin: f32) -> f32 {
@@ -58,6 +62,18 @@ pub struct Record {
     pub deviation: DeviationRecord,
     /// The certified set.
     pub global: GlobalRecord,
+    /// The whole box, certified or not; older records say nothing of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub whole_box: Option<BoxRecord>,
+    /// The bound on margin drops, where these tighten the margins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drops: Option<DropsRecord>,
+    /// The sequence of sets that the certified one was chosen from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<SequenceRecord>,
+    /// The calibration of the score.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationRecord>,
     /// The state that slice and growth start from.
     pub state: StateRecord,
     /// The slice through that state.
@@ -77,6 +93,18 @@ pub struct Record {
     pub events: Vec<Event>,
     /// Wall time and threads: the only part that a second run may change.
     pub timing: Timing,
+}
+
+impl Record {
+    /// The claims, in the order of the method.
+    pub fn claims(&self) -> Vec<&Claim> {
+        let drops = self.drops.iter().map(|drops| &drops.claim);
+        let calibration = self.calibration.iter().map(|calibration| &calibration.claim);
+        let first = [&self.deviation.claim, &self.global.claim].into_iter();
+        let whole_box = self.whole_box.iter().map(|found| &found.claim);
+        let sets = first.chain(whole_box).chain(drops).chain(calibration);
+        sets.chain(&self.growth.claim).collect()
+    }
 }
 
 /// Who computed what from which input.
@@ -213,6 +241,10 @@ pub struct GlobalRecord {
     pub band: f64,
     /// How many were.
     pub f64_reruns: u64,
+    /// The fresh starts that the share is from, where the set was chosen among several; else it is from
+    /// the draws.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share: Option<ShareRecord>,
 }
 
 /// The state that slice and growth start from.

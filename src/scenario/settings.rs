@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
+use super::box_settings::BoxSettings;
+use super::drops_settings::DropSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
@@ -134,6 +136,10 @@ pub struct Settings {
     pub deviation: DeviationSettings,
     /// Certified set.
     pub global: GlobalSettings,
+    /// The whole box; nothing is said of it where there are none.
+    pub whole_box: Option<BoxSettings>,
+    /// Margin drops, where these tighten the margins and not constants times the deviation bound.
+    pub drops: Option<DropSettings>,
     /// The slice: the axis across the columns, then the axis along the rows; none where there is but
     /// one state.
     pub slice: Option<[SliceAxis; 2]>,
@@ -235,6 +241,8 @@ impl Settings {
                 source: DeviationSource::Scenario,
             },
             global: GlobalSettings { draws: 20_000, beta },
+            whole_box: Some(BoxSettings { risk: None, beta }),
+            drops: None,
             slice,
             state,
             growth: GrowthSettings {

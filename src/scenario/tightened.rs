@@ -1,9 +1,10 @@
 //! What V_check is computed with: constants, deviation bound, and what they take off the margins.
 
 use super::constants::constants;
+use super::drops_record::DropsRecord;
 use super::record::{ConstantsRecord, DeviationRecord};
 use super::settings::Settings;
-use super::{Context, deviation};
+use super::{Context, deviation, drops};
 use crate::error::Result;
 use crate::rollout::{Region, RolloutSpec, Tightening};
 
@@ -24,8 +25,13 @@ pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened>
     Region::new_box(&*settings.low, &*settings.high)?;
     let constants = constants(context.model(), settings)?;
     let deviation = deviation::bound(context, settings)?;
-    let tightening = tightening(&deviation.bound, &constants, &settings.spec);
-    Ok(Tightened { constants, deviation, tightening })
+    let drops = settings.drops.as_ref();
+    let drops = drops.map(|asked| drops::bound(context, settings, asked)).transpose()?;
+    let tightening = match &drops {
+        Some(drops) => drops.shapes().tightening(drops.level),
+        None => tightening(&deviation.bound, &constants, &settings.spec),
+    };
+    Ok(Tightened { constants, deviation, drops, tightening })
 }
 
 /// What V_check is computed with.
@@ -35,6 +41,8 @@ pub struct Tightened {
     pub constants: ConstantsRecord,
     /// Deviation bound.
     pub deviation: DeviationRecord,
+    /// The bound on margin drops, where these tighten the margins.
+    pub drops: Option<DropsRecord>,
     /// What the margins lose.
     pub tightening: Tightening,
 }

@@ -9,11 +9,10 @@ use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
 use super::origin::{Hashes, hashes, provenance};
 use super::purpose;
-use super::record::{Record, SCHEMA, finite_margin};
+use super::record::{HASHED_ALIKE, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier, verified_ball};
-use super::tightened::tightening;
-use super::{Context, Unwatched, Watch, compare, global};
+use super::{Context, Unwatched, Watch, compare, global, sets, whole_box};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
@@ -43,14 +42,14 @@ pub struct QueryRow {
     pub target_margin: f32,
 }
 
-/// Whether the record is of the version that this program writes, and not of an older one.
-fn is_current(record: &Record) -> bool {
-    record.schema == SCHEMA
+/// Whether the record's hashes are of the text that this program records.
+fn is_hashed_alike(record: &Record) -> bool {
+    record.schema >= HASHED_ALIKE
 }
 
 /// That the physics of an older record cannot be compared; nothing of a current one.
 fn not_compared(record: &Record) -> Option<Finding> {
-    (!is_current(record)).then(|| Finding {
+    (!is_hashed_alike(record)).then(|| Finding {
         name: "hash of the physics".to_owned(),
         stored: Figure::Words(format!("of schema {}", record.schema)),
         found: Figure::Words("not compared: system, settings and numbers are".to_owned()),
@@ -77,11 +76,11 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
         let found = record.system.states.len().to_string();
         return refuse("system.states length", &found, &plant.model.states.len().to_string());
     }
-    if is_current(record) && stored.physics_sha256 != physics {
+    if is_hashed_alike(record) && stored.physics_sha256 != physics {
         return refuse("provenance.physics_sha256", &stored.physics_sha256, &physics);
     }
     // The digest of a formula is that of the physics.
-    let comparable = is_current(record) || plant.controller.network().is_some();
+    let comparable = is_hashed_alike(record) || plant.controller.network().is_some();
     if comparable && stored.policy_sha256 != policy {
         return refuse("provenance.policy_sha256", &stored.policy_sha256, &policy);
     }
@@ -120,9 +119,10 @@ pub fn query(
     let plant = program.plant();
     check_identity(plant, record)?;
     check_sizes(settings, &plant.model)?;
+    let settings = &whole_box::as_recorded(settings, record);
     check_derived(program, record, settings)?;
     let spec = settings.spec;
-    let tightening = tightening(&record.deviation.bound, &record.constants, &spec);
+    let tightening = sets::tightening(record, &spec);
     let context = Context { program, watch: &Unwatched };
     let margins = global::check_margins(
         context,
@@ -155,12 +155,13 @@ pub fn check(
     watch: &dyn Watch,
 ) -> Result<CheckReport> {
     check_identity(program.plant(), record)?;
+    let settings = &whole_box::as_recorded(settings, record);
     let again = certify(program, settings, record.provenance.config.clone(), watch)?;
     let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
     findings.push(compare::fields(record, &again));
     findings.extend(not_compared(record));
-    let tightening = tightening(&record.deviation.bound, &record.constants, &settings.spec);
+    let tightening = sets::tightening(record, &settings.spec);
     let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
     let fresh = global::conditional(context, settings, &tightening, purposes)?;
     findings.push(refuted(
@@ -171,6 +172,11 @@ pub fn check(
     ));
     let share = global::share_overlaps(&record.global, &fresh);
     findings.push(share);
+    if let Some(stored) = &record.whole_box {
+        let band = record.global.band;
+        let found = whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?;
+        findings.push(found);
+    }
     if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
         let failures = fresh_failures(context, settings, ball)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);

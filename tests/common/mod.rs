@@ -2,6 +2,9 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+#[path = "../pessimist/mod.rs"]
+pub(crate) mod pessimist;
+
 use nalgebra::DMatrix;
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
@@ -26,11 +29,11 @@ pub(crate) fn cpu(threads: usize) -> Backend {
     Backend::Cpu(Cpu::new(Some(threads)).expect("threads start"))
 }
 
-/// An adapter, software included; where none opens this is said, and is a failure if
+/// An adapter, software included, as pessimistic as `REACHCAST_PESSIMIST` asks for; where none opens this is said, and is a failure if
 /// `REACHCAST_REQUIRE_GPU` is 1.
 pub(crate) fn adapter() -> Option<Gpu> {
     match Gpu::open(&Choice::Any) {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => Some(pessimist::as_asked(gpu)),
         Err(error) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
             panic!("REACHCAST_REQUIRE_GPU is 1: {error}")
         }
@@ -79,6 +82,8 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             source: DeviationSource::Scenario,
         },
         global: GlobalSettings { draws: 600, beta: 1e-3 },
+        whole_box: None,
+        drops: None,
         slice: Some([0, 1].map(|state| SliceAxis { state, values: values(state) })),
         state: axes.iter().map(|axis| 0.5 * (axis.low + axis.high)).collect(),
         growth: GrowthSettings {

@@ -21,18 +21,30 @@ use reachcast::{Error, Fault, Result};
 use crate::models::{Driver, VALUES};
 use crate::{drawn, gpu, ramp, random_network, whole_box};
 
-/// One write, one submission, one wait, one read.
-const ONE: Traffic = Traffic {
-    writes: 1,
-    submissions: 1,
-    waits: 1,
-    reads: 1,
+/// Nothing.
+const NONE: Traffic = Traffic {
+    writes: 0,
+    bytes_written: 0,
+    submissions: 0,
+    passes: 0,
+    waits: 0,
+    reads: 0,
+    bytes_read: 0,
     texts: 0,
     pipelines: 0,
     packs: 0,
+    programs: 0,
     buffers: 0,
     groups: 0,
 };
+/// One write, one submission of one pass, one wait, one read.
+const ONE: Traffic = Traffic { writes: 1, submissions: 1, passes: 1, waits: 1, reads: 1, ..NONE };
+/// Bytes of the parameters of a dispatch.
+const DISPATCH_BYTES: u64 = 256;
+/// Starts or pairs of a batch.
+const STARTS: u64 = 158;
+/// Steps of a rollout.
+const HORIZON: u64 = 30;
 
 /// The race under a network of three hidden layers.
 fn race() -> Plant {
@@ -51,12 +63,17 @@ fn starts(plant: &Plant) -> Starts<'static> {
     }
 }
 
-/// A batch of 158 starts.
-fn roll_out(program: &Program<'_>, starts: &Starts<'_>, query: Query) -> Result<Vec<f32>> {
-    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+/// A batch of 158 starts, the first of which has the index `first`.
+fn roll_out_from(
+    program: &Program<'_>,
+    starts: &Starts<'_>,
+    query: Query,
+    first: u64,
+) -> Result<Vec<f32>> {
+    let spec = RolloutSpec::new(HORIZON as u32, 0.95).expect("a horizon");
     let task = ReachAvoidTask {
         starts: starts.clone(),
-        range: 0..158,
+        range: first..first + STARTS,
         spec,
         tightening: &ramp(&spec),
         query,
@@ -69,16 +86,21 @@ fn roll_out(program: &Program<'_>, starts: &Starts<'_>, query: Query) -> Result<
     Ok(all)
 }
 
+/// A batch of 158 starts.
+fn roll_out(program: &Program<'_>, starts: &Starts<'_>, query: Query) -> Result<Vec<f32>> {
+    roll_out_from(program, starts, query, 0)
+}
+
 /// A batch of 158 pairs.
-fn roll_out_pairs(program: &Program<'_>, control: PairControl) -> Result<()> {
-    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+fn roll_out_pairs(program: &Program<'_>, control: PairControl, first: u64) -> Result<()> {
+    let spec = RolloutSpec::new(HORIZON as u32, 0.95).expect("a horizon");
     let task = DeviationTask {
         pairs: Pairs {
             nominal: starts(program.plant()),
             radius: 0.1,
             stream: Stream::new(82, purpose::DEVIATION_PERTURBATION, 0),
         },
-        range: 0..158,
+        range: first..first + STARTS,
         spec,
         tightening: &ramp(&spec),
         control,
@@ -93,56 +115,115 @@ fn traffic(backend: &Backend) -> Traffic {
     }
 }
 
-/// What `call` costs the second time.
-fn second(backend: &Backend, call: impl Fn() -> Result<()>) -> Traffic {
-    call().expect("it runs");
+/// What `call` costs the second time: `call` is given 0 first, then 1.
+fn second(backend: &Backend, call: impl Fn(u64) -> Result<()>) -> Traffic {
+    call(0).expect("it runs");
     let before = traffic(backend);
-    call().expect("it runs again");
+    call(1).expect("it runs again");
     traffic(backend).since(before)
 }
 
-/// Each plant, its network in layers and fused.
-fn each(test: impl Fn(&Backend, &Plant)) {
+/// What the very same call costs the second time.
+fn again(backend: &Backend, call: impl Fn(u64) -> Result<()>) -> Traffic {
+    second(backend, |_| call(0))
+}
+
+/// Each plant, its network in layers and fused, with the number of dispatches of a step under it: 1 where
+/// the rollout kernel takes all steps in one.
+fn each(test: impl Fn(&Backend, &Plant, bool)) {
     for networks in [NetworkKernels::Layered, NetworkKernels::Fused] {
         for plant in [race(), integrator()] {
             let Some(gpu) = gpu() else { return };
-            test(&Backend::Gpu(gpu.with_networks(networks)), &plant);
+            let layered =
+                networks == NetworkKernels::Layered && plant.controller.network().is_some();
+            test(&Backend::Gpu(gpu.with_networks(networks)), &plant, layered);
         }
     }
 }
 
+/// Dispatches of rollouts from the start to the horizon: the draw, then layers and rollouts.
+fn dispatches(layered: bool) -> u64 {
+    // A network of three hidden layers.
+    if layered { 1 + 4 * HORIZON + HORIZON + 1 } else { 2 }
+}
+
+/// What is read before the measures, which are numbers of 4 bytes.
+const HEAD_BYTES: u64 = 8;
+
 #[test]
 fn a_call_is_one_write_one_submission_one_wait_and_one_read() {
-    each(|backend, plant| {
+    each(|backend, plant, layered| {
         let program = backend.prepare(plant).expect("it fits");
         let drawn = starts(plant);
-        let measures = || roll_out(&program, &drawn, Query::Measure).map(drop);
-        assert_eq!(second(backend, measures), ONE, "measures of {}", plant.model.name);
-        for control in [PairControl::Replay, PairControl::ClosedLoop] {
-            let pairs = || roll_out_pairs(&program, control);
-            assert_eq!(second(backend, pairs), ONE, "{control:?} pairs of {}", plant.model.name);
-        }
-        let size = plant.model.states.len();
-        let list: Vec<f32> = (0..158).flat_map(|i| drawn.start(i)).collect();
-        let listed = Starts::Listed(States::new(&list, size).unwrap());
-        let measures = || roll_out(&program, &listed, Query::Measure).map(drop);
-        assert_eq!(second(backend, measures), ONE, "a list of {}", plant.model.name);
+        let measures = |first| roll_out_from(&program, &drawn, Query::Measure, first).map(drop);
+        let read = Traffic { bytes_read: HEAD_BYTES + 4 * STARTS, ..ONE };
+        let expected = Traffic { bytes_written: DISPATCH_BYTES * dispatches(layered), ..read };
+        assert_eq!(second(backend, measures), expected, "measures of {}", plant.model.name);
+        let sent = Traffic { writes: 0, ..read };
+        assert_eq!(again(backend, measures), sent, "the same again of {}", plant.model.name);
     });
 }
 
-/// Signs are compacted after each submission, which asks for the number that is left.
+/// A list lies on the device for the next call, and is sent again where a number of it has changed.
 #[test]
-fn signs_are_one_of_each_per_submission() {
-    each(|backend, plant| {
+fn a_list_is_sent_once() {
+    each(|backend, plant, _| {
         let program = backend.prepare(plant).expect("it fits");
-        let signs = || roll_out(&program, &starts(plant), Query::Sign).map(drop);
-        let cost = second(backend, signs);
-        let count = cost.submissions;
-        // 31 states in submissions of 8 under a network, of 32 under a formula.
-        assert!((1..=4).contains(&count), "{cost:?}");
-        let expected =
-            Traffic { writes: count, submissions: count, waits: count, reads: count, ..ONE };
-        assert_eq!(cost, expected, "{}", plant.model.name);
+        let drawn = starts(plant);
+        let size = plant.model.states.len();
+        let mut list: Vec<f32> = (0..STARTS).flat_map(|i| drawn.start(i)).collect();
+        let roll = |list: &[f32]| {
+            let listed = Starts::Listed(States::new(list, size).unwrap());
+            let before = traffic(backend);
+            let found = roll_out(&program, &listed, Query::Measure).expect("it runs");
+            (found, traffic(backend).since(before))
+        };
+        let expected = roll_out(&program, &drawn, Query::Measure).expect("it runs");
+        assert_eq!(roll(&list).0, expected);
+        let read = Traffic { writes: 0, bytes_read: HEAD_BYTES + 4 * STARTS, ..ONE };
+        assert_eq!(roll(&list), (expected.clone(), read), "{}", plant.model.name);
+        list.swap(0, size);
+        let (found, cost) = roll(&list);
+        let bytes_written = 16 * size.div_ceil(4) as u64 * STARTS;
+        let (writes, buffers) = (1, cost.buffers);
+        assert_eq!(cost, Traffic { writes, bytes_written, buffers, ..read });
+        assert_ne!(found[..2], expected[..2]);
+        assert_eq!(found[2..], expected[2..]);
+    });
+}
+
+#[test]
+fn pairs_are_one_of_each() {
+    each(|backend, plant, layered| {
+        let program = backend.prepare(plant).expect("it fits");
+        for control in [PairControl::Replay, PairControl::ClosedLoop] {
+            let pairs = |first| roll_out_pairs(&program, control, first);
+            let expected = Traffic {
+                // The reduction of the distances comes on top.
+                bytes_written: DISPATCH_BYTES * (dispatches(layered) + 1),
+                bytes_read: HEAD_BYTES + 8 * STARTS + 8 * (HORIZON + 1),
+                ..ONE
+            };
+            assert_eq!(second(backend, pairs), expected, "{control:?} of {}", plant.model.name);
+        }
+    });
+}
+
+/// Signs are compacted on the way, and no host is asked how many are left.
+#[test]
+fn signs_are_one_of_each() {
+    each(|backend, plant, layered| {
+        let program = backend.prepare(plant).expect("it fits");
+        let signs = |first| roll_out_from(&program, &starts(plant), Query::Sign, first).map(drop);
+        // 31 states: segments of 8 under a network, of 32 under a formula; compactions between.
+        let compactions = if plant.controller.network().is_some() { 3 } else { 0 };
+        let rollouts = if layered { dispatches(true) } else { 2 + compactions };
+        let expected = Traffic {
+            bytes_written: DISPATCH_BYTES * (rollouts + compactions),
+            bytes_read: HEAD_BYTES + 4 * STARTS,
+            ..ONE
+        };
+        assert_eq!(second(backend, signs), expected, "{}", plant.model.name);
     });
 }
 
@@ -184,7 +265,8 @@ fn a_parameter_is_sent_with_the_call() {
         let other = of([1.0, -0.5, 0.9, 3.0, 0.1]);
         let cost = traffic(&backend).since(before);
         // Printed, and found to be the same plant with the same network.
-        assert_eq!(cost, Traffic { texts: 1, ..ONE });
+        let (bytes_written, bytes_read) = (cost.bytes_written, HEAD_BYTES + 4 * STARTS);
+        assert_eq!(cost, Traffic { texts: 1, bytes_written, bytes_read, ..ONE });
         assert_ne!(first, other);
         assert_eq!(of(VALUES), first, "and back");
     }
@@ -225,7 +307,7 @@ fn a_cpu_takes_a_prepared_plant_over() {
     let expected =
         roll_out(&cpu.prepare(&plant).expect("it fits"), &starts(&plant), Query::Measure);
     assert_eq!(found, expected.expect("it runs"));
-    roll_out_pairs(&program, PairControl::ClosedLoop).expect("and pairs");
+    roll_out_pairs(&program, PairControl::ClosedLoop, 0).expect("and pairs");
 }
 
 /// Without one, the error says what failed.
@@ -300,8 +382,13 @@ fn a_plan_is_one_write_one_submission_one_wait_and_one_read() {
         for costs in [CostQuery::Summary, CostQuery::Each] {
             let problems = [problem.clone(), problem.clone(), problem.clone()];
             let task = |iteration| MppiTask { problems: &problems, iteration, costs };
-            let plan = || program.improve(&task(1)).map(drop);
-            assert_eq!(second(&backend, plan), ONE, "{costs:?}");
+            let plan = |iteration| program.improve(&task(iteration as u32)).map(drop);
+            let cost = second(&backend, plan);
+            let Traffic { bytes_written, bytes_read, .. } = cost;
+            assert_eq!(cost, Traffic { bytes_written, bytes_read, ..ONE }, "{costs:?}");
+            // Streams and plans of the problems are there from the call before.
+            assert!(bytes_written.is_multiple_of(DISPATCH_BYTES), "{cost:?}");
+            assert!(bytes_read > 0, "{cost:?}");
             // Another iteration, other problems, fewer of them in the same room.
             let before = traffic(&backend);
             let fewer = MppiTask { problems: &problems[1..], ..task(2) };

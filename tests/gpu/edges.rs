@@ -104,7 +104,7 @@ fn every_step_under_a_network(mut gpu: Gpu) {
     let spec = RolloutSpec::new(150, 1.0).expect("a horizon");
     let mut target = vec![1000.0; 151];
     target[150] = 0.0;
-    let tightening = Tightening { constraint: vec![0.0; 151], target };
+    let tightening = Tightening::losing(target, vec![0.0; 151]);
     let starts = [[-149.5, 0.5], [-150.5, 0.5]];
     for (query, expected) in [(Query::Measure, [0.5, -0.5]), (Query::Sign, [1.0, -1.0])] {
         let task = ReachAvoidTask {

@@ -7,9 +7,11 @@ mod calls;
 mod certificates;
 #[path = "../common/mod.rs"]
 mod common;
+mod counts;
 mod edges;
 mod failures;
 mod faults;
+mod held;
 mod infinite;
 #[path = "../learned/mod.rs"]
 mod learned;
@@ -42,10 +44,10 @@ use reachcast::rollout::{
 };
 use reachcast::system::System;
 
-/// An adapter of any kind; `None`, said aloud, where there is none.
+/// An adapter of any kind, as pessimistic as `REACHCAST_PESSIMIST` asks for; `None`, said aloud, where there is none.
 fn gpu() -> Option<Gpu> {
     match Gpu::open(&Choice::Any) {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => Some(common::pessimist::as_asked(gpu)),
         Err(e) if std::env::var("REACHCAST_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
             panic!("REACHCAST_REQUIRE_GPU is 1: {e}")
         }
@@ -110,6 +112,7 @@ fn ramp(spec: &RolloutSpec) -> Tightening {
     Tightening {
         target: steps.clone().map(|t| 0.01 * t as f32).collect(),
         constraint: steps.map(|t| 0.02 * t as f32).collect(),
+        ..Tightening::default()
     }
 }
 

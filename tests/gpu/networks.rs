@@ -26,7 +26,7 @@ fn last_state_only(horizon: u32) -> (RolloutSpec, Tightening) {
     let spec = RolloutSpec::new(horizon, 1.0).expect("a horizon");
     let mut target = vec![1e3; horizon as usize + 1];
     target[horizon as usize] = 0.0;
-    (spec, Tightening { constraint: vec![-1e3; target.len()], target })
+    (spec, Tightening::losing(target.clone(), vec![-1e3; target.len()]))
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn a_decided_sign_stays_when_the_state_overflows() {
         // Not safe from t = 3 on; infinite at t = 7, within the same dispatch.
         let mut constraint = vec![0.0; 8];
         constraint[3] = 1e7;
-        let tightening = Tightening { target: vec![0.0; 8], constraint };
+        let tightening = Tightening::losing(vec![0.0; 8], constraint);
         let mut task = ReachAvoidTask {
             starts: Starts::listed(&[[-20.0, 2.1]]),
             range: 0..1,

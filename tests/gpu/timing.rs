@@ -1,6 +1,6 @@
 //! Times of kernels on the device, and its limits.
 
-use reachcast::backend::gpu::{Gpu, KernelTime};
+use reachcast::backend::gpu::{Gpu, KernelTime, NetworkKernels};
 use reachcast::model::Plant;
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
@@ -23,9 +23,14 @@ fn roll_out(gpu: Gpu, policy: &Mlp, count: u64) -> (Gpu, Vec<f32>) {
     measures(gpu, &Plant::of(system, policy.clone()), &task)
 }
 
+/// An adapter that has a dispatch per layer and step.
+fn layered() -> Option<Gpu> {
+    gpu().map(|gpu| gpu.with_networks(NetworkKernels::Layered))
+}
+
 #[test]
 fn every_dispatch_of_the_plan_is_timed() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = layered() else { return };
     let policy = random_network(&[12, 16, 16, 3], Activation::Relu);
     let (gpu, plain) = roll_out(gpu, &policy, 100);
     assert_eq!(gpu.take_kernel_times(), [], "off at first");
@@ -47,7 +52,7 @@ fn every_dispatch_of_the_plan_is_timed() {
 
 #[test]
 fn submissions_longer_than_a_set_of_queries_are_timed() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = layered() else { return };
     // 10 steps of 300 layers in one submission, 2048 to a set.
     let policy = random_network(&[&[12][..], &[4; 299], &[3]].concat(), Activation::Tanh);
     gpu.time_kernels(true);

@@ -29,6 +29,7 @@ fn ramp(spec: &RolloutSpec) -> Tightening {
     Tightening {
         target: steps.clone().map(|t| 0.01 * t as f32).collect(),
         constraint: steps.map(|t| 0.02 * t as f32).collect(),
+        ..Tightening::default()
     }
 }
 

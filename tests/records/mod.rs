@@ -147,6 +147,10 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             constants: constants(self.constants),
             deviation: deviation(&bound, self.deviation, NX),
             global: global(NX),
+            whole_box: None,
+            drops: None,
+            sequence: None,
+            calibration: None,
             state: StateRecord {
                 x: short(&self.state),
                 tier: if self.measure(self.state, &bound) > 0.0 { 1 } else { 2 },
@@ -300,6 +304,7 @@ fn global(dimension: usize) -> GlobalRecord {
         f32_error: 7.3e-7,
         band: 2.92e-6,
         f64_reruns: 17,
+        share: None,
     }
 }
 

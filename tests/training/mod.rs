@@ -76,5 +76,5 @@ pub(crate) fn task<
 /// Losses that grow over the steps.
 pub(crate) fn losses(spec: &RolloutSpec) -> Tightening {
     let grown = |rate: f32| (0..=spec.horizon).map(|t| rate * (t as f32).sqrt()).collect();
-    Tightening { target: grown(0.3), constraint: grown(0.2) }
+    Tightening::losing(grown(0.3), grown(0.2))
 }

@@ -4,7 +4,7 @@ use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use crate::real::simd::{Body, Instructions};
 use crate::real::{Lanes, Real, per_lane};
-use crate::rollout::{Fold, HUGE, NON_FINITE, Tightening};
+use crate::rollout::{Effect, Fold, HUGE, NON_FINITE, Tightening};
 use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem};
 
 /// Exponent bits of an f32: all set for infinities and NaN.
@@ -197,11 +197,12 @@ where
     fn run(self) {
         let Self { frame, scores, gamma } = self;
         let (states, [target_row, constraint_row]) = (frame.states().len(), frame.margins());
-        for (group, (score, Loss([target_loss, constraint_loss]))) in scores.enumerate() {
+        for (group, (score, loss)) in scores.enumerate() {
             let at = group * N;
             // Infinite margins are satisfied or violated, only a NaN fails the rollout.
-            let target = bounded(lanes(frame, target_row, at) - target_loss);
-            let constraint = bounded(lanes(frame, constraint_row, at) - constraint_loss);
+            let rows = [target_row, constraint_row];
+            let [target, constraint] = loss.act(rows.map(|row| lanes(frame, row, at)));
+            let [target, constraint] = [bounded(target), bounded(constraint)];
             let mut largest = with_largest(with_largest([0; N], target), constraint);
             for row in 0..states {
                 largest = with_largest(largest, lanes(frame, row, at));
@@ -226,29 +227,44 @@ fn with_largest<const N: usize>(largest: [u32; N], values: Lanes<N>) -> [u32; N]
     per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]))
 }
 
-/// What both margins lose, per lane: off the target margin, off the constraint margin.
+/// What both margins lose, per lane: off the target margin, off the constraint margin; or their factors.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Loss<const N: usize>([Lanes<N>; 2]);
+pub(super) struct Loss<const N: usize> {
+    numbers: [Lanes<N>; 2],
+    effect: Effect,
+}
 
 impl<const N: usize> Loss<N> {
     /// Nothing.
-    pub(super) const NONE: Self = Self([Lanes([0.0; N]); 2]);
+    pub(super) const NONE: Self =
+        Self { numbers: [Lanes([0.0; N]); 2], effect: Effect::Subtracted };
 
     /// At step `t`, the same for all lanes.
     #[inline(always)]
     pub(super) fn at(tightening: &Tightening, t: usize) -> Self {
         let (target, constraint) = (tightening.target[t], tightening.constraint[t]);
-        Self([Lanes::lit(target), Lanes::lit(constraint)])
+        Self { numbers: [Lanes::lit(target), Lanes::lit(constraint)], effect: tightening.effect }
     }
 
     /// At a step of its own for each lane.
     #[inline(always)]
     pub(super) fn at_each(tightening: &Tightening, steps: &[u32; N]) -> Self {
-        let Tightening { target, constraint } = tightening;
-        Self([
+        let Tightening { target, constraint, effect } = tightening;
+        let numbers = [
             Lanes(per_lane!(N, i => target[steps[i] as usize])),
             Lanes(per_lane!(N, i => constraint[steps[i] as usize])),
-        ])
+        ];
+        Self { numbers, effect: *effect }
+    }
+
+    /// The margins `[target, constraint]` with it taken off, or multiplied with it.
+    #[inline(always)]
+    fn act(&self, [target, constraint]: [Lanes<N>; 2]) -> [Lanes<N>; 2] {
+        let [of_target, of_constraint] = self.numbers;
+        match self.effect {
+            Effect::Subtracted => [target - of_target, constraint - of_constraint],
+            Effect::Multiplied => [target * of_target, constraint * of_constraint],
+        }
     }
 }
 

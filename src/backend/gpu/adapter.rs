@@ -9,7 +9,9 @@ use super::fault::Injection;
 use super::fusing::NetworkKernels;
 use super::limits::{self, DeviceLimits};
 use super::listing::{Adapter, Choice};
+use super::mppi_source::PlanSource;
 use super::opened::{Opened, Setup};
+use super::recent::Recent;
 use super::source::Sources;
 use super::state::State;
 use super::timing::KernelTime;
@@ -17,6 +19,9 @@ use super::traffic::Traffic;
 use crate::backend::Event;
 use crate::backend::cpu::Cpu;
 use crate::error::Result;
+
+/// Plannings that are remembered.
+const PLANS: usize = 16;
 
 /// An adapter, and what becomes of the work where it fails.
 ///
@@ -30,6 +35,8 @@ pub struct Gpu {
     pub(super) fallback: Option<Cpu>,
     events: Mutex<Vec<Event>>,
     pub(super) sources: Sources,
+    /// What was planned for last.
+    pub(super) plans: Recent<Arc<PlanSource>>,
 }
 
 impl Gpu {
@@ -48,6 +55,7 @@ impl Gpu {
             fallback: None,
             events: Mutex::default(),
             sources: Sources::default(),
+            plans: Recent::new(PLANS),
         })
     }
 
@@ -120,6 +128,12 @@ impl Gpu {
     #[doc(hidden)]
     pub fn traffic(&self) -> Traffic {
         self.opened().device.counters.so_far()
+    }
+
+    /// Time that calls spent in the driver so far, submitting and waiting.
+    #[doc(hidden)]
+    pub fn driver_time(&self) -> Duration {
+        self.opened().device.counters.driver_time()
     }
 
     /// Where calls run now.

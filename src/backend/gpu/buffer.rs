@@ -41,7 +41,7 @@ impl Use {
         match self {
             Self::Storage => U::STORAGE | U::COPY_SRC | U::COPY_DST,
             Self::Uniform => U::UNIFORM | U::COPY_DST,
-            Self::Inputs => U::UNIFORM | U::STORAGE | U::COPY_DST,
+            Self::Inputs => U::UNIFORM | U::STORAGE | U::INDIRECT | U::COPY_DST,
             Self::Readback => U::MAP_READ | U::COPY_DST,
             Self::Timestamps => U::QUERY_RESOLVE | U::COPY_SRC,
         }
@@ -75,6 +75,12 @@ impl Pool {
     pub(super) fn clear(&self) {
         self.free.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
+}
+
+/// Bytes of a buffer that the host has asked for.
+pub(super) struct Mapping {
+    bytes: u64,
+    done: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
 }
 
 /// A buffer that returns to its pool.
@@ -114,6 +120,7 @@ impl Buffer {
     /// Writes `bytes` from `offset` on, before the next submission.
     pub(super) fn write_at(&self, device: &Device, offset: u64, bytes: &[u8]) {
         device.counters.add(Count::Write);
+        device.counters.add_many(Count::BytesWritten, bytes.len() as u64);
         device.queue.write_buffer(&self.inner, offset, bytes);
     }
 
@@ -143,34 +150,41 @@ impl Buffer {
         let mut encoder = device.device.create_command_encoder(&Default::default());
         self.copy(&mut encoder, &staging, 0, bytes);
         device.submit(encoder.finish())?;
-        staging.mapped(device, bytes, || device.wait(None), bytemuck::pod_collect_to_vec)
+        let mapping = staging.map(bytes);
+        device.wait(None)?;
+        staging.mapped(device, mapping, bytemuck::pod_collect_to_vec)
     }
 
-    /// What `take` makes of the first `bytes` of a buffer for readback, after `wait`, which waits for
-    /// the work that fills it.
+    /// Asks for the first `bytes` of a buffer for readback, once all work submitted so far is done.
+    pub(super) fn map(&mut self, bytes: u64) -> Mapping {
+        // Until it is unmapped again, nobody else can use it.
+        self.reusable = false;
+        let (send, done) = mpsc::channel();
+        self.inner.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+            // The receiver is gone only if the call failed, which is reported by itself.
+            let _ = send.send(result);
+        });
+        Mapping { bytes, done }
+    }
+
+    /// What `take` makes of the bytes that `mapping` asked for, after a wait for that work.
     ///
     /// # Errors
-    /// [`crate::Error::DeviceFailed`], also for failures of earlier work.
+    /// [`crate::Error::DeviceFailed`] if they cannot be read.
     pub(super) fn mapped<T>(
         &mut self,
         device: &Device,
-        bytes: u64,
-        wait: impl FnOnce() -> Result<()>,
+        mapping: Mapping,
         take: impl FnOnce(&[u8]) -> T,
     ) -> Result<T> {
-        // Until it is unmapped again, nobody else can use it.
-        self.reusable = false;
-        let (send, mapped) = mpsc::channel();
-        self.inner.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
-            // The receiver is gone only if the wait failed, which is reported by itself.
-            let _ = send.send(result);
-        });
-        wait()?;
+        let Mapping { bytes, done } = mapping;
         device.counters.add(Count::Read);
+        device.counters.add_many(Count::BytesRead, bytes);
         let failed = |text: String| {
             device.failed(Fault::Validation, &format!("cannot read results: {text}"))
         };
-        match mapped.recv() {
+        // The wait is over, but a thread that waits beside this one may be about to answer.
+        match done.recv() {
             Ok(Ok(())) => {}
             Ok(Err(e)) => return Err(failed(e.to_string())),
             Err(e) => return Err(failed(e.to_string())),

@@ -15,6 +15,8 @@ pub(super) const NETWORK_COLUMNS: u64 = 1 << 14;
 /// threads per 64 columns: enough for any GPU, and not too long a dispatch for the watchdog of a
 /// slow one.
 const FUSED_COLUMNS: u64 = 1 << 16;
+/// Most dispatches of a submission of signs, whose trajectories may all be decided by then.
+const DISPATCHES: u64 = 1024;
 /// Most device memory of one call, bytes.
 pub(super) const MEMORY_BYTES: u64 = 256 << 20;
 
@@ -99,6 +101,13 @@ pub(super) struct Size<'a> {
 }
 
 impl Size<'_> {
+    /// Most dispatches of a step: the rollout, what its network sees, layers and links.
+    pub(super) fn step_dispatches(&self) -> u64 {
+        let layers = self.network.map_or(0, |mlp| mlp.layers().len());
+        let chained = self.chain.map_or(0, |load| load.dispatches);
+        (2 + layers + chained) as u64
+    }
+
     /// Operations of a step of one trajectory.
     fn step_flops(&self) -> u64 {
         let called = self.chain.map_or(0, |load| load.flops);
@@ -113,8 +122,10 @@ pub(super) struct Chunking {
     pub(super) stride: u32,
     /// Trajectories in each row of the state: `stride`, or twice that for pairs.
     pub(super) row: u32,
-    /// Steps per submission.
+    /// Steps per submission, of signs per compaction.
     pub(super) segment: u32,
+    /// Segments per submission: 1 but for signs.
+    pub(super) rounds: u32,
     /// Steps per dispatch: 1 if a network's layers come between, else as many of a segment as the
     /// bound on loop iterations allows.
     pub(super) steps: u32,
@@ -152,7 +163,12 @@ impl Chunking {
         if stride == 0 || parameters > binding {
             return Err(too_large(adapter, largest * COLUMN_UNIT, parameters, binding));
         }
-        let segment = u64::from(segment).min(limit.pieces(stride * step_flops)) as u32;
+        let timely = limit.pieces(stride * step_flops);
+        let segment = u64::from(segment).min(timely) as u32;
+        let rounds = match work {
+            Work::Sign => rounds(size, timely, segment),
+            Work::Measure | Work::Pairs => 1,
+        };
         let steps = match (driven_by, fused) {
             (DrivenBy::Layered, _) => 1,
             (_, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work.sides())) as u32),
@@ -166,8 +182,25 @@ impl Chunking {
                  at {MAX_TRIPS} without notice; use the native CPU backend for this size"
             )));
         }
-        Ok(Self { stride: stride as u32, row: stride as u32 * work.sides(), segment, steps })
+        Ok(Self {
+            stride: stride as u32,
+            row: stride as u32 * work.sides(),
+            segment,
+            rounds,
+            steps,
+        })
     }
+
+    /// Segments of a submission of rollouts of `horizon` steps.
+    pub(super) fn rounds_of(&self, horizon: u32) -> u32 {
+        self.rounds.min((horizon + 1).div_ceil(self.segment))
+    }
+}
+
+/// Segments of `segment` steps that a submission of `timely` steps takes.
+fn rounds(size: &Size<'_>, timely: u64, segment: u32) -> u32 {
+    let dispatches = u64::from(segment) * size.step_dispatches() + 2;
+    (timely / u64::from(segment)).min(DISPATCHES / dispatches).max(1) as u32
 }
 
 /// Bytes that each buffer holds per column.

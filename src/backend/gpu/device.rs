@@ -113,7 +113,7 @@ impl Device {
             self.inject(fault);
             self.check()?;
         }
-        Ok(self.queue.submit([commands]))
+        Ok(self.counters.in_driver(|| self.queue.submit([commands])))
     }
 
     /// Fails as `fault`: by the driver itself where it can be brought to it.
@@ -153,7 +153,8 @@ impl Device {
         self.counters.add(Count::Wait);
         let polled = contained(|| {
             let timeout = Some(self.patience);
-            self.device.poll(wgpu::PollType::Wait { submission_index: submission, timeout })
+            let wait = wgpu::PollType::Wait { submission_index: submission, timeout };
+            self.counters.in_driver(|| self.device.poll(wait))
         });
         self.check()?;
         match polled {

@@ -1,11 +1,11 @@
 //! What the host sends with a submission of rollouts.
 
-use super::batch::Batch;
+use super::batch::{Batch, Counted};
 use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
 use super::upload::Upload;
-use crate::rollout::{Region, RolloutSpec, Starts, Tightening};
+use crate::rollout::{Effect, Region, RolloutSpec, Starts, Tightening};
 
 /// Bytes of a vector of 4 numbers.
 const VECTOR_BYTES: usize = 16;
@@ -17,13 +17,15 @@ pub(super) struct InputSizes {
     pub(super) values: usize,
     /// Of the schedule, one per step.
     pub(super) steps: usize,
-    /// Of the region or of the starts that are listed.
+    /// Of the region that starts are drawn from.
     pub(super) region: usize,
     /// Dispatches of a submission.
     pub(super) dispatches: usize,
+    /// Dispatches that the device narrows at a time.
+    pub(super) narrowed: usize,
 }
 
-/// Parts of the upload: the parameters of the model, the schedule, the region or listed starts.
+/// Parts of the upload: the parameters of the model, the schedule, the region.
 const VALUES: usize = 0;
 const SCHEDULE: usize = 1;
 const REGION: usize = 2;
@@ -35,18 +37,24 @@ impl Inputs {
     /// Room for `sizes`.
     pub(super) fn new(device: &Device, pool: &Pool, sizes: InputSizes) -> Self {
         let parts = [sizes.values, sizes.steps, sizes.region].map(|vectors| VECTOR_BYTES * vectors);
-        Self(Upload::new(device, pool, &parts, sizes.dispatches))
+        Self(Upload::new(device, pool, &parts, sizes.dispatches, sizes.narrowed))
     }
 
     /// What a kernel sees of it in `slot`; `None` for any other.
     pub(super) fn binding(&self, slot: Slot) -> Option<wgpu::BufferBinding<'_>> {
         match slot {
             Slot::Params => Some(self.0.params()),
+            Slot::Blocks => Some(self.0.narrowed()),
             Slot::Values => Some(self.0.part(VALUES)),
             Slot::Schedule => Some(self.0.part(SCHEDULE)),
             Slot::Region => Some(self.0.part(REGION)),
             _ => None,
         }
+    }
+
+    /// Where dispatches find the number of their workgroups that the device counts.
+    pub(super) fn counted(&self) -> Counted {
+        self.0.counted()
     }
 
     /// Bytes of it.
@@ -59,13 +67,17 @@ impl Inputs {
         self.0.put(VALUES, 0, values);
     }
 
-    /// Sets the schedule, per step: discount, and what both margins lose. The discount is multiplied
-    /// up step by step in f32, as the host's fold does.
+    /// Sets the schedule, per step: discount, what both margins lose, and 1 where they are multiplied
+    /// with it instead. The discount is multiplied up step by step in f32, as the host's fold does.
     pub(super) fn set_schedule(&mut self, spec: &RolloutSpec, tightening: &Tightening) {
         let losses = tightening.target.iter().zip(&tightening.constraint);
+        let multiplied = match tightening.effect {
+            Effect::Subtracted => 0.0,
+            Effect::Multiplied => 1.0,
+        };
         let mut discount = 1.0;
         for (step, (&target, &constraint)) in losses.enumerate() {
-            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, 0.0]);
+            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, multiplied]);
             discount *= spec.gamma;
         }
     }
@@ -83,20 +95,6 @@ impl Inputs {
                 }
             };
             self.0.put(REGION, 4 * i, &vector);
-        }
-    }
-
-    /// Sets the listed starts `first..first + columns`, `[states / 4, columns]` vectors; nothing if
-    /// they are drawn.
-    pub(super) fn set_starts(&mut self, starts: &Starts<'_>, first: u64, columns: u32) {
-        let Starts::Listed(list) = starts else { return };
-        let columns = columns as usize;
-        for column in 0..columns {
-            // Past its end, a list repeats its last start.
-            let row = list.row((first as usize + column).min(list.len() - 1));
-            for (quad, numbers) in row.chunks(4).enumerate() {
-                self.0.put(REGION, 4 * (quad * columns + column), numbers);
-            }
         }
     }
 

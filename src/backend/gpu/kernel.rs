@@ -90,9 +90,13 @@ impl Pipelines {
         // by the length of the schedule or of the plans of the problems, and `inputs`, `plan` and
         // `mppi_plan` size every buffer for that stride, that length and those problems; workgroup
         // memory has the vectors of the widest layer, and `limits` sizes its buffers for its
-        // threads; the cell of a map is bounded by the number of its cells, as an integer; the
-        // recorded physics has neither loops nor indices that are not constant, and every loop of
-        // the hand-written kernels ends.
+        // threads; the cell of a map is bounded by the number of its cells, as an integer; a window
+        // of blocks is as long as a segment, whose dispatches alone are narrowed, and counts have a
+        // place for each workgroup; the recorded physics has neither loops nor indices that are not
+        // constant, and every loop of the hand-written kernels ends; the loops of a generated network
+        // run over its layers and their inputs, its trajectories divide the padding of columns, its
+        // threads beyond a layer read its last neurons and write none, and slices end with the layer,
+        // behind the last of which comes the first slice of the first.
         unsafe {
             let checks = wgpu::ShaderRuntimeChecks::unchecked();
             device.device.create_shader_module_trusted(descriptor, checks)
@@ -173,11 +177,10 @@ impl Bound {
         self.pipeline.columns
     }
 
-    /// Runs `groups` workgroups with the parameters at `offset`.
-    pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32, groups: [u32; 2]) {
+    /// Chooses the kernel, with the parameters at `offset`.
+    pub(super) fn choose(&self, pass: &mut wgpu::ComputePass<'_>, offset: u32) {
         pass.set_pipeline(&self.pipeline.pipeline);
         pass.set_bind_group(0, &self.group, &[offset]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 }
 
@@ -185,6 +188,7 @@ impl Bound {
 fn layout_entry(&(slot, access): &(Slot, Access)) -> wgpu::BindGroupLayoutEntry {
     let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
     let block = access == Access::Uniform;
+    let written = access == Access::Blocks;
     wgpu::BindGroupLayoutEntry {
         binding: slot as u32,
         visibility: wgpu::ShaderStages::COMPUTE,
@@ -192,9 +196,9 @@ fn layout_entry(&(slot, access): &(Slot, Access)) -> wgpu::BindGroupLayoutEntry 
             ty: match access {
                 Access::Uniform | Access::Constant => wgpu::BufferBindingType::Uniform,
                 Access::Read => storage(true),
-                Access::ReadWrite => storage(false),
+                Access::ReadWrite | Access::Blocks => storage(false),
             },
-            has_dynamic_offset: block,
+            has_dynamic_offset: block || written,
             min_binding_size: block.then_some(Params::SIZE),
         },
         count: None,

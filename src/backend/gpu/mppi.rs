@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::attempt::Attempt;
 use super::batch::Batch;
 use super::compose::{Kernel, PARTIAL_HEADER, Slot};
-use super::flight::Flight;
+use super::flight::{Flight, Ticket};
 use super::mppi_chunking::{DISPATCHES, MppiChunking};
 use super::mppi_source::PlanSource;
-use super::mppi_workspace::{PlanShape, PlanWorkspace, groups, words};
+use super::mppi_workspace::{PlanShape, PlanWorkspace, SentPlans, groups, words};
 use super::opened::Opened;
 use super::params::Params;
 use crate::error::Result;
@@ -36,12 +36,23 @@ pub(super) fn tally(
     let chunking = MppiChunking::new(&opened.device.adapter, attempt.limit, &size)?;
     attempt.columns.set(u64::from(chunking.stride));
     let mut space = program.take(&flight, PlanShape { chunking, costs: task.costs })?;
+    let mut delivery = Delivery { source, chunking, tallies: Vec::new(), sink };
     for problems in task.problems.chunks(chunking.problems as usize) {
         let chunk = Chunk { flight: &flight, source, task, problems };
-        sink(chunk.tally(&mut space, samples.clone())?);
+        chunk.tally(&mut space, samples.clone(), &mut delivery)?;
     }
+    let last = space.results.last(&flight, |sent, bytes| delivery.take(sent, bytes))?;
+    debug_assert!(last.is_some(), "a call has results");
     program.keep(space);
     Ok(())
+}
+
+/// Tallies of the problems of a chunk, as far as their samples have come in.
+struct Delivery<'a> {
+    source: &'a PlanSource,
+    chunking: MppiChunking,
+    tallies: Vec<PlanTally>,
+    sink: &'a mut dyn FnMut(Vec<PlanTally>),
 }
 
 /// Problems that are improved at a time.
@@ -60,21 +71,33 @@ struct Timed<'a> {
 }
 
 impl Chunk<'_> {
-    /// What the samples `samples` of each problem come to.
-    fn tally(&self, space: &mut PlanWorkspace, samples: Range<u32>) -> Result<Vec<PlanTally>> {
+    /// Sends the samples `samples` of each problem off; `delivery` takes what came before.
+    fn tally(
+        &self,
+        space: &mut PlanWorkspace,
+        samples: Range<u32>,
+        delivery: &mut Delivery<'_>,
+    ) -> Result<()> {
         space.inputs.set(self.problems, self.source.planning.spec.horizon());
-        let mut tallies = vec![PlanTally::default(); self.problems.len()];
         let most = space.shape.chunking.samples;
         for first in samples.clone().step_by(most as usize) {
-            let samples = first..samples.end.min(first + most);
-            self.run(space, samples.clone())?;
-            self.read(space, samples, &mut tallies)?;
+            let end = samples.end.min(first + most);
+            let ticket = self.run(space, first..end)?;
+            let [partials, totals] = self.result_bytes(&space.shape.chunking, space.shape.costs);
+            let sent = SentPlans {
+                problems: self.problems.len(),
+                samples: first..end,
+                partials: partials as usize / size_of::<u32>(),
+                ended: end == samples.end,
+            };
+            let take = |sent, bytes: &[u8]| delivery.take(sent, bytes);
+            space.results.send(self.flight, (ticket, partials + totals), sent, take)?;
         }
-        Ok(tallies)
+        Ok(())
     }
 
     /// Rolls out the samples `samples` and weighs them.
-    fn run(&self, space: &mut PlanWorkspace, samples: Range<u32>) -> Result<()> {
+    fn run(&self, space: &mut PlanWorkspace, samples: Range<u32>) -> Result<Ticket> {
         let (chunking, spec) = (space.shape.chunking, &self.source.planning.spec);
         let settings = spec.settings();
         let params = Params {
@@ -89,7 +112,7 @@ impl Chunk<'_> {
             temperature: settings.temperature,
             ..Params::default()
         };
-        let PlanWorkspace { inputs, buffers, kernels, readback, shape, .. } = space;
+        let PlanWorkspace { inputs, buffers, kernels, results, shape, .. } = space;
         let mut batch = Timed::default();
         batch.dispatches.push_columns(&kernels.start, &params);
         let mut room = |batch: &mut Timed<'_>, steps: u32| -> Result<()> {
@@ -126,9 +149,9 @@ impl Chunk<'_> {
             &batch.dispatches,
             |_| {},
             |encoder| {
-                readback.copy(encoder, buffers.of(Slot::Partials), 0, partials);
+                results.free().copy(encoder, buffers.of(Slot::Partials), 0, partials);
                 if totals > 0 {
-                    readback.copy(encoder, buffers.of(Slot::Totals), partials, totals);
+                    results.free().copy(encoder, buffers.of(Slot::Totals), partials, totals);
                 }
             },
         )
@@ -144,35 +167,33 @@ impl Chunk<'_> {
         };
         [problems * u64::from(groups(chunking)) * partial, totals]
     }
+}
 
-    /// Adds what the samples `samples` came to, a block for each workgroup of the update.
-    fn read(
-        &self,
-        space: &mut PlanWorkspace,
-        samples: Range<u32>,
-        tallies: &mut [PlanTally],
-    ) -> Result<()> {
-        let chunking = space.shape.chunking;
-        let [partials, totals] = self.result_bytes(&chunking, space.shape.costs);
-        let read = space.readback.read(self.flight, partials + totals, |bytes| {
-            bytemuck::pod_collect_to_vec::<u8, u32>(bytes)
-        })?;
-        let (partials, costs) = read.split_at(partials as usize / size_of::<u32>());
+impl Delivery<'_> {
+    /// Adds what the samples of `sent` came to, a block for each workgroup of the update; hands the
+    /// tallies of a chunk on once all its samples are there.
+    fn take(&mut self, sent: SentPlans, bytes: &[u8]) {
+        let read = bytemuck::pod_collect_to_vec::<u8, u32>(bytes);
+        let (partials, costs) = read.split_at(sent.partials);
+        self.tallies.resize_with(sent.problems, PlanTally::default);
+        let chunking = self.chunking;
         let words = words(&self.source.planning.spec);
         let covered = chunking.rounds * Kernel::MppiUpdate.workgroup();
-        for (number, tally) in tallies.iter_mut().enumerate() {
+        for (number, tally) in self.tallies.iter_mut().enumerate() {
             let mine =
                 partials.chunks(groups(&chunking) as usize * words).nth(number).unwrap_or(&[]);
             let costs = costs.chunks(chunking.width as usize).nth(number).unwrap_or(&[]);
-            for (group, first) in samples.clone().step_by(covered as usize).enumerate() {
-                let count = covered.min(samples.end - first);
-                let place = (first - samples.start) as usize;
+            for (group, first) in sent.samples.clone().step_by(covered as usize).enumerate() {
+                let count = covered.min(sent.samples.end - first);
+                let place = (first - sent.samples.start) as usize;
                 let costs = costs.get(place..place + count as usize).unwrap_or(&[]);
                 let costs = costs.iter().map(|bits| counted(f32::from_bits(*bits))).collect();
                 tally.add(first, partial(count, &mine[group * words..][..words]), costs);
             }
         }
-        Ok(())
+        if sent.ended {
+            (self.sink)(std::mem::take(&mut self.tallies));
+        }
     }
 }
 

@@ -11,6 +11,7 @@ use super::mppi_source::PlanSource;
 use super::mppi_workspace::{PlanShape, PlanWorkspace};
 use super::program::{KEPT, KEPT_BYTES};
 use super::recent::Recent;
+use super::traffic::Count;
 use crate::error::Result;
 
 /// What is planned for, prepared on a device.
@@ -27,6 +28,7 @@ impl PlanProgram {
         pipelines: &Arc<Pipelines>,
         source: &Arc<PlanSource>,
     ) -> Self {
+        device.counters.add(Count::Program);
         let compiled = PlanCompiled::new(device, pool, pipelines, source);
         Self { compiled, kept: Recent::new(KEPT) }
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::compose::MppiText;
 use super::mppi_chunking::Size;
+use super::source::same_bits;
 use crate::policy::Mlp;
 use crate::rollout::{NoiseShape, Planning, SPLINE_SUPPORT};
 
@@ -24,6 +25,24 @@ impl PlanSource {
         let text = MppiText::new(planning);
         let (values, flops) = (planning.model.values(), text.operations());
         Self { text, planning: planning.clone(), values, flops }
+    }
+
+    /// Whether both have the same kernels, samples and tables, bit by bit.
+    pub(super) fn same(&self, other: &Self) -> bool {
+        let bits = |one: &[f32], other: &[f32]| {
+            bytemuck::cast_slice::<f32, u32>(one) == bytemuck::cast_slice::<f32, u32>(other)
+        };
+        let mut networks = self.networks().into_iter().zip(other.networks());
+        self.text == other.text
+            && self.planning.spec == other.planning.spec
+            && bits(&self.values, &other.values)
+            && bits(self.cells(), other.cells())
+            && self.spline() == other.spline()
+            && networks.all(|networks| match networks {
+                (None, None) => true,
+                (Some(one), Some(other)) => same_bits(one, other),
+                _ => false,
+            })
     }
 
     /// The costs of the map's cells; none without a map.

@@ -1,5 +1,7 @@
 //! The buffers of MPPI calls of one shape, and the kernels bound to them.
 
+use std::ops::Range;
+
 use super::buffer::{Buffer, Use};
 use super::compose::{Kernel, PARTIAL_HEADER, Slot};
 use super::flight::Flight;
@@ -7,7 +9,7 @@ use super::kernel::Bound;
 use super::mppi_chunking::MppiChunking;
 use super::mppi_compiled::PlanCompiled;
 use super::network::Layers;
-use super::readback::Readback;
+use super::readback::Turns;
 use super::upload::Upload;
 use crate::error::Result;
 use crate::rollout::{CostQuery, MppiProblem, NoiseShape};
@@ -27,11 +29,23 @@ pub(super) struct PlanShape {
     pub(super) costs: CostQuery,
 }
 
+/// What a submission of plans comes to.
+#[derive(Clone, Debug)]
+pub(super) struct SentPlans {
+    /// How many problems.
+    pub(super) problems: usize,
+    pub(super) samples: Range<u32>,
+    /// Words of the partials, which the costs follow.
+    pub(super) partials: usize,
+    /// Whether no more samples follow.
+    pub(super) ended: bool,
+}
+
 /// Buffers and kernels for one call at a time.
 pub(super) struct PlanWorkspace {
     pub(super) shape: PlanShape,
     pub(super) inputs: PlanInputs,
-    pub(super) readback: Readback,
+    pub(super) results: Turns<SentPlans>,
     pub(super) buffers: PlanBuffers,
     pub(super) kernels: PlanKernels,
     /// Bytes of its buffers, without those of the results.
@@ -52,7 +66,7 @@ impl PlanWorkspace {
         let size = compiled.source.size(chunking.problems as usize, chunking.samples);
         let parts = size.parts(u64::from(chunking.problems)).map(|bytes| bytes as usize);
         let dispatches = chunking.dispatches(&size) as usize;
-        let upload = Upload::new(&flight.device, flight.pool, &parts, dispatches);
+        let upload = Upload::new(&flight.device, flight.pool, &parts, dispatches, 0);
         let mut inputs = PlanInputs(upload);
         inputs.0.put(VALUES, 0, &compiled.source.values);
         let buffers = PlanBuffers::new(flight, compiled, chunking);
@@ -60,9 +74,9 @@ impl PlanWorkspace {
         let totals =
             if shape.costs == CostQuery::Each { 4 * u64::from(chunking.stride) } else { 0 };
         let results = buffers.of(Slot::Partials).size() + totals;
-        let readback = Readback::new(&flight.device, flight.pool, results);
+        let results = Turns::new(&flight.device, flight.pool, results);
         let bytes = inputs.0.size() + buffers.bytes;
-        Ok(Self { shape, inputs, readback, buffers, kernels, bytes })
+        Ok(Self { shape, inputs, results, buffers, kernels, bytes })
     }
 }
 

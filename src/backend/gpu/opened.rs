@@ -7,6 +7,7 @@ use super::device::Device;
 use super::flight::Flight;
 use super::fusing::NetworkKernels;
 use super::kernel::{Edit, Pipelines};
+use super::lists::Lists;
 use super::mppi_program::PlanProgram;
 use super::mppi_source::PlanSource;
 use super::program::Program;
@@ -32,6 +33,8 @@ pub(super) struct Opened {
     pub(super) pipelines: Arc<Pipelines>,
     pub(super) pool: Pool,
     pub(super) setup: Setup,
+    /// Of this device, whoever lists them.
+    pub(super) lists: Arc<Lists>,
     programs: Recent<Arc<Program>>,
     plan_programs: Recent<Arc<PlanProgram>>,
 }
@@ -48,6 +51,7 @@ impl Opened {
             pipelines: Arc::new(pipelines),
             pool: Pool::default(),
             setup,
+            lists: Arc::default(),
             programs: Recent::new(KEPT),
             plan_programs: Recent::new(KEPT),
         }
@@ -65,6 +69,7 @@ impl Opened {
             pipelines: Arc::clone(&self.pipelines),
             pool: self.pool.clone(),
             setup,
+            lists: Arc::clone(&self.lists),
             programs: Recent::new(KEPT),
             plan_programs: Recent::new(KEPT),
         }
@@ -121,6 +126,7 @@ impl Opened {
     pub(super) fn clear(&self) {
         self.programs.clear();
         self.plan_programs.clear();
+        self.lists.clear();
         self.pool.clear();
     }
 }

@@ -4,7 +4,12 @@ use std::num::NonZeroU64;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::compose::{BLOCK_WORDS, COLUMNS_WORD, GROUPS_WORD};
 use crate::rollout::{Region, RolloutSpec, Starts};
+
+// The words that `shaders/narrow.wgsl` changes are where they are meant to be.
+const _: () = assert!(std::mem::offset_of!(Params, columns) == 4 * COLUMNS_WORD);
+const _: () = assert!(size_of::<Params>() <= 4 * GROUPS_WORD);
 
 /// `region_kind` of a box.
 const REGION_BOX: u32 = 0;
@@ -57,7 +62,7 @@ impl Params {
     };
 
     /// Bytes from one block to the next: the largest alignment that an adapter may ask for.
-    pub(super) const PITCH: usize = 256;
+    pub(super) const PITCH: usize = 4 * BLOCK_WORDS;
 
     /// The parameters for `columns` trajectories from index `first` on.
     pub(super) fn at(mut self, first: u64, columns: u32) -> Self {

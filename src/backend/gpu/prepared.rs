@@ -7,7 +7,7 @@ use super::job::Subject;
 use super::recover;
 use super::source::Source;
 use super::traffic::Count;
-use crate::backend::{MeasureSink, PairSink};
+use crate::backend::sink::{PairsSink, StartSink};
 use crate::error::{Error, Result};
 use crate::model::Plant;
 use crate::rollout::{DeviationTask, Farthest, ReachAvoidTask};
@@ -45,7 +45,7 @@ impl Prepared<'_> {
     pub(in crate::backend) fn reach_avoid(
         &self,
         task: &ReachAvoidTask<'_>,
-        sink: MeasureSink<'_>,
+        sink: StartSink<'_>,
     ) -> Result<()> {
         recover::reach_avoid(self.gpu, self.subject(), &self.plant, task, sink)
     }
@@ -54,7 +54,7 @@ impl Prepared<'_> {
     pub(in crate::backend) fn deviation(
         &self,
         task: &DeviationTask<'_>,
-        sink: PairSink<'_>,
+        sink: PairsSink<'_>,
     ) -> Result<Vec<Farthest>> {
         recover::deviation(self.gpu, self.subject(), &self.plant, task, sink)
     }

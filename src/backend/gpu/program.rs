@@ -13,6 +13,7 @@ use super::fusing::NetworkKernels;
 use super::kernel::Pipelines;
 use super::recent::Recent;
 use super::source::Source;
+use super::traffic::Count;
 use super::workspace::{Shape, Workspace};
 use crate::error::Result;
 
@@ -41,6 +42,7 @@ impl Program {
         source: &Arc<Source>,
         networks: NetworkKernels,
     ) -> Result<Self> {
+        device.counters.add(Count::Program);
         let compiled = Compiled::new(device, pool, pipelines, source, networks)?;
         Ok(Self { source: Arc::clone(source), compiled, kept: Recent::new(KEPT) })
     }

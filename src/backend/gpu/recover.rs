@@ -15,7 +15,8 @@ use super::mppi_source::PlanSource;
 use super::opened::Opened;
 use super::{deviation, mppi, reach_avoid};
 use crate::backend::cpu::Cpu;
-use crate::backend::{Action, Event, MeasureSink, PairSink};
+use crate::backend::sink::{PairsSink, StartSink};
+use crate::backend::{Action, Event};
 use crate::error::{Error, Fault, Result};
 use crate::model::Plant;
 use crate::rollout::{DeviationTask, Farthest, MppiTask, PairMeasure, PlanTally, ReachAvoidTask};
@@ -50,18 +51,24 @@ pub(super) fn reach_avoid(
     subject: Subject<'_>,
     plant: &Plant,
     task: &ReachAvoidTask<'_>,
-    sink: MeasureSink<'_>,
+    mut sink: StartSink<'_>,
 ) -> Result<()> {
+    let asked = sink.asked();
     gpu.persevere("starts", task.range.start, |runner, delivered| {
         let task = ReachAvoidTask { range: delivered.next.get()..task.range.end, ..task.clone() };
-        let sink: MeasureSink<'_> =
-            &mut |first, values| delivered.deliver(values.len(), || sink(first, values));
         match runner {
             Runner::Adapter(opened, attempt) => {
-                reach_avoid::reach_avoid(opened, attempt, subject, &task, sink)
+                let request = reach_avoid::Asking { subject, task: &task, asked };
+                reach_avoid::reach_avoid(opened, attempt, request, &mut |first, came_to| {
+                    delivered.deliver(came_to.count(), || came_to.hand_to(first, &mut sink))
+                })
             }
             // A CPU prepares the plant when it takes over, once per call that it takes over.
-            Runner::Cpu(cpu) => cpu.prepare(plant)?.reach_avoid(cpu, &task, sink),
+            Runner::Cpu(cpu) => {
+                cpu.prepare(plant)?.reach_avoid(cpu, &task, &mut |first, values| {
+                    delivered.deliver(values.len(), || sink.take(first, values))
+                })
+            }
         }
     })
 }
@@ -72,20 +79,25 @@ pub(super) fn deviation(
     subject: Subject<'_>,
     plant: &Plant,
     task: &DeviationTask<'_>,
-    sink: PairSink<'_>,
+    mut sink: PairsSink<'_>,
 ) -> Result<Vec<Farthest>> {
+    let asked = sink.asked();
     let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
     gpu.persevere("pairs", task.range.start, |runner, delivered| {
         let task = DeviationTask { range: delivered.next.get()..task.range.end, ..task.clone() };
-        let sink: PairSink<'_> = &mut |first, values: &[PairMeasure]| {
-            delivered.deliver(values.len(), || sink(first, values))
-        };
         match runner {
             Runner::Adapter(opened, attempt) => {
-                deviation::deviation(opened, attempt, subject, &task, &mut farthest, sink)
+                let request = deviation::Asking { subject, task: &task, asked };
+                let take = &mut |first, came_to: deviation::CameTo| {
+                    delivered.deliver(came_to.count(), || came_to.hand_to(first, &mut sink))
+                };
+                deviation::deviation(opened, attempt, request, &mut farthest, take)
             }
             Runner::Cpu(cpu) => {
-                let rest = cpu.prepare(plant)?.deviation(cpu, &task, sink)?;
+                let take = &mut |first, values: &[PairMeasure]| {
+                    delivered.deliver(values.len(), || sink.take(first, values))
+                };
+                let rest = cpu.prepare(plant)?.deviation(cpu, &task, take)?;
                 Farthest::merge_steps(&mut farthest, &rest);
                 Ok(())
             }

@@ -52,7 +52,7 @@ impl Source {
 }
 
 /// Whether two networks have the same layers, bit by bit: 0 and -0 differ.
-fn same_bits(one: &Mlp, other: &Mlp) -> bool {
+pub(super) fn same_bits(one: &Mlp, other: &Mlp) -> bool {
     let bits = |numbers: &[f32], others: &[f32]| {
         bytemuck::cast_slice::<f32, u32>(numbers) == bytemuck::cast_slice::<f32, u32>(others)
     };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytemuck::Pod;
 
-use super::batch::Batch;
+use super::batch::{Batch, Counted};
 use super::buffer::{Buffer, Pool, Use};
 use super::device::Device;
 use super::params::Params;
@@ -20,8 +20,10 @@ pub(super) struct Upload {
     parts: Vec<Range<usize>>,
     /// Where the parameters of the dispatches begin.
     blocks: usize,
-    /// The device has what lies before.
-    changed: usize,
+    /// Bytes of the blocks that the device changes at a time.
+    window: usize,
+    /// What the device does not have yet.
+    stale: Range<usize>,
 }
 
 impl Upload {
@@ -31,16 +33,25 @@ impl Upload {
         parts + Params::PITCH * dispatches
     }
 
-    /// Room for parts of `sizes` bytes, and for the parameters of `dispatches` dispatches.
-    pub(super) fn new(device: &Device, pool: &Pool, sizes: &[usize], dispatches: usize) -> Self {
+    /// Room for parts of `sizes` bytes, and for the parameters of `dispatches` dispatches; the device
+    /// itself changes those of up to `narrowed` at a time.
+    pub(super) fn new(
+        device: &Device,
+        pool: &Pool,
+        sizes: &[usize],
+        dispatches: usize,
+        narrowed: usize,
+    ) -> Self {
         let (mut end, mut parts) = (0, Vec::with_capacity(sizes.len()));
         for size in sizes {
             parts.push(end..end + (*size).max(SMALLEST));
             end += rounded(*size);
         }
         let bytes = Self::bytes(sizes, dispatches);
-        let buffer = pool.take(device, Use::Inputs, bytes as u64);
-        Self { buffer, bytes: vec![0; bytes], parts, blocks: end, changed: 0 }
+        // What a kernel sees of the blocks from any of them on is as long as from the first.
+        let window = narrowed * Params::PITCH;
+        let buffer = pool.take(device, Use::Inputs, (bytes + window) as u64);
+        Self { buffer, bytes: vec![0; bytes], parts, blocks: end, window, stale: 0..bytes }
     }
 
     /// What a kernel sees of part `part`.
@@ -54,6 +65,17 @@ impl Upload {
         self.buffer.part(self.blocks as u64, Params::SIZE.get())
     }
 
+    /// What a kernel that narrows dispatches sees of their parameters, at a dynamic offset.
+    pub(super) fn narrowed(&self) -> wgpu::BufferBinding<'_> {
+        self.buffer.part(self.blocks as u64, self.window as u64)
+    }
+
+    /// Where the parameters of the dispatches are, as dispatches see them whose workgroups the device
+    /// counts.
+    pub(super) fn counted(&self) -> Counted {
+        Counted { buffer: self.buffer.whole().clone(), start: self.blocks as u64 }
+    }
+
     /// Bytes of it.
     pub(super) fn size(&self) -> u64 {
         self.bytes.len() as u64
@@ -62,19 +84,33 @@ impl Upload {
     /// Sets the numbers of `part` from number `at` on.
     pub(super) fn put<T: Pod>(&mut self, part: usize, at: usize, numbers: &[T]) {
         let start = self.parts[part].start + size_of::<T>() * at;
-        let bytes: &[u8] = bytemuck::cast_slice(numbers);
-        self.bytes[start..start + bytes.len()].copy_from_slice(bytes);
-        self.changed = self.changed.min(self.parts[part].start);
+        self.set(start, bytemuck::cast_slice(numbers));
     }
 
-    /// Writes what changed, and the parameters of `batch`, before the next submission.
+    /// Sets `bytes` from byte `start` on; what is there already needs no write.
+    fn set(&mut self, start: usize, bytes: &[u8]) {
+        let end = start + bytes.len();
+        if self.bytes[start..end] == *bytes {
+            return;
+        }
+        self.bytes[start..end].copy_from_slice(bytes);
+        let Range { start: first, end: last } = self.stale.clone();
+        let none = self.stale.is_empty();
+        self.stale = if none { start..end } else { first.min(start)..last.max(end) };
+    }
+
+    /// Writes what changed, and the parameters of `batch`, before the next submission: one write, and
+    /// none where the device has it all.
     pub(super) fn write(&mut self, device: &Device, batch: &Batch<'_>) {
-        let blocks = batch.blocks();
-        let end = self.blocks + blocks.len();
-        self.bytes[self.blocks..end].copy_from_slice(blocks);
-        let start = self.changed.min(self.blocks);
-        self.buffer.write_at(device, start as u64, &self.bytes[start..end]);
-        self.changed = self.blocks;
+        self.set(self.blocks, batch.blocks());
+        let stale = std::mem::take(&mut self.stale);
+        if !stale.is_empty() {
+            self.buffer.write_at(device, stale.start as u64, &self.bytes[stale]);
+        }
+        if batch.is_narrowed() {
+            // The device is about to change them.
+            self.stale = self.blocks..self.blocks + batch.blocks().len();
+        }
     }
 }
 

@@ -7,12 +7,15 @@ use super::chain_load::ChainLoad;
 use super::chunking::{Chunking, Work};
 use super::compiled::Compiled;
 use super::compose::{Kernel, Slot};
+use super::counting;
 use super::flight::Flight;
 use super::inputs::{InputSizes, Inputs};
 use super::kernel::Bound;
+use super::lists::{List, Listed};
 use super::network::Layers;
 use super::params::Params;
-use super::readback::Readback;
+use super::readback::Turns;
+use crate::backend::sink::Asked;
 use crate::error::Result;
 use crate::policy::Mlp;
 
@@ -21,6 +24,8 @@ use crate::policy::Mlp;
 pub(super) struct Shape {
     /// What is asked of the rollouts.
     pub(super) work: Work,
+    /// Whether each result is asked for.
+    pub(super) asked: Asked,
     /// Whether the host lists the starts.
     pub(super) listed: bool,
     /// Steps.
@@ -32,11 +37,34 @@ pub(super) struct Shape {
 /// Offset of the measures in what is read back, bytes.
 pub(super) const MEASURES_AT: u64 = 8;
 
+/// Starts or pairs that are sent off together.
+#[derive(Clone, Copy)]
+pub(super) struct Chunk<'a> {
+    pub(super) params: Params,
+    /// Index of the first.
+    pub(super) first: u64,
+    /// The starts, where the host lists them.
+    pub(super) list: Option<&'a List>,
+}
+
+/// Results on their way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent {
+    /// Index of their first start or pair.
+    pub(super) first: u64,
+    /// How many starts or pairs.
+    pub(super) columns: u32,
+    /// Whether none of their trajectories goes on.
+    pub(super) ended: bool,
+}
+
 /// Buffers and kernels for one call at a time.
 pub(super) struct Workspace {
     pub(super) shape: Shape,
     pub(super) inputs: Inputs,
-    pub(super) readback: Readback,
+    /// Where starts are that the host lists.
+    pub(super) listed: Option<Listed>,
+    pub(super) results: Turns<Sent>,
     pub(super) buffers: Buffers,
     /// Bound to the first set of columns; for signs also to the second one.
     pub(super) kernels: Vec<Kernels>,
@@ -58,29 +86,39 @@ impl Workspace {
         let layers = network.map_or(0, |mlp| mlp.layers().len());
         let chain = compiled.text.chain().map(ChainLoad::new);
         let chained = chain.map_or(0, |load| load.dispatches);
+        // Each step with what its networks need; compaction or reduction.
+        let segment = chunking.segment as usize * (layers + chained + 2) + 1;
         let sizes = InputSizes {
             values: compiled.text.parameters().div_ceil(4),
             steps: shape.horizon as usize + 1,
-            region: if shape.listed { quads * chunking.stride as usize } else { 4 * quads },
-            // The draw, compaction or reduction, and each step with what its networks need.
-            dispatches: 2 + chunking.segment as usize * (layers + chained + 2),
+            region: 4 * quads,
+            // The draw, segments, and what counts.
+            dispatches: 2 + chunking.rounds_of(shape.horizon) as usize * segment,
+            narrowed: if shape.work == Work::Sign { segment } else { 0 },
         };
         let inputs = Inputs::new(device, pool, sizes);
         let buffers = Buffers::new(flight, compiled, network, shape);
         let sets = if shape.work == Work::Sign { 2 } else { 1 };
-        let columns = chunking.stride;
-        let binder = Binder { flight, compiled, inputs: &inputs, buffers: &buffers, columns };
-        let kernels =
-            (0..sets).map(|set| binder.kernels(shape.work, set)).collect::<Result<_>>()?;
+        let room = || Listed::new(device, pool, compiled.text.states(), chunking.stride);
+        let listed = shape.listed.then(room);
+        let binder = Binder {
+            flight,
+            compiled,
+            inputs: &inputs,
+            listed: listed.as_ref(),
+            buffers: &buffers,
+            columns: chunking.stride,
+        };
+        let kernels = (0..sets).map(|set| binder.kernels(shape, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(chunking.stride);
         let farthest = 8 * (u64::from(shape.horizon) + 1);
-        let readback = Readback::new(device, pool, MEASURES_AT + results + farthest);
-        Ok(Self { shape, inputs, readback, buffers, kernels })
+        let results = Turns::new(device, pool, MEASURES_AT + results + farthest);
+        Ok(Self { shape, inputs, listed, results, buffers, kernels })
     }
 
     /// Bytes of its buffers, without those of the results.
     pub(super) fn size(&self) -> u64 {
-        self.inputs.size() + self.buffers.bytes
+        self.inputs.size() + self.buffers.bytes + self.listed.as_ref().map_or(0, Listed::size)
     }
 }
 
@@ -123,7 +161,7 @@ impl Buffers {
 
     /// The buffer of `slot` for the set of columns number `set`: the kernels on the second one
     /// compact into the first.
-    fn of_set(&self, slot: Slot, set: usize) -> &Buffer {
+    pub(super) fn of_set(&self, slot: Slot, set: usize) -> &Buffer {
         let other = match slot {
             Slot::State => Slot::KeptState,
             Slot::Folds => Slot::KeptFolds,
@@ -131,6 +169,8 @@ impl Buffers {
             Slot::KeptState => Slot::State,
             Slot::KeptFolds => Slot::Folds,
             Slot::KeptOrigin => Slot::Origin,
+            Slot::Survivors => Slot::Left,
+            Slot::Left => Slot::Survivors,
             same => same,
         };
         self.of(if set == 0 { slot } else { other })
@@ -138,7 +178,7 @@ impl Buffers {
 }
 
 /// Bytes of each buffer.
-fn sizes(Shape { work, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Slot, u64)> {
+fn sizes(Shape { work, asked, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Slot, u64)> {
     let (row, stride) = (u64::from(chunking.row), u64::from(chunking.stride));
     let state = 16 * states.div_ceil(4) as u64 * row;
     let measures = 4 * stride * u64::from(work.sides());
@@ -148,6 +188,11 @@ fn sizes(Shape { work, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Sl
         (Slot::Origin, 4 * stride),
         (Slot::Measures, measures),
     ];
+    if asked == Asked::Counts {
+        let (starts, pairs) =
+            (counting::measure_bytes(chunking.stride), counting::pair_bytes(chunking.stride));
+        sizes.push((Slot::Counts, starts.max(pairs)));
+    }
     match work {
         Work::Measure => {}
         Work::Sign => sizes.extend([
@@ -155,6 +200,7 @@ fn sizes(Shape { work, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Sl
             (Slot::KeptFolds, 8 * row),
             (Slot::KeptOrigin, 4 * stride),
             (Slot::Survivors, 4),
+            (Slot::Left, 4),
         ]),
         Work::Pairs => sizes.extend([
             (Slot::Distances, 4 * stride * u64::from(chunking.segment)),
@@ -170,6 +216,10 @@ pub(super) struct Kernels {
     pub(super) rollout: Bound,
     /// Compaction of signs, reduction of pairs, nothing for measures.
     pub(super) after: Option<Bound>,
+    /// Of signs: what sets dispatches on these columns to the trajectories that are left.
+    pub(super) narrow: Option<Bound>,
+    /// Where counts are asked for alone.
+    pub(super) count: Option<Bound>,
     observe: Option<Bound>,
     layers: Vec<Bound>,
     chain: Option<BoundChain>,
@@ -208,23 +258,31 @@ struct Binder<'a> {
     flight: &'a Flight<'a>,
     compiled: &'a Compiled,
     inputs: &'a Inputs,
+    listed: Option<&'a Listed>,
     buffers: &'a Buffers,
     /// Most columns of a chunk.
     columns: u32,
 }
 
 impl Binder<'_> {
-    /// The kernels of `work` on the set of columns number `set`.
-    fn kernels(&self, work: Work, set: usize) -> Result<Kernels> {
+    /// The kernels of a shape on the set of columns number `set`.
+    fn kernels(&self, Shape { work, asked, .. }: Shape, set: usize) -> Result<Kernels> {
         let (rollout, after) = match work {
             Work::Measure => (Kernel::ReachAvoid, None),
             Work::Sign => (Kernel::ReachAvoid, Some(Kernel::Compact)),
             Work::Pairs => (Kernel::Deviation, Some(Kernel::Reduce)),
         };
+        let count = (asked == Asked::Counts).then_some(match work {
+            Work::Measure | Work::Sign => Kernel::Count,
+            Work::Pairs => Kernel::CountPairs,
+        });
+        let narrow = (work == Work::Sign).then_some(Kernel::Narrow);
         Ok(Kernels {
             sample: self.bind(Kernel::Sample, set, None)?,
             rollout: self.bind(rollout, set, None)?,
             after: after.map(|kernel| self.bind(kernel, set, None)).transpose()?,
+            narrow: narrow.map(|kernel| self.bind(kernel, set, None)).transpose()?,
+            count: count.map(|kernel| self.bind(kernel, set, None)).transpose()?,
             observe: self.observe(set)?,
             layers: self.layers(set)?,
             chain: self.chain(set)?,
@@ -275,8 +333,10 @@ impl Binder<'_> {
             }
             (slot, _) => self.buffers.of_set(slot, set),
         };
-        Ok(pipeline.bind(&self.flight.device, |slot| {
-            self.inputs.binding(slot).unwrap_or_else(|| buffer(slot).binding())
+        let listed = self.listed.filter(|_| kernel == Kernel::Sample);
+        Ok(pipeline.bind(&self.flight.device, |slot| match (slot, listed) {
+            (Slot::Region, Some(listed)) => listed.binding(),
+            _ => self.inputs.binding(slot).unwrap_or_else(|| buffer(slot).binding()),
         }))
     }
 }

@@ -18,6 +18,7 @@ use crate::model::{Model, Plant};
 use crate::policy::{Activation, OutputActivation};
 use crate::report::train_html;
 use crate::rollout::{Purpose, Stream};
+use crate::scenario::settings::Settings;
 use crate::scenario::{Context, provenance, tightened};
 use crate::system::Axis;
 use crate::train::analytic::{Analytic, LAST, Task};
@@ -139,7 +140,11 @@ impl Training<'_> {
         let program = backend.prepare(&Plant::under(model, policy))?;
         let context = Context { program: &program, watch };
         let tightening = match settings.analytic.certified > 0.0 {
-            true => Some(tightened(context, &config.settings(&model.states)?)?.tightening),
+            true => {
+                // Gradients run through constants and the deviation bound of the untrained policy.
+                let settings = Settings { drops: None, ..config.settings(&model.states)? };
+                Some(tightened(context, &settings)?.tightening)
+            }
             false => None,
         };
         let task = Task { tightening, ..self.task(model)? };

@@ -219,15 +219,21 @@ fn absent(record: &RaceRecord) -> String {
 
 /// What V_check was computed with, and the deviation bound's own statement.
 fn bounds(record: &RaceRecord) -> String {
-    let Some(BoundsRecord { constants, deviation, band }) = &record.bounds else {
+    let Some(BoundsRecord { constants, deviation, band, sequence, .. }) = &record.bounds else {
         return String::new();
     };
     let constant =
         |constant: &ConstantRecord| format!("{} ({})", upper(constant.used), constant.source);
     let claim = &deviation.claim;
+    let set = sequence.as_ref().and_then(|sequence| sequence.levels.get(sequence.chosen));
+    let set = set.map(|set| {
+        let risk = or_dash(set.risk.map(upper));
+        format!("margin drops at level {}, conditional risk at most {risk}", upper(set.level))
+    });
     pairs(
         "What V_check was computed with",
         &[
+            ("certified set", set.unwrap_or_else(|| "constants times the bound".to_owned())),
             ("deviation bound", claim.statement.clone()),
             ("measure", claim.measure.clone()),
             ("pairs", format!("{}, none allowed to exceed the bound", count(claim.scenarios))),

@@ -34,7 +34,7 @@ pub(super) fn spec() -> RolloutSpec {
 /// Losses that grow over time.
 pub(super) fn tightening(spec: &RolloutSpec) -> Tightening {
     let growing = |rate: f32| (0..=spec.horizon).map(|t| rate * t as f32).collect();
-    Tightening { target: growing(0.01), constraint: growing(0.02) }
+    Tightening::losing(growing(0.01), growing(0.02))
 }
 
 /// Race starts near the study's: the positions of both drones vary with its box.

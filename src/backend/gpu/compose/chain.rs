@@ -174,11 +174,12 @@ impl ChainText {
         let none: Vec<String> = zeros(controls).collect();
         format!(
             "@group(0) @binding({slot}) var<storage, read> kept: array<f32>;\n{load}\
-             fn target_at(x: State, t: u32) -> f32 {{\n    return x[{states}];\n}}\n\
-             fn constraint_at(x: State, t: u32) -> f32 {{\n    return x[{}];\n}}\n\
-             fn advance(x: State, u: Control, t: u32) -> State {{\n    return State({moved});\n}}\n\
-             fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {{\n    \
-             return Control({});\n}}\n",
+             fn target_at(x: array<f32, NX>, t: u32) -> f32 {{\n    return x[{states}];\n}}\n\
+             fn constraint_at(x: array<f32, NX>, t: u32) -> f32 {{\n    return x[{}];\n}}\n\
+             fn advance(x: array<f32, NX>, u: array<f32, NU>, t: u32) -> array<f32, NX> {{\n    \
+             return array<f32, NX>({moved});\n}}\n\
+             fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) -> array<f32, NU> {{\n    \
+             return array<f32, NU>({});\n}}\n",
             states + 1,
             none.join(", ")
         )
@@ -284,10 +285,11 @@ impl Printer<'_> {
             .map(|number| format!("kept[{number}u * row + acting]"))
             .collect();
         let mut text = careful_function("formulas", &taken, &link.graph);
-        text += "fn evaluate(column: u32, x: State, t: u32) {\n    let row = params.stride;\n";
+        text += "fn evaluate(column: u32, x: array<f32, NX>, t: u32) {\n";
+        text += "    let row = params.stride;\n";
         // Where a pair replays, both of it act as the nominal one does.
         text += "    let acting = column % params.width;\n";
-        text += &format!("    let u = Control({});\n", acting.join(", "));
+        text += &format!("    let u = array<f32, NU>({});\n", acting.join(", "));
         text += &self.handed(link);
         text += &format!("    let v = formulas({});\n", passed.join(", "));
         text + &self.stores(link, first) + "}\n"

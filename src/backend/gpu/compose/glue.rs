@@ -2,7 +2,7 @@
 
 use super::kernels::WORKGROUP;
 use crate::formula::record;
-use crate::formula::wgsl::{Product, function_with};
+use crate::formula::wgsl::{Arithmetic, function_with};
 use crate::rollout::{HUGE, NON_FINITE, normal_pair};
 
 pub(super) const PARAMS: &str = include_str!("../../../../shaders/params.wgsl");
@@ -14,7 +14,8 @@ pub(super) fn constants(states: usize, controls: usize) -> String {
     constants_with(states, controls, states)
 }
 
-/// The same where a kernel's state is `length` numbers, those that are stored first.
+/// The same where a kernel's state is `length` numbers, those that are stored first. Arrays have no
+/// names of their own: two types of one shape are one to WGSL, and may be two to a driver.
 pub(super) fn constants_with(states: usize, controls: usize, length: usize) -> String {
     format!(
         "const NX: u32 = {}u;\n\
@@ -22,14 +23,10 @@ pub(super) fn constants_with(states: usize, controls: usize, length: usize) -> S
          const STATE_QUADS: u32 = {}u;\n\
          const WORKGROUP: u32 = {WORKGROUP}u;\n\
          const HUGE: f32 = {HUGE:?}f;\n\
-         const NON_FINITE: f32 = {NON_FINITE:?}f;\n\
-         alias State = array<f32, {}>;\n\
-         alias Control = array<f32, {}>;\n",
-        states,
-        controls,
-        states.div_ceil(4),
+         const NON_FINITE: f32 = {NON_FINITE:?}f;\n",
         length,
         controls,
+        states.div_ceil(4),
     )
 }
 
@@ -43,7 +40,7 @@ pub(super) fn state_glue(states: usize) -> String {
 
 /// `store_state` alone.
 pub(super) fn store_glue(states: usize) -> String {
-    let mut text = String::from("fn store_state(column: u32, x: State) {\n");
+    let mut text = String::from("fn store_state(column: u32, x: array<f32, NX>) {\n");
     text += &format!("    let stride = {ROW};\n");
     for quad in 0..states.div_ceil(4) {
         let entries = padded("x", quad, states);
@@ -54,23 +51,23 @@ pub(super) fn store_glue(states: usize) -> String {
 
 /// `load_state` alone, for kernels that may not write states; `more` numbers follow those of the state.
 pub(super) fn load_glue(states: usize, more: &[String]) -> String {
-    let mut text = String::from("fn load_state(column: u32) -> State {\n");
+    let mut text = String::from("fn load_state(column: u32) -> array<f32, NX> {\n");
     text += &format!("    let stride = {ROW};\n");
     for quad in 0..states.div_ceil(4) {
         text += &format!("    let v{quad} = state[{quad}u * stride + column];\n");
     }
     let all: Vec<String> = (0..states).map(component).chain(more.iter().cloned()).collect();
-    text + &format!("    return State({});\n}}\n", all.join(", "))
+    text + &format!("    return array<f32, NX>({});\n}}\n", all.join(", "))
 }
 
 /// `listed_start`: a start that the host lists, `[NX / 4, columns]` vectors of 4 coordinates.
 pub(super) fn listed_glue(states: usize) -> String {
-    let mut text = String::from("fn listed_start(column: u32) -> State {\n");
+    let mut text = String::from("fn listed_start(column: u32) -> array<f32, NX> {\n");
     for quad in 0..states.div_ceil(4) {
         text += &format!("    let v{quad} = region[{quad}u * params.columns + column];\n");
     }
     let all: Vec<String> = (0..states).map(component).collect();
-    text + &format!("    return State({});\n}}\n", all.join(", "))
+    text + &format!("    return array<f32, NX>({});\n}}\n", all.join(", "))
 }
 
 /// The vector number `quad` of the `length` numbers of `name`, padded with 0.
@@ -83,7 +80,8 @@ pub(super) fn padded(name: &str, quad: usize, length: usize) -> String {
 /// `state_finite`, free of loops.
 pub(super) fn finite_glue(states: usize) -> String {
     let tests: Vec<String> = (0..states).map(|i| format!("finite(x[{i}])")).collect();
-    format!("fn state_finite(x: State) -> bool {{\n    return {};\n}}\n", tests.join(" && "))
+    let all = tests.join(" && ");
+    format!("fn state_finite(x: array<f32, NX>) -> bool {{\n    return {all};\n}}\n")
 }
 
 /// Entry `i` of vectors `v0`, `v1`, ...
@@ -115,9 +113,9 @@ pub(super) fn call(
     format!("fn {name}({}) -> {kind} {{\n    return {value};\n}}\n", declared.join(", "))
 }
 
-/// `normal_pair`, its products kept apart from sums.
-pub(super) fn recorded_pair() -> String {
+/// `normal_pair`, with arithmetic as `arithmetic` says.
+pub(super) fn recorded_pair(arithmetic: Arithmetic) -> String {
     let pair = record(2, |u| normal_pair(u[0], u[1]).to_vec());
     let arguments = [("magnitude", 1), ("turn", 1)];
-    function_with("normal_pair", &arguments, &pair, Product::Call("product"))
+    function_with("normal_pair", &arguments, &pair, arithmetic)
 }

@@ -8,6 +8,8 @@ pub const TILE_COLUMNS: u32 = 8;
 pub const TILE_PITCH: u32 = WORKGROUP / TILE_COLUMNS;
 /// Vectors of 4 neurons that one thread of a layer computes.
 pub const TILE_QUADS: u32 = 2;
+/// Trajectories or pairs that one workgroup counts.
+pub const COUNTED: u32 = 64 * WORKGROUP;
 /// Numbers of a partial of MPPI before its sums of controls.
 pub const PARTIAL_HEADER: u32 = 6;
 
@@ -20,10 +22,16 @@ pub enum Kernel {
     ReachAvoid,
     /// Keeps the trajectories whose sign is open.
     Compact,
+    /// Sets dispatches to the trajectories that are left.
+    Narrow,
     /// Rolls pairs side by side.
     Deviation,
     /// Finds the farthest pair of each step.
     Reduce,
+    /// Counts measures or signs.
+    Count,
+    /// Counts how pairs fared.
+    CountPairs,
     /// Evaluates what a network sees.
     Observe,
     /// Evaluates the part of that number of formulas that call networks.
@@ -51,6 +59,8 @@ pub enum Access {
     Uniform,
     /// Uniform numbers that all dispatches of a call share.
     Constant,
+    /// Blocks of parameters that are written, at a dynamic offset.
+    Blocks,
     /// Storage that is read.
     Read,
     /// Storage that is read and written.
@@ -123,16 +133,25 @@ pub enum Slot {
     Asked = 31,
     /// `said`: vectors of 4 outputs of such networks.
     Said = 32,
+    /// `blocks`: parameters of the dispatches that follow.
+    Blocks = 33,
+    /// `left`: one number, the survivors of the other set of columns.
+    Left = 34,
+    /// `counts`: of each workgroup that counts.
+    Counts = 35,
 }
 
 impl Kernel {
     /// The kernels of measures, pairs and networks.
-    pub const ROLLOUT: [Self; 8] = [
+    pub const ROLLOUT: [Self; 11] = [
         Self::Sample,
         Self::ReachAvoid,
         Self::Compact,
+        Self::Narrow,
         Self::Deviation,
         Self::Reduce,
+        Self::Count,
+        Self::CountPairs,
         Self::HiddenLayer,
         Self::OutputLayer,
         Self::Observe,
@@ -150,8 +169,11 @@ impl Kernel {
             Self::Sample => "sample",
             Self::ReachAvoid => "reach_avoid",
             Self::Compact => "compact",
+            Self::Narrow => "narrow",
             Self::Deviation => "deviation",
             Self::Reduce => "reduce",
+            Self::Count => "count",
+            Self::CountPairs => "count_pairs",
             Self::Observe => "observe",
             Self::Link(_) => "link",
             Self::HiddenLayer | Self::OutputLayer => "mlp",
@@ -165,7 +187,7 @@ impl Kernel {
 
     /// Threads of a workgroup.
     pub fn workgroup(self) -> u32 {
-        WORKGROUP
+        if self == Self::Narrow { 1 } else { WORKGROUP }
     }
 
     /// What the kernel binds, for a plant driven by a network or by a formula; for MPPI, where the
@@ -173,6 +195,9 @@ impl Kernel {
     pub fn bindings(self, network: bool) -> Vec<(Slot, Access)> {
         use Access::{Read, ReadWrite, Uniform};
         use Slot as S;
+        if self == Self::Narrow {
+            return vec![(S::Blocks, Access::Blocks), (S::Left, Read), (S::Survivors, ReadWrite)];
+        }
         let mut list = vec![(S::Params, Uniform)];
         let more: &[(Slot, Access)] = match self {
             Self::Sample => &[
@@ -204,7 +229,9 @@ impl Kernel {
                 (S::Measures, ReadWrite),
                 (S::Distances, ReadWrite),
             ],
+            Self::Narrow => &[],
             Self::Reduce => &[(S::Distances, Read), (S::Farthest, ReadWrite)],
+            Self::Count | Self::CountPairs => &[(S::Measures, Read), (S::Counts, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
             Self::Link(_) => &[(S::State, Read), (S::Kept, ReadWrite)],
             Self::HiddenLayer | Self::OutputLayer => {

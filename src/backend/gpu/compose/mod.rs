@@ -7,6 +7,7 @@ mod kernels;
 mod layers;
 mod limits;
 mod mppi;
+mod narrowed;
 mod physics_glue;
 mod plant;
 
@@ -15,11 +16,12 @@ pub(super) use chain::{AskShape, ChainSizes};
 pub(super) use fused::packed as packed_by_inputs;
 pub use fused::{Form, Fused};
 pub use kernels::{
-    Access, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
+    Access, COUNTED, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
 };
 pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::tile_steps;
+pub(super) use narrowed::{BLOCK_WORDS, COLUMNS_WORD, GROUPS_WORD};
 pub use plant::PlantText;
 pub(super) use plant::layer_kernel;

@@ -6,7 +6,7 @@ use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
 use super::physics_glue::{Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Role};
-use crate::formula::wgsl::{CHOICES, careful_function, function};
+use crate::formula::wgsl::{Arithmetic, CHOICES, careful_function, function};
 use crate::formula::{Expr, Graph, record};
 use crate::model::StageCost;
 use crate::real::Real;
@@ -109,7 +109,7 @@ impl MppiText {
         let state = state_glue(states);
         let parts = match kernel {
             Kernel::MppiStart => {
-                vec![loader("start_of", "State", "starts", states, 0..states), state]
+                vec![loader("start_of", "array<f32, NX>", "starts", states, 0..states), state]
             }
             Kernel::MppiRollout => vec![state, self.noise.clone(), self.rollout()],
             Kernel::MppiUpdate => {
@@ -137,10 +137,10 @@ impl MppiText {
         let contexts = self.outline.contexts;
         let mut text = String::new();
         if contexts > 0 {
-            text += &format!("alias Context = array<f32, {contexts}>;\n");
+            text += &format!("const CONTEXTS: u32 = {contexts}u;\n");
             let controls = self.outline.controls;
             let row = controls + contexts;
-            text += &loader("context_at", "Context", "plans", row, controls..row);
+            text += &loader("context_at", "array<f32, CONTEXTS>", "plans", row, controls..row);
         }
         let functions: Vec<&Function> = self.functions.iter().collect();
         [text, physics_glue(&self.outline, &functions), self.charge.clone()].concat()
@@ -180,12 +180,13 @@ fn noise_text(spec: &MppiSpec, contexts: usize) -> String {
     [
         format!("const ANTITHETIC: bool = {antithetic};\n"),
         RNG.to_owned(),
-        recorded_pair(),
+        // A plan weighs the numbers that it drew: they need not have the bits of the host.
+        recorded_pair(Arithmetic::Apart),
         NOISE.to_owned(),
         draw(controls),
         recorded,
         shape.to_owned(),
-        loader("plan_at", "Control", "plans", controls + contexts, 0..controls),
+        loader("plan_at", "array<f32, NU>", "plans", controls + contexts, 0..controls),
         recorded_control(spec),
     ]
     .join("\n")
@@ -194,17 +195,17 @@ fn noise_text(spec: &MppiSpec, contexts: usize) -> String {
 /// `draw`: the normal numbers of a step or knot, in ascending order; many of them in a loop, since
 /// the text of the generator is compiled wherever it is called.
 fn draw(controls: usize) -> String {
-    let mut text = String::from("fn draw(number: u32) -> Control {\n");
+    let mut text = String::from("fn draw(number: u32) -> array<f32, NU> {\n");
     if controls > MOST_CALLS {
         return text
-            + "    var z: Control;\n    for (var i = 0u; i < NU; i += 1u) {\n        \
+            + "    var z: array<f32, NU>;\n    for (var i = 0u; i < NU; i += 1u) {\n        \
                z[i] = normal(number * NU + i);\n    }\n    return z;\n}\n";
     }
     for i in 0..controls {
         text += &format!("    let z{i} = normal(number * NU + {i}u);\n");
     }
     let all: Vec<String> = (0..controls).map(|i| format!("z{i}")).collect();
-    text + &format!("    return Control({});\n}}\n", all.join(", "))
+    text + &format!("    return array<f32, NU>({});\n}}\n", all.join(", "))
 }
 
 /// A function that loads the numbers `part` of row `row` of a table of rows of `length` numbers.
@@ -223,8 +224,8 @@ fn recorded_recurrence(count: usize, keep: f32, fresh: f32) -> String {
         let next = |i: usize| Expr::lit(keep) * both[i] + Expr::lit(fresh) * both[count + i];
         (0..count).map(next).collect()
     });
-    let arguments = [("before", "Control", count), ("fresh", "Control", count)];
-    both("recurrence", "recorded_recurrence", &arguments, "Control", count, &graph)
+    let arguments = [("before", "array<f32, NU>", count), ("fresh", "array<f32, NU>", count)];
+    both("recurrence", "recorded_recurrence", &arguments, "array<f32, NU>", count, &graph)
 }
 
 /// `mixture`: the weighted sum of four knots.
@@ -239,10 +240,10 @@ fn recorded_mixture(count: usize) -> String {
         };
         (0..count).map(mixed).collect()
     });
-    let knot = |name| (name, "Control", count);
+    let knot = |name| (name, "array<f32, NU>", count);
     let weights = ("weights", "array<f32, 4>", SPLINE_SUPPORT);
     let arguments = [weights, knot("a"), knot("b"), knot("c"), knot("d")];
-    both("mixture", "recorded_mixture", &arguments, "Control", count, &graph)
+    both("mixture", "recorded_mixture", &arguments, "array<f32, NU>", count, &graph)
 }
 
 /// `control_at`: the plan, its noise added, clipped.
@@ -261,8 +262,8 @@ fn recorded_control(spec: &MppiSpec) -> String {
         };
         (0..count).map(control).collect()
     });
-    let arguments = [("nominal", "Control", count), ("z", "Control", count)];
-    both("control_at", "recorded_control", &arguments, "Control", count, &graph)
+    let arguments = [("nominal", "array<f32, NU>", count), ("z", "array<f32, NU>", count)];
+    both("control_at", "recorded_control", &arguments, "array<f32, NU>", count, &graph)
 }
 
 /// `charge`: the cost so far with that of a stage, of its noise where noise costs, and of its place
@@ -282,7 +283,8 @@ fn charge_text(cost: &StageCost, spec: &MppiSpec) -> String {
         sum = format!("({sum}) + map_cost(x, t)");
     }
     text + &format!(
-        "fn charge(total: f32, x: State, u: Control, stage: u32, nominal: Control, t: u32) -> f32 \
+        "fn charge(\n    total: f32,\n    x: array<f32, NX>,\n    u: array<f32, NU>,\n    \
+         stage: u32,\n    nominal: array<f32, NU>,\n    t: u32,\n) -> f32 \
          {{\n    return {sum};\n}}\n"
     )
 }
@@ -298,7 +300,7 @@ fn recorded_noise_cost(penalty: &[f32], count: usize) -> String {
         let cost = |cost, i: usize| cost + row(i) * (u[i] - plan[i]);
         vec![(0..count).fold(Expr::lit(0.0), cost)]
     });
-    let arguments = [("nominal", "Control", count), ("u", "Control", count)];
+    let arguments = [("nominal", "array<f32, NU>", count), ("u", "array<f32, NU>", count)];
     both("noise_cost", "recorded_noise_cost", &arguments, "f32", 1, &graph)
 }
 
@@ -322,7 +324,7 @@ fn value_text(term: Option<&ValueTerm>) -> String {
 
 /// `disturb`: the state pushed by the disturbance.
 fn push_text(states: usize, disturbance: Option<&Disturbance>) -> String {
-    let head = "fn disturb(column: u32, x: State) -> State {\n";
+    let head = "fn disturb(column: u32, x: array<f32, NX>) -> array<f32, NX> {\n";
     let Some(disturbance) = disturbance else {
         return format!("{head}    return x;\n}}\n");
     };
@@ -334,18 +336,18 @@ fn push_text(states: usize, disturbance: Option<&Disturbance>) -> String {
         }
         x
     });
-    let arguments = [("x", "State", states), ("d", "Push", outputs)];
-    let recorded = both("pushed", "recorded_push", &arguments, "State", states, &graph);
+    let arguments = [("x", "array<f32, NX>", states), ("d", "array<f32, PUSHES>", outputs)];
+    let recorded = both("pushed", "recorded_push", &arguments, "array<f32, NX>", states, &graph);
     let slot = Slot::Push as u32;
     let mut text = format!(
-        "alias Push = array<f32, {outputs}>;\n{recorded}\
+        "const PUSHES: u32 = {outputs}u;\n{recorded}\
          @group(0) @binding({slot}) var<storage, read> push: array<vec4<f32>>;\n{head}"
     );
     for quad in 0..outputs.div_ceil(4) {
         text += &format!("    let v{quad} = push[{quad}u * params.stride + column];\n");
     }
     let all: Vec<String> = (0..outputs).map(component).collect();
-    text + &format!("    return pushed(x, Push({}));\n}}\n", all.join(", "))
+    text + &format!("    return pushed(x, array<f32, PUSHES>({}));\n}}\n", all.join(", "))
 }
 
 /// Sizes of the update, the exponential of its weights, and `put_terms`.
@@ -354,7 +356,7 @@ fn update_text(controls: usize) -> String {
     let exponential = record(1, |x| vec![x[0].exp_negative()]);
     let mut text = format!(
         "const PARTIAL_HEADER: u32 = {PARTIAL_HEADER}u;\nconst TILE_STEPS: u32 = {tile}u;\n{}\
-         fn put_terms(lane: u32, step: u32, weight: f32, u: Control) {{\n",
+         fn put_terms(lane: u32, step: u32, weight: f32, u: array<f32, NU>) {{\n",
         function("exp_negative", &[("x", 1)], &exponential)
     );
     for i in 0..controls {

@@ -103,18 +103,25 @@ pub(super) fn seconds_glue(period: f32) -> String {
     format!("fn seconds_at(t: u32) -> f32 {{\n    return f32(t) * {period:?}f;\n}}\n")
 }
 
+/// What the kernels give every formula.
+const STATE: &str = "x: array<f32, NX>";
+/// What they give those of steps and stages besides.
+const CONTROL: &str = "u: array<f32, NU>";
+
 /// The function by which the kernels call `function`.
 fn caller(outline: &Outline, function: &Function) -> String {
     let (name, arguments, kind, several) = match function.role {
-        Role::Step => ("advance", "x: State, u: Control", "State", true),
-        Role::Target => ("target_at", "x: State", "f32", false),
-        Role::Constraint => ("constraint_at", "x: State", "f32", false),
-        Role::Control => ("control_of", "x: State", "Control", true),
-        Role::Observe => ("observed", "x: State", "Inputs", true),
-        Role::Act => ("acted", "x: State, said: Outputs", "Control", true),
-        Role::Stage if outline.contexts == 0 => ("staged", "x: State, u: Control", "f32", false),
-        Role::Stage => ("staged", "x: State, u: Control, context: Context", "f32", false),
-        Role::Cell => ("cell_at", "x: State", "f32", false),
+        Role::Step => ("advance", vec![STATE, CONTROL], "array<f32, NX>", true),
+        Role::Target => ("target_at", vec![STATE], "f32", false),
+        Role::Constraint => ("constraint_at", vec![STATE], "f32", false),
+        Role::Control => ("control_of", vec![STATE], "array<f32, NU>", true),
+        Role::Observe => ("observed", vec![STATE], "array<f32, SEEN>", true),
+        Role::Act => ("acted", vec![STATE, "said: array<f32, SAID>"], "array<f32, NU>", true),
+        Role::Stage if outline.contexts == 0 => ("staged", vec![STATE, CONTROL], "f32", false),
+        Role::Stage => {
+            ("staged", vec![STATE, CONTROL, "context: array<f32, CONTEXTS>"], "f32", false)
+        }
+        Role::Cell => ("cell_at", vec![STATE], "f32", false),
     };
     let said = outline.driving.as_ref().map_or(0, |driving| driving.outputs);
     // A single number is an f32 to the recorded function, and an array to the kernel.
@@ -134,6 +141,7 @@ fn caller(outline: &Outline, function: &Function) -> String {
     let passed: Vec<String> = function.takes.iter().map(passed).collect();
     let call = format!("{}({})", function.role.name(), passed.join(", "));
     let value = if several && function.outputs == 1 { format!("{kind}({call})") } else { call };
+    let arguments = arguments.join(", ");
     format!("fn {name}({arguments}, t: u32) -> {kind} {{\n    return {value};\n}}\n")
 }
 
@@ -141,15 +149,16 @@ fn caller(outline: &Outline, function: &Function) -> String {
 fn network_glue(outline: &Outline, has: impl Fn(Role) -> bool) -> String {
     let Some(driving) = &outline.driving else { return String::new() };
     let mut glue = format!(
-        "alias Inputs = array<f32, {}>;\nalias Outputs = array<f32, {}>;\n",
+        "const SEEN: u32 = {}u;\nconst SAID: u32 = {}u;\n",
         driving.inputs, driving.outputs
     );
     let rolls = has(Role::Step);
     if rolls && driving.fused.is_some() && !has(Role::Observe) {
-        glue += "fn observed(x: State, t: u32) -> Inputs {\n    return x;\n}\n";
+        glue += "fn observed(x: array<f32, NX>, t: u32) -> array<f32, SEEN> {\n    return x;\n}\n";
     }
     if rolls && !has(Role::Act) {
-        glue += "fn acted(x: State, said: Outputs, t: u32) -> Control {\n    return said;\n}\n";
+        glue += "fn acted(x: array<f32, NX>, said: array<f32, SAID>, t: u32) -> array<f32, NU> {\n    \
+                 return said;\n}\n";
     }
     glue
 }

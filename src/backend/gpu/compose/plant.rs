@@ -4,12 +4,13 @@ use super::chain::ChainText;
 use super::fused::{Fused, fused_text};
 use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
-use super::kernels::{Access, Kernel, Slot};
+use super::kernels::{Access, COUNTED, Kernel, Slot};
 use super::layers::layer_text;
+use super::narrowed::block_constants;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::error::{Error, Result};
-use crate::formula::wgsl::{CHOICES, Product, function, function_with};
+use crate::formula::wgsl::{Arithmetic, CHOICES, function, function_with};
 use crate::formula::{Expr, record};
 use crate::model::{Controller, Law, Model};
 use crate::policy::Mlp;
@@ -17,11 +18,15 @@ use crate::real::Real;
 
 const FOLD: &str = include_str!("../../../../shaders/fold.wgsl");
 const JUDGE: &str = include_str!("../../../../shaders/judge.wgsl");
+const EXACT: &str = include_str!("../../../../shaders/exact.wgsl");
 const SAMPLE: &str = include_str!("../../../../shaders/sample.wgsl");
 const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
+const NARROW: &str = include_str!("../../../../shaders/narrow.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
 const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
+const COUNT: &str = include_str!("../../../../shaders/count.wgsl");
+const COUNT_PAIRS: &str = include_str!("../../../../shaders/count_pairs.wgsl");
 const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
 
 /// `begin_drive` where a thread keeps nothing for its steps.
@@ -147,6 +152,11 @@ impl PlantText {
     /// For any other kernel.
     pub fn compose(&self, kernel: Kernel) -> String {
         let states = self.outline.states;
+        match kernel {
+            Kernel::Narrow => return block_constants() + NARROW,
+            Kernel::Count | Kernel::CountPairs => return self.count(kernel),
+            _ => {}
+        }
         let folds = || [FINITE, FOLD].concat();
         let parts = match kernel {
             Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
@@ -177,10 +187,18 @@ impl PlantText {
         [shared, parts].concat().join("\n")
     }
 
+    /// What counts: bits alone, nothing of the plant.
+    fn count(&self, kernel: Kernel) -> String {
+        let sizes = constants(self.outline.states, self.outline.controls);
+        let counted = format!("const COUNTED: u32 = {COUNTED}u;\n");
+        let text = if kernel == Kernel::Count { COUNT } else { COUNT_PAIRS };
+        [sizes.as_str(), PARAMS, counted.as_str(), text].join("\n")
+    }
+
     /// What draws starts and pairs.
     fn draw(&self) -> String {
         let glue = [state_glue(self.outline.states), listed_glue(self.outline.states)].concat();
-        [glue, RNG.to_owned(), recorded_normals()].join("\n")
+        [glue, RNG.to_owned(), EXACT.to_owned(), recorded_normals()].join("\n")
     }
 
     /// What judges and drives a rollout.
@@ -217,7 +235,7 @@ impl PlantText {
         };
         let (recorded, a, b) = (recorded_distance(states), passed("a"), passed("b"));
         format!(
-            "{recorded}\nfn state_distance(a: State, b: State) -> f32 {{\n    \
+            "{recorded}\nfn state_distance(a: array<f32, NX>, b: array<f32, NX>) -> f32 {{\n    \
              return distance_of({a}, {b});\n}}\n"
         )
     }
@@ -225,7 +243,7 @@ impl PlantText {
     /// What evaluates the inputs of a network.
     fn observation(&self) -> String {
         let quads = self.outline.driving.as_ref().map_or(0, |driving| driving.inputs.div_ceil(4));
-        let mut store = String::from("fn store_seen(column: u32, seen: Inputs) {\n");
+        let mut store = String::from("fn store_seen(column: u32, seen: array<f32, SEEN>) {\n");
         for quad in 0..quads {
             let entries = super::glue::padded("seen", quad, self.seen());
             store += &format!("    sink[{quad}u * params.stride + column] = {entries};\n");
@@ -272,7 +290,8 @@ impl PlantText {
     /// network that the rollout runs itself.
     fn drive(&self) -> String {
         let Some(driving) = &self.outline.driving else {
-            return "fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {\n    \
+            return "fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) \
+                    -> array<f32, NU> {\n    \
                     return control_of(x, t);\n}\n"
                 .to_owned()
                 + NOTHING_TO_BEGIN;
@@ -283,14 +302,14 @@ impl PlantText {
         let slot = Slot::Control as u32;
         let mut text = format!(
             "@group(0) @binding({slot}) var<storage, read> control: array<vec4<f32>>;\n\
-             fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {{\n    \
+             fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) -> array<f32, NU> {{\n    \
              let stride = params.stride * (1u + params.paired);\n"
         );
         for quad in 0..driving.outputs.div_ceil(4) {
             text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
         }
         let all: Vec<String> = (0..driving.outputs).map(component).collect();
-        text += &format!("    return acted(x, Outputs({}), t);\n}}\n", all.join(", "));
+        text += &format!("    return acted(x, array<f32, SAID>({}), t);\n}}\n", all.join(", "));
         text + NOTHING_TO_BEGIN
     }
 }
@@ -357,11 +376,11 @@ fn check_reads(physics: &Physics) -> Result<()> {
     }
 }
 
-/// `normal_pair` and `ln_unit`, their products kept apart from sums.
+/// `normal_pair` and `ln_unit`, with the bits of the host.
 fn recorded_normals() -> String {
     let logarithm = record(1, |u| vec![u[0].ln_unit()]);
-    let apart = Product::Call("product");
-    [function_with("ln_unit", &[("u", 1)], &logarithm, apart), recorded_pair()].join("\n")
+    let exact = Arithmetic::Exact;
+    [function_with("ln_unit", &[("u", 1)], &logarithm, exact), recorded_pair(exact)].join("\n")
 }
 
 /// `distance_of`, the Euclidean distance of two states.

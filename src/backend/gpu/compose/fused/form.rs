@@ -1,7 +1,7 @@
 //! How the threads of a workgroup share the layers of its trajectories.
 
 use super::shape::{BLOCK, FusedLayer};
-use super::whole;
+use super::{WORKGROUP, whole};
 
 /// Most numbers of weights that a thread keeps: 255 are all that a thread of a GPU has, and sums,
 /// activations and addresses need the rest.
@@ -14,7 +14,7 @@ pub enum Form {
     /// A thread has a tile of neurons and trajectories and reads weights from storage: networks of any
     /// widths.
     Tiles {
-        /// Trajectories of a workgroup, a multiple of `columns`.
+        /// Trajectories of a workgroup: a multiple of `columns` that divides 64.
         trajectories: u32,
         /// Neurons of a tile, 4 or 8.
         neurons: u32,
@@ -24,13 +24,13 @@ pub enum Form {
     /// The same by tiles of 8 by 8, whose weights come by slices of 8 inputs through workgroup memory, the
     /// next slice loaded ahead: hidden layers of one width, from 64 neurons on.
     Slices {
-        /// Trajectories of a workgroup, a multiple of 8.
+        /// Trajectories of a workgroup: a multiple of 8 that divides 64.
         trajectories: u32,
     },
     /// A thread keeps the weights of its neuron in each layer for all steps: small networks, and batches
     /// that leave most of the device idle.
     Rows {
-        /// Trajectories of a workgroup, one after the other for each thread.
+        /// Trajectories of a workgroup, all by each thread: a number that divides 64.
         trajectories: u32,
     },
 }
@@ -58,6 +58,13 @@ impl Form {
     /// Whether networks of these layers have the form.
     pub(super) fn fits(self, layers: &[FusedLayer]) -> bool {
         let Some((_, hidden)) = layers.split_last() else { return false };
+        // Columns are padded to whole workgroups of the other kernels, and so to whole ones of these.
+        let divides = self.trajectories() > 0 && WORKGROUP.is_multiple_of(self.trajectories());
+        divides && self.has(hidden)
+    }
+
+    /// Whether these hidden layers can be shared so.
+    fn has(self, hidden: &[FusedLayer]) -> bool {
         match self {
             Self::Tiles { trajectories, neurons, columns } => {
                 [4, 8].contains(&neurons)
@@ -68,9 +75,9 @@ impl Form {
                 let equal = hidden.iter().all(|layer| layer.quads == first.quads);
                 equal && trajectories.is_multiple_of(8) && first.quads >= 16
             }),
-            Self::Rows { trajectories } => {
+            Self::Rows { .. } => {
                 let kept: u32 = hidden.iter().map(|layer| layer.depth).sum();
-                !hidden.is_empty() && kept <= MOST_KEPT && trajectories > 0
+                !hidden.is_empty() && kept <= MOST_KEPT
             }
         }
     }

@@ -88,7 +88,7 @@ pub(super) fn fused_text(activations: Activations, fused: &Fused, outputs: usize
     };
     let all: Vec<String> = (0..outputs).map(component).collect();
     let outputs = format!(
-        "fn outputs_at(lane: u32) -> Outputs {{\n{}    return Outputs({});\n}}\n",
+        "fn outputs_at(lane: u32) -> array<f32, SAID> {{\n{}    return array<f32, SAID>({});\n}}\n",
         last::text(fused),
         all.join(", ")
     );
@@ -99,7 +99,7 @@ pub(super) fn fused_text(activations: Activations, fused: &Fused, outputs: usize
 
 /// Who calls it calls it with all threads; threads from `COLUMNS` on only help.
 const DRIVE: &str = "\
-fn drive(lane: u32, column: u32, x: State, t: u32) -> Control {
+fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) -> array<f32, NU> {
     // The outputs of the step before are read before they are replaced.
     workgroupBarrier();
     if lane < COLUMNS {

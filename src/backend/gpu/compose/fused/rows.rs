@@ -69,7 +69,7 @@ fn begin(fused: &Fused) -> String {
 
 /// `put_inputs`: what the network sees of a trajectory, with 0 behind it.
 fn inputs(fused: &Fused) -> String {
-    let mut text = String::from("fn put_inputs(lane: u32, seen: Inputs) {\n");
+    let mut text = String::from("fn put_inputs(lane: u32, seen: array<f32, SEEN>) {\n");
     for quad in 0..fused.layers[0].depth / 4 {
         let entry = |i: u32| match 4 * quad + i {
             row if row < fused.inputs() => format!("seen[{row}]"),
@@ -93,10 +93,13 @@ fn layer(fused: &Fused, number: usize) -> String {
     for quad in 0..layer.depth / 4 {
         for c in 0..fused.trajectories() {
             text += &format!("        let h_{quad}_{c} = {from}[{c}u * INPUT_QUADS + {quad}u];\n");
-            for part in PARTS {
-                let factors = format!("row_{number}_{quad}.{part}, h_{quad}_{c}.{part}");
-                text += &format!("        s_{c} = fma({factors}, s_{c});\n");
-            }
+        }
+        // Neighbouring products belong to different sums: none waits for the one before.
+        for (part, c) in
+            PARTS.iter().flat_map(|part| (0..fused.trajectories()).map(move |c| (part, c)))
+        {
+            let factors = format!("row_{number}_{quad}.{part}, h_{quad}_{c}.{part}");
+            text += &format!("        s_{c} = fma({factors}, s_{c});\n");
         }
     }
     for c in 0..fused.trajectories() {

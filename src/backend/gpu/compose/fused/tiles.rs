@@ -55,7 +55,7 @@ fn sizes(fused: &Fused) -> String {
 /// `put_inputs`: what the network sees of a trajectory, rows of 0 behind it.
 fn inputs(fused: &Fused) -> String {
     let depth = fused.layers[0].depth;
-    let mut text = String::from("fn put_inputs(lane: u32, seen: Inputs) {\n");
+    let mut text = String::from("fn put_inputs(lane: u32, seen: array<f32, SEEN>) {\n");
     for row in 0..depth {
         let value = if row < fused.inputs() { format!("seen[{row}]") } else { "0.0".to_owned() };
         // Parts of a vector that lie side by side are written by different threads: each of the
@@ -175,13 +175,17 @@ impl Tile {
         text
     }
 
-    /// The sums from weights in storage.
+    /// The sums from weights in storage, a few inputs at a time: their loads are under way together.
     fn stored(&self) -> String {
         // Threads beyond the layer read its last tile and write nothing.
         let mut text = self.biases().replace("+ down", "+ min(down, span - 1u)");
-        text += "    for (var k = 0u; k < layer.depth; k += 1u) {\n        \
-                 let base = layer.offset + (k + 1u) * layer.quads + min(down, span - 1u);\n";
-        text += &self.products(|group| format!("weights[base + {group}u * span]"), "k");
+        text += "    let first = layer.offset + layer.quads + min(down, span - 1u);\n    \
+                 for (var from_k = 0u; from_k < layer.depth; from_k += 4u) {\n";
+        for k in 0..4 {
+            let row = format!("(from_k + {k}u)");
+            let at = |group| format!("weights[first + {row} * layer.quads + {group}u * span]");
+            text += &format!("        {{\n{}        }}\n", self.products(at, &row));
+        }
         text + "    }\n"
     }
 

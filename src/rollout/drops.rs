@@ -1,0 +1,152 @@
+//! Margin drops of pairs, and the score of starts: the tightening that a start just bears.
+
+use super::fold::{HUGE, reach_avoid};
+use super::replay::{Margins, PairMargins};
+use super::spec::{Effect, RolloutSpec, Tightening};
+
+/// What margins are measured in at each step: `rho_t` and `kappa_t`, `[T + 1]` each, above 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shapes {
+    /// `rho_t` of the target margin.
+    pub target: Vec<f64>,
+    /// `kappa_t` of the constraint margin.
+    pub constraint: Vec<f64>,
+}
+
+impl Shapes {
+    /// The units with which the score is the reach-avoid measure itself: `1 / gamma^t` at step t.
+    pub fn of_discount(spec: &RolloutSpec) -> Self {
+        let gamma = f64::from(spec.gamma);
+        let units: Vec<f64> =
+            (0..=spec.horizon).map(|t| gamma.powi(-(t as i32)).min(f64::from(HUGE))).collect();
+        Self { target: units.clone(), constraint: units }
+    }
+
+    /// What the margins lose at `level`: `level rho_t` and `level kappa_t`, rounded up to f32.
+    pub fn tightening(&self, level: f64) -> Tightening {
+        let lost = |shape: &Vec<f64>| -> Vec<f32> {
+            let lost = shape.iter().map(|unit| (level * unit).min(f64::from(HUGE)));
+            lost.map(|lost| if lost == 0.0 { 0.0 } else { (lost as f32).next_up() }).collect()
+        };
+        Tightening::losing(lost(&self.target), lost(&self.constraint))
+    }
+
+    /// The margins in these units, so that with gamma = 1 the measure is the score of a start: the least
+    /// level at which it is not certified any more.
+    pub fn units(&self) -> Tightening {
+        let factor = |unit: &f64| (unit.recip() as f32).clamp(f32::MIN_POSITIVE, HUGE);
+        Tightening {
+            target: self.target.iter().map(factor).collect(),
+            constraint: self.constraint.iter().map(factor).collect(),
+            effect: Effect::Multiplied,
+        }
+    }
+
+    /// The score of a nominal rollout: the least level at which it is not certified any more, in f64.
+    /// Minus [`HUGE`] where its first state violates the constraint.
+    pub fn score(&self, margins: &[Margins]) -> f64 {
+        let units = self.target.iter().zip(&self.constraint);
+        let scaled = margins.iter().zip(units).map_while(|(margins, (target, constraint))| {
+            let number = !margins.target.is_nan() && !margins.constraint.is_nan();
+            number.then(|| (margins.target / target, margins.constraint / constraint))
+        });
+        let huge = f64::from(HUGE);
+        let bounded = |x: f64| x.clamp(-huge, huge);
+        reach_avoid(scaled.map(|(target, constraint)| (bounded(target), bounded(constraint))), 1.0)
+    }
+
+    /// The largest drop of a pair in these units, section 3 of `docs/method.md`: over both margins and the
+    /// steps before the nominal rollout's first violation. Minus infinity where there is no such step.
+    pub fn largest(&self, pair: &PairMargins) -> f64 {
+        let units = self.target.iter().zip(&self.constraint);
+        let scaled = drops(pair).zip(units).map(|(drop, (target, constraint))| {
+            (drop.target / target).max(drop.constraint / constraint)
+        });
+        scaled.fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// How far the margins of the perturbed rollout lie below those of the nominal one, step by step up to,
+/// and without, the first violation of the nominal rollout: its constraint margin is not above 0, or a
+/// margin or state of it is no number.
+///
+/// Infinite where the perturbed rollout has no number; two equal infinite margins drop 0.
+pub fn drops(pair: &PairMargins) -> impl Iterator<Item = Margins> {
+    let counts = |margins: &Margins| margins.constraint > 0.0 && !margins.target.is_nan();
+    let both = pair.nominal.iter().zip(&pair.perturbed);
+    both.take_while(move |(nominal, _)| counts(nominal)).map(|(nominal, perturbed)| Margins {
+        target: drop(nominal.target, perturbed.target),
+        constraint: drop(nominal.constraint, perturbed.constraint),
+    })
+}
+
+/// How far `perturbed` lies below `nominal`, rounded up.
+fn drop(nominal: f64, perturbed: f64) -> f64 {
+    match () {
+        () if perturbed.is_nan() => f64::INFINITY,
+        () if nominal == perturbed => 0.0,
+        () => (nominal - perturbed).next_up(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rollout::{RolloutSpec, replay};
+
+    fn rollout(margins: &[[f64; 2]]) -> Vec<Margins> {
+        margins.iter().map(|&[target, constraint]| Margins { target, constraint }).collect()
+    }
+
+    fn z(shapes: &Shapes, nominal: &[[f64; 2]], perturbed: &[[f64; 2]]) -> f64 {
+        let (nominal, perturbed) = (rollout(nominal), rollout(perturbed));
+        shapes.largest(&PairMargins { nominal, perturbed })
+    }
+
+    #[test]
+    fn drops_count_before_the_violation_of_the_nominal_rollout() {
+        let shapes = Shapes { target: vec![1.0, 2.0, 4.0], constraint: vec![1.0, 1.0, 0.5] };
+        let close = |found: f64, wanted: f64| {
+            assert!(found >= wanted && found <= wanted + 1e-12, "{found}, not {wanted}");
+        };
+        let nominal = [[-1.0, 1.0], [0.0, 1.0], [1.0, 1.0]];
+        close(z(&shapes, &nominal, &[[-1.5, 1.0], [-3.0, 1.0], [1.0, 0.5]]), 1.5);
+        close(z(&shapes, &nominal, &[[-1.5, 1.0], [0.0, 1.0], [1.0, -0.5]]), 3.0);
+        // A perturbed rollout that is better has a drop below 0.
+        close(z(&shapes, &nominal, &[[0.0, 2.0], [1.0, 2.0], [3.0, 2.0]]), -0.5);
+        let (nan, inf) = (f64::NAN, f64::INFINITY);
+        assert_eq!(z(&shapes, &nominal, &[[-1.0, 1.0], [nan, nan], [nan, nan]]), inf);
+        // The step of the violation, and what comes after it, does not count.
+        for violated in [0.0, -1.0, nan] {
+            let fails = [[-1.0, 1.0], [0.0, violated], [1.0, 1.0]];
+            close(z(&shapes, &fails, &[[-1.25, 1.0], [-9.0, nan], [nan, nan]]), 0.25);
+        }
+        assert_eq!(z(&shapes, &[[0.0, -1.0]; 3], &nominal), f64::NEG_INFINITY);
+        let clear = [[1.0, inf], [1.0, inf], [1.0, 1.0]];
+        assert_eq!(z(&shapes, &clear, &clear), 0.0);
+        assert_eq!(z(&shapes, &clear, &[[1.0, inf], [1.0, 5.0], [1.0, 1.0]]), inf);
+    }
+
+    /// The score is the level at which the measure with tightened margins changes its sign.
+    #[test]
+    fn a_start_is_certified_exactly_below_its_score() {
+        let shapes = Shapes { target: vec![0.1, 0.2, 0.4], constraint: vec![0.3, 0.1, 0.2] };
+        let spec = RolloutSpec::new(2, 0.9).expect("a horizon");
+        let plain = RolloutSpec::new(2, 1.0).expect("a horizon");
+        for margins in [
+            [[-1.0, 1.0], [0.5, 0.75], [1.0, -1.0]],
+            [[0.25, 0.5], [0.5, 0.75], [1.0, 1.0]],
+            [[0.25, 0.0], [0.5, 0.75], [1.0, 1.0]],
+            [[0.25, 3.0], [0.5, 3.0], [-1.0, f64::NAN]],
+        ] {
+            let margins = rollout(&margins);
+            let score = replay::measure_of(&margins, &plain, &shapes.units());
+            let certified =
+                |level: f64| replay::measure_of(&margins, &spec, &shapes.tightening(level)) > 0.0;
+            assert_eq!(score > 0.0, certified(0.0), "{margins:?}: {score}");
+            if score > 0.0 {
+                assert!(certified(score * (1.0 - 1e-6)) && !certified(score * (1.0 + 1e-6)));
+            }
+        }
+    }
+}
