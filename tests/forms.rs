@@ -25,7 +25,8 @@ const SLICES: Form = Form::Slices { trajectories: 32 };
 /// Weights in registers.
 const ROWS: Form = Form::Rows { trajectories: 8 };
 
-/// Goes where the control says; the measure is the largest state.
+/// Goes where the control says. The target is beyond 0 on the left: from the right a state that is no
+/// number comes before it is reached, and fails.
 struct Line;
 
 impl System<1, 1> for Line {
@@ -42,7 +43,7 @@ impl System<1, 1> for Line {
         [x + u]
     }
     fn target<R: Real>(&self, [x]: [R; 1]) -> R {
-        x
+        -x
     }
     fn constraint<R: Real>(&self, _: [R; 1]) -> R {
         R::lit(1e6)
@@ -174,8 +175,8 @@ macro_rules! noticed {
 
 noticed! {
     tiles_in_descending_order: TILES, with(
-        "for (var k = 0u; k < layer.depth; k += 1u) {\n",
-        "for (var j = 0u; j < layer.depth; j += 1u) {\n        let k = layer.depth - 1u - j;\n",
+        "for (var from_k = 0u; from_k < layer.depth; from_k += 4u) {\n",
+        "for (var j = 0u; j < layer.depth; j += 4u) {\n        let from_k = layer.depth - 4u - j;\n",
     );
     slices_in_descending_order: SLICES, descending;
     rows_in_another_order: ROWS, second_first;

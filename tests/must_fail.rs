@@ -452,7 +452,7 @@ mutants! {
     target_without_constraint: "min(safe, discount * target_margin)" => "discount * target_margin";
     constraint_forgotten: "min(fold.safe, discount * constraint_margin)" => "discount * constraint_margin";
     losses_swapped: "target_at(x, t), row.y" => "target_at(x, t), row.z";
-    loss_added: "constraint_at(x, t) - row.z" => "constraint_at(x, t) + row.z";
+    loss_added: "select(margin - number," => "select(margin + number,";
     early_exit_on_safety: "fold.best > 0.0 || fold.safe <= 0.0" => "fold.best > 0.0 || fold.safe > 0.0";
     survivors_mixed_up: "kept_origin[place] = origin[column];" => "kept_origin[place] = origin[place];";
     largest_is_smallest: "b.x > a.x ||" => "b.x < a.x ||";
