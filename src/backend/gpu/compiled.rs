@@ -13,6 +13,9 @@ use super::source::Source;
 use super::traffic::Count;
 use crate::error::Result;
 
+/// A kernel, and the form in which it runs the network of its plant, if it does.
+type Formed = (Kernel, Option<Form>);
+
 /// The kernels of a plant, each compiled when it is first needed, and its networks' parameters.
 pub(super) struct Compiled {
     /// With the network in the form of large batches, if rollouts run it themselves.
@@ -22,7 +25,7 @@ pub(super) struct Compiled {
     /// Of the networks that formulas call.
     called: Vec<Buffer>,
     pipelines: Arc<Pipelines>,
-    built: Mutex<HashMap<(Kernel, Option<Form>), Arc<Pipeline>>>,
+    built: Mutex<HashMap<Formed, Arc<Pipeline>>>,
 }
 
 impl Compiled {
