@@ -1,6 +1,6 @@
 // One thread rolls one pair side by side over the states t = step .. step + steps - 1. The
 // nominal trajectory stands in column i, the perturbed one in column stride + i; threads from
-// WORKGROUP on only help to drive. Reads the schedule and, for a network, its outputs (steps = 1
+// COLUMNS on only help to drive. Reads the schedule and, for a network, its outputs (steps = 1
 // then) or its parameters; writes both states and folds, the pair's measures and its distance at
 // each of these steps. Twin: backend/cpu/deviation.rs.
 
@@ -23,9 +23,10 @@ fn deviation(
     @builtin(workgroup_id) group: vec3<u32>,
 ) {
     // Columns are padded to whole workgroups; nothing is written beyond the last.
-    let column = group.x * WORKGROUP + lane % WORKGROUP;
-    let writes = lane < WORKGROUP && column < params.columns;
+    let column = group.x * COLUMNS + lane % COLUMNS;
+    let writes = lane < COLUMNS && column < params.columns;
     let second = params.stride + column;
+    begin_drive(lane);
     var nominal = load_state(column);
     var perturbed = load_state(second);
     var nominal_fold = folds[column];

@@ -1,5 +1,5 @@
 // One thread rolls one trajectory over the states t = step .. step + steps - 1, the margins of
-// each folded; threads from WORKGROUP on only help to drive. Reads the schedule and, for a network,
+// each folded; threads from COLUMNS on only help to drive. Reads the schedule and, for a network,
 // its outputs (steps = 1 then) or its parameters; writes the state, the fold and the measure or
 // its sign at the trajectory's place in the batch. Twin: backend/cpu/reach_avoid.rs.
 
@@ -15,7 +15,8 @@ fn reach_avoid(
     @builtin(workgroup_id) group: vec3<u32>,
 ) {
     // Columns are padded to whole workgroups; nothing is written beyond the last.
-    let column = group.x * WORKGROUP + lane % WORKGROUP;
+    let column = group.x * COLUMNS + lane % COLUMNS;
+    begin_drive(lane);
     var x = load_state(column);
     var fold = folds[column];
     for (var t = params.step; t < params.step + params.steps; t += 1u) {
@@ -30,7 +31,7 @@ fn reach_avoid(
             x = advance(x, drive(lane, column, x, t), t);
         }
     }
-    if lane >= WORKGROUP || column >= params.columns {
+    if lane >= COLUMNS || column >= params.columns {
         return;
     }
     store_state(column, x);

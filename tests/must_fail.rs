@@ -18,7 +18,7 @@ use std::sync::Arc;
 use common::{adapter, race_policy};
 use functions::{Case, disagreement};
 use reachcast::backend::Backend;
-use reachcast::backend::gpu::{Gpu, NetworkKernels};
+use reachcast::backend::gpu::{Form, Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
 use reachcast::formula::Function;
 use reachcast::model::Plant;
@@ -70,9 +70,10 @@ fn parity(gpu: Gpu) -> bool {
         && pairs_agree(&backend, &plant, region, PairControl::Replay)
 }
 
-/// The same for rollouts that run the race's network themselves, pairs in feedback.
+/// The same for rollouts that run the race's network themselves, by tiles, pairs in feedback.
 fn fused_parity(gpu: Gpu) -> bool {
-    let backend = Backend::Gpu(gpu.with_networks(NetworkKernels::Fused));
+    let tiles = Form::Tiles { trajectories: 32, neurons: 8, columns: 8 };
+    let backend = Backend::Gpu(gpu.with_networks(NetworkKernels::Form(tiles)));
     let race = DroneRace::default();
     let (low, high) = (race.states().map(|a| a.low), race.states().map(|a| a.high));
     let region = Region::new_box(low, high).expect("box");
@@ -451,7 +452,7 @@ mutants! {
     target_without_constraint: "min(safe, discount * target_margin)" => "discount * target_margin";
     constraint_forgotten: "min(fold.safe, discount * constraint_margin)" => "discount * constraint_margin";
     losses_swapped: "target_at(x, t), row.y" => "target_at(x, t), row.z";
-    loss_added: "constraint_at(x, t) - row.z" => "constraint_at(x, t) + row.z";
+    loss_added: "select(margin - number," => "select(margin + number,";
     early_exit_on_safety: "fold.best > 0.0 || fold.safe <= 0.0" => "fold.best > 0.0 || fold.safe > 0.0";
     survivors_mixed_up: "kept_origin[place] = origin[column];" => "kept_origin[place] = origin[place];";
     largest_is_smallest: "b.x > a.x ||" => "b.x < a.x ||";
@@ -469,14 +470,14 @@ mutants! {
 mutants! {
     fused_parity:
     one_fused_step_too_few: "if t < params.horizon {" => "if t + 1u < params.horizon {";
-    one_layer_too_few: "i < LAYER_COUNT" => "i + 1u < LAYER_COUNT";
-    last_layer_like_the_others: "if layer.last {" => "if !layer.last {";
+    one_layer_too_few: "i < 3u;" => "i + 1u < 3u;";
+    last_layer_like_the_others: "vec4<f32>(output_activation(s0.x)" => "vec4<f32>(hidden_activation(s0.x)";
     inputs_replaced_too_early: "    // All inputs are read before the first is replaced.\n    workgroupBarrier();\n" => "";
-    states_of_a_neighbour: "put_inputs(lane, observed(x, t));" => "put_inputs((lane + 1u) % WORKGROUP, observed(x, t));";
-    neurons_of_another_tile: "2u * (lane / TILE_PITCH)" => "2u * (lane % TILE_PITCH)";
-    one_tile_in_eight_left_out: "let column = lane % TILE_PITCH;" => "let column = lane % (TILE_PITCH - 1u);";
-    controls_of_a_neighbour: "outputs_at(lane % WORKGROUP)" => "outputs_at((lane + 1u) % WORKGROUP)";
-    biases_forgotten: "let upper_bias = weights[layer.offset + quad];" => "let upper_bias = vec4<f32>(0.0);";
+    states_of_a_neighbour: "put_inputs(lane, observed(x, t));" => "put_inputs((lane + 1u) % COLUMNS, observed(x, t));";
+    neurons_of_another_tile: "let down = lane / PITCH;" => "let down = lane % PITCH;";
+    one_tile_in_four_left_out: "let across = lane % PITCH;" => "let across = lane % (PITCH - 1u);";
+    controls_of_a_neighbour: "outputs_at(lane % COLUMNS)" => "outputs_at((lane + 1u) % COLUMNS)";
+    biases_forgotten: "let bias_0 = weights[layer.offset + 0u * span + min(down, span - 1u)];" => "let bias_0 = vec4<f32>(0.0);";
     perturbed_controls_are_nominal: "drive(lane, second, perturbed, t)" => "replayed";
 }
 
@@ -487,15 +488,15 @@ mutants! {
     parameters_swapped: "(values[0].x, values[0].y" => "(values[0].y, values[0].x";
     fifth_parameter_is_the_first: "values[1].x" => "values[0].x";
     network_sees_the_first_time: "observed(load_state(column), params.step)" => "observed(load_state(column), 0u)";
-    action_of_the_first_step: "return acted(x, Outputs(v0.x, v0.y, v0.z), t);" => "return acted(x, Outputs(v0.x, v0.y, v0.z), 0u);";
-    output_of_another_neuron: "Outputs(v0.x, v0.y, v0.z)" => "Outputs(v0.x, v0.z, v0.y)";
+    action_of_the_first_step: "return acted(x, array<f32, SAID>(v0.x, v0.y, v0.z), t);" => "return acted(x, array<f32, SAID>(v0.x, v0.y, v0.z), 0u);";
+    output_of_another_neuron: "array<f32, SAID>(v0.x, v0.y, v0.z)" => "array<f32, SAID>(v0.x, v0.z, v0.y)";
     list_of_a_neighbour: "u * params.columns + column]" => "u * params.columns + (column ^ 1u)]";
 }
 
 mutants! {
     fused_drift_parity:
     fused_network_sees_the_first_time: "observed(x, t)" => "observed(x, 0u)";
-    fused_action_of_the_first_step: "acted(x, outputs_at(lane % WORKGROUP), t)" => "acted(x, outputs_at(lane % WORKGROUP), 0u)";
+    fused_action_of_the_first_step: "acted(x, outputs_at(lane % COLUMNS), t)" => "acted(x, outputs_at(lane % COLUMNS), 0u)";
 }
 
 mutants! {

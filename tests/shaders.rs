@@ -12,7 +12,7 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
 use reachcast::backend::gpu::Params;
 use reachcast::backend::gpu::compose::{
-    Access, Fused, Kernel, MppiText, PlantText, Slot, limit_kernel,
+    Access, Form, Fused, Kernel, MppiText, PlantText, Slot, limit_kernel,
 };
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, Quadratic};
 use reachcast::formula::{Expr, Scalar as _, record};
@@ -77,6 +77,15 @@ fn network_of(states: usize, hidden: usize, controls: usize, activation: Activat
     Mlp::new(layers, activation, OutputActivation::Tanh).expect("a whole network")
 }
 
+/// Forms of networks that rollouts run themselves: of each kind, and tiles of each size.
+const FORMS: [Form; 5] = [
+    Form::Tiles { trajectories: 8, neurons: 4, columns: 4 },
+    Form::Tiles { trajectories: 32, neurons: 8, columns: 8 },
+    Form::Slices { trajectories: 32 },
+    Form::Rows { trajectories: 1 },
+    Form::Rows { trajectories: 8 },
+];
+
 /// The kernels of a plant, by name.
 type Named = (String, PlantText);
 
@@ -96,9 +105,12 @@ where
         let (name, text) = (format!("{name} {activation:?}"), text(&model, controller));
         all.push((name.clone(), text.clone()));
         for hidden in [5, 128] {
-            let fused = Fused::new(&network_of(NX, hidden, NU, activation));
-            let name = format!("{name}, {hidden} neurons fused");
-            all.push((name, text.clone().fusing(Some(fused))));
+            for form in FORMS {
+                let fused = Fused::new(&network_of(NX, hidden, NU, activation), form);
+                let Some(fused) = fused else { continue };
+                let name = format!("{name}, {hidden} neurons fused, {form:?}");
+                all.push((name, text.clone().fusing(Some(fused))));
+            }
         }
     }
     all
@@ -114,9 +126,13 @@ fn drifts() -> Vec<Named> {
     for driver in DRIVERS {
         let plant = driver.plant(VALUES);
         let text = text(&plant.model, &plant.controller);
-        let fused = plant.controller.network().map(Fused::new);
-        all.push((format!("drift, {driver:?}"), text.clone()));
-        all.push((format!("drift, {driver:?} fused"), text.fusing(fused)));
+        for form in FORMS {
+            let fused = plant.controller.network().and_then(|mlp| Fused::new(mlp, form));
+            let Some(fused) = fused else { continue };
+            let name = format!("drift, {driver:?} fused, {form:?}");
+            all.push((name, text.clone().fusing(Some(fused))));
+        }
+        all.push((format!("drift, {driver:?}"), text));
     }
     all
 }
@@ -569,11 +585,21 @@ fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
 
 #[test]
 fn fused_activations_take_the_workgroup_memory_that_is_planned() {
-    for (hidden, lanes, bytes) in [(3, 64, 3), (64, 64, 16), (65, 128, 18), (128, 128, 32)] {
+    let tiles = |trajectories, size| Form::Tiles { trajectories, neurons: size, columns: size };
+    // Bytes of a number: for each input of the widest layer, of 12 padded to 16 at least, and trajectory;
+    // in slices 16 more per neuron, in rows twice.
+    for (hidden, form, lanes, bytes) in [
+        (3, tiles(64, 8), 64, 4 * 16 * 64),
+        (64, tiles(64, 8), 64, 4 * 64 * 64),
+        (65, tiles(64, 8), 96, 4 * 72 * 64),
+        (128, tiles(16, 4), 128, 4 * 128 * 16),
+        (64, Form::Slices { trajectories: 64 }, 64, 4 * 64 * (64 + 16)),
+        (128, Form::Slices { trajectories: 32 }, 64, 4 * 128 * (32 + 16)),
+        (64, Form::Rows { trajectories: 8 }, 64, 2 * 4 * 64 * 8),
+    ] {
         let mlp = network_of(12, hidden, 3, Activation::Relu);
-        let fused = Fused::new(&mlp);
-        // A quarter of a KiB per neuron, the 12 inputs and whole tiles of 8 at least.
-        assert_eq!((fused.lanes(), fused.workgroup_bytes()), (lanes, bytes << 10), "{hidden}");
+        let fused = Fused::new(&mlp, form).expect("the network has the form");
+        assert_eq!((fused.lanes(), fused.workgroup_bytes()), (lanes, bytes), "{hidden} {form:?}");
         let race = DroneRace::default();
         let controller = Controller::of(&race, mlp);
         let text = text(&Model::of(race), &controller).fusing(Some(fused));
@@ -583,6 +609,6 @@ fn fused_activations_take_the_workgroup_memory_that_is_planned() {
         let size = |variable: &naga::GlobalVariable| {
             u64::from(module.types[variable.ty].inner.size(module.to_ctx()))
         };
-        assert_eq!(shared.map(size).sum::<u64>(), bytes << 10, "{hidden} neurons");
+        assert_eq!(shared.map(size).sum::<u64>(), bytes, "{hidden} {form:?}");
     }
 }

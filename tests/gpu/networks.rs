@@ -1,13 +1,13 @@
 //! Networks that the rollouts run themselves, against the f64 oracle and against layers.
 
 use reachcast::Error;
-use reachcast::backend::gpu::{Gpu, NetworkKernels};
+use reachcast::backend::gpu::{Form, Gpu, NetworkKernels};
 use reachcast::model::Plant;
 use reachcast::policy::{Activation, Mlp};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{
-    DeviationTask, NON_FINITE, PairControl, Pairs, Query, ReachAvoidTask, RolloutSpec, Starts,
-    Stream, Tightening,
+    DeviationTask, Farthest, NON_FINITE, PairControl, PairMeasure, Pairs, Query, ReachAvoidTask,
+    RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::scenario::purpose;
 
@@ -79,6 +79,54 @@ fn batches_around_whole_workgroups() {
         gpu = back;
         assert_eq!(found, all[7..7 + count as usize], "{count} trajectories");
     }
+}
+
+/// Whoever adds them up, sums are one chain over ascending inputs: which form a batch gets must not be
+/// seen in a single bit.
+#[test]
+fn a_trajectory_has_the_same_bits_in_every_form() {
+    let tiles = |trajectories, neurons, columns| Form::Tiles { trajectories, neurons, columns };
+    let slices = |trajectories| Form::Slices { trajectories };
+    let rows = |trajectories| Form::Rows { trajectories };
+    for (widths, activation, forms) in [
+        (vec![12, 64, 64, 3], Activation::Relu, vec![tiles(64, 8, 8), slices(64), rows(8)]),
+        (vec![12, 70, 72, 3], Activation::Silu, vec![tiles(8, 4, 4), slices(32)]),
+        (vec![12, 13, 30, 3], Activation::Tanh, vec![tiles(32, 8, 4), tiles(64, 4, 8)]),
+        (vec![12, 3], Activation::Relu, vec![tiles(64, 8, 8), tiles(8, 4, 4)]),
+    ] {
+        let plant = Plant::of(DroneRace::default(), random_network(&widths, activation));
+        let mut first = None;
+        for form in forms {
+            let Some(gpu) = gpu() else { return };
+            let found = in_form(gpu.with_networks(NetworkKernels::Form(form)), &plant);
+            assert_eq!(first.get_or_insert(found.clone()), &found, "{widths:?} {form:?}");
+        }
+    }
+}
+
+/// Measures and pairs of a few starts of the race, the measures close to those in f64.
+fn in_form(gpu: Gpu, plant: &Plant) -> (Vec<f32>, Vec<Farthest>, Vec<PairMeasure>) {
+    let (spec, tightening) = last_state_only(3);
+    let nominal = drawn(whole_box(&DroneRace::default()), 37);
+    let starts = ReachAvoidTask {
+        starts: nominal.clone(),
+        range: 0..70,
+        spec,
+        tightening: &tightening,
+        query: Query::Measure,
+    };
+    let stream = Stream::new(37, purpose::DEVIATION_PERTURBATION, 0);
+    let pairs = DeviationTask {
+        pairs: Pairs { nominal, radius: 0.1, stream },
+        range: 0..70,
+        spec,
+        tightening: &tightening,
+        control: PairControl::ClosedLoop,
+    };
+    let (gpu, found) = measures(gpu, plant, &starts);
+    assert_close_to_f64(plant, &starts, &found);
+    let (_, farthest, pairs) = deviation(gpu, plant, &pairs);
+    (found, farthest, pairs)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The dispatches of one submission and their parameters.
 
-use super::compose::{GROUPS_WORD, Kernel};
+use super::compose::GROUPS_WORD;
 use super::kernel::Bound;
 use super::params::Params;
 use super::timing::Stamps;
@@ -124,9 +124,9 @@ impl<'a> Batch<'a> {
         self.calls.len() as u64
     }
 
-    /// Adds a dispatch with a thread per column.
-    pub(super) fn push_columns(&mut self, kernel: Kernel, bound: &'a Bound, params: &Params) {
-        let groups = params.columns.div_ceil(kernel.workgroup());
+    /// Adds a dispatch over all columns.
+    pub(super) fn push_columns(&mut self, bound: &'a Bound, params: &Params) {
+        let groups = params.columns.div_ceil(bound.columns());
         self.push(bound, params, [groups, 1]);
     }
 }

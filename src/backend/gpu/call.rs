@@ -5,7 +5,7 @@ use super::buffer::{Buffer, Use};
 use super::compose::{Access, Kernel, Slot};
 use super::device::Device;
 use super::flight::Flight;
-use super::kernel::{Bound, Pipelines};
+use super::kernel::{Bound, Composed, Pipelines};
 use super::opened::Opened;
 use super::params::Params;
 use super::traffic::Count;
@@ -38,16 +38,18 @@ impl<'a> Call<'a> {
         self.flight.pool.take(self.device(), Use::Storage, bytes)
     }
 
-    /// `kernel` of the text `composed` with its buffers.
+    /// `kernel` of this text with its buffers.
     pub(super) fn bind<'b>(
         &self,
         kernel: Kernel,
         bindings: Vec<(Slot, Access)>,
-        composed: String,
+        text: String,
         buffer: impl Fn(Slot) -> &'b Buffer,
     ) -> Result<Bound> {
         self.device().counters.add(Count::Text);
-        let pipeline = self.pipelines.pipeline(self.device(), kernel, bindings, composed)?;
+        let columns = kernel.workgroup();
+        let composed = Composed { kernel, bindings, columns, text };
+        let pipeline = self.pipelines.pipeline(self.device(), composed)?;
         Ok(pipeline.bind(self.device(), |slot| match slot {
             Slot::Params => self.uniform.part(0, Params::SIZE.get()),
             _ => buffer(slot).binding(),

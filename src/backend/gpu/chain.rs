@@ -101,7 +101,7 @@ impl ChainBinder<'_> {
 
     fn link(&self, number: usize) -> Result<Bound> {
         let device = &self.flight.device;
-        let pipeline = self.compiled.pipeline(device, Kernel::Link(number as u32))?;
+        let pipeline = self.compiled.pipeline(device, Kernel::Link(number as u32), 0)?;
         let ChainBuffers { kept, asked, said, .. } = self.buffers;
         let buffer = |slot| match slot {
             Slot::Kept => kept,
@@ -173,8 +173,8 @@ impl BoundChain {
         let ChainStep { step, horizon, columns, row, acting } = at;
         let count = if step < horizon { self.links.len() } else { self.deciding };
         let params = Params { columns, stride: row, width: acting, step, ..Params::default() };
-        for (number, BoundLink { link, asks }) in self.links[..count].iter().enumerate() {
-            batch.push_columns(Kernel::Link(number as u32), link, &params);
+        for BoundLink { link, asks } in &self.links[..count] {
+            batch.push_columns(link, &params);
             for BoundAsk { layers, shapes } in asks {
                 push_layers(batch, layers, shapes, columns, row);
             }

@@ -253,8 +253,11 @@ fn too_large(adapter: &Adapter, columns: u64, parameters: u64, binding: u64) -> 
 #[cfg(test)]
 mod tests {
     use super::super::attempt::WORK_FLOPS;
+    use super::super::compose::Form;
     use super::super::fusing::tests::network;
     use super::*;
+
+    const TILES: Form = Form::Tiles { trajectories: 64, neurons: 8, columns: 8 };
 
     fn size<'a>(
         states: usize,
@@ -274,7 +277,8 @@ mod tests {
         let (wide, narrow) = (network(&[12, 512, 512, 3]), network(&[12, 64, 64, 3]));
         for (binding, count) in [(1 << 27, 1), (1 << 27, u64::MAX / 2), (1 << 20, 100_000_000)] {
             for network in [None, Some(&wide), Some(&narrow)] {
-                let fused = network.filter(|mlp| *mlp == &narrow).map(Fused::new);
+                let fused =
+                    network.filter(|mlp| *mlp == &narrow).and_then(|mlp| Fused::new(mlp, TILES));
                 for work in [Work::Measure, Work::Sign, Work::Pairs] {
                     // Parameters of the wide network take a megabyte of their own.
                     let binding = binding + if network.is_some() { 1 << 21 } else { 0 };
@@ -356,13 +360,13 @@ mod tests {
     #[test]
     fn deep_fused_networks_take_fewer_steps_per_dispatch() {
         let deep = network(&[[12].as_slice(), &[128; 60], &[3]].concat());
-        let fused = Fused::new(&deep);
+        let fused = Fused::new(&deep, TILES).expect("tiles fit any network");
         let adapter = Adapter::made_up(1 << 27);
         let size = size(12, Some(&deep), Some(&fused), 1000);
         let limit = Limit { flops: u64::MAX, ..Limit::default() };
         let chunking = Chunking::new(&adapter, limit, Work::Measure, &size);
-        // 3 vectors of inputs, then 60 times 32, and the 61 layers themselves.
-        let trips = 1 + 3 + 60 * 32 + 61;
+        // 12 inputs padded to 16, then 60 times 128, and the 61 layers themselves.
+        let trips = 1 + 16 + 60 * 128 + 61;
         assert_eq!(u64::from(chunking.expect("a chunking").steps), MAX_TRIPS / trips);
     }
 }

@@ -4,23 +4,28 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::buffer::{Buffer, Pool};
-use super::compose::{Access, Kernel, PlantText, Slot};
+use super::compose::{Access, Form, Fused, Kernel, PlantText, Slot};
 use super::device::Device;
-use super::fusing::{NetworkKernels, fused};
-use super::kernel::{Pipeline, Pipelines};
-use super::network::upload;
+use super::fusing::{Forms, NetworkKernels};
+use super::kernel::{Composed, Pipeline, Pipelines};
+use super::network::{upload, upload_fused};
 use super::source::Source;
 use super::traffic::Count;
 use crate::error::Result;
 
+/// A kernel, and the form in which it runs the network of its plant, if it does.
+type Formed = (Kernel, Option<Form>);
+
 /// The kernels of a plant, each compiled when it is first needed, and its networks' parameters.
 pub(super) struct Compiled {
+    /// With the network in the form of large batches, if rollouts run it themselves.
     pub(super) text: PlantText,
+    forms: Forms,
     weights: Option<Buffer>,
     /// Of the networks that formulas call.
     called: Vec<Buffer>,
     pipelines: Arc<Pipelines>,
-    built: Mutex<HashMap<Kernel, Arc<Pipeline>>>,
+    built: Mutex<HashMap<Formed, Arc<Pipeline>>>,
 }
 
 impl Compiled {
@@ -36,12 +41,15 @@ impl Compiled {
         networks: NetworkKernels,
     ) -> Result<Self> {
         let network = source.network.as_deref();
-        let fused = fused(&device.adapter, network, networks)?;
+        let forms = Forms::new(&device.adapter, network, networks)?;
+        let fused = forms.largest();
+        let upload_own = if fused.is_some() { upload_fused } else { upload };
         let called = source.text.chain().map(|chain| chain.networks()).unwrap_or_default();
         Ok(Self {
             called: called.iter().map(|mlp| upload(device, pool, mlp)).collect(),
             text: source.text.clone().fusing(fused),
-            weights: network.map(|mlp| upload(device, pool, mlp)),
+            forms,
+            weights: network.map(|mlp| upload_own(device, pool, mlp)),
             pipelines: Arc::clone(pipelines),
             built: Mutex::default(),
         })
@@ -70,22 +78,40 @@ impl Compiled {
         text: String,
     ) -> Result<Arc<Pipeline>> {
         device.counters.add(Count::Text);
-        self.pipelines.pipeline(device, kernel, bindings, text)
+        let columns = kernel.workgroup();
+        self.pipelines.pipeline(device, Composed { kernel, bindings, columns, text })
     }
 
-    /// The pipeline of `kernel`.
+    /// The pipeline of `kernel` for batches of `columns` columns.
     ///
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if the driver refuses the text.
-    pub(super) fn pipeline(&self, device: &Device, kernel: Kernel) -> Result<Arc<Pipeline>> {
+    pub(super) fn pipeline(
+        &self,
+        device: &Device,
+        kernel: Kernel,
+        columns: u32,
+    ) -> Result<Arc<Pipeline>> {
+        let rolls = matches!(kernel, Kernel::ReachAvoid | Kernel::Deviation);
+        let fused = self.forms.of(columns).filter(|_| rolls);
+        let key = (kernel, fused.map(Fused::form));
         let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pipeline) = built.get(&kernel) {
+        if let Some(pipeline) = built.get(&key) {
             return Ok(Arc::clone(pipeline));
         }
         device.counters.add(Count::Text);
-        let (bindings, text) = (self.text.bindings(kernel), self.text.compose(kernel));
-        let pipeline = self.pipelines.pipeline(device, kernel, bindings, text)?;
-        built.insert(kernel, Arc::clone(&pipeline));
+        let text = match fused {
+            Some(fused) => self.text.clone().fusing(Some(fused.clone())),
+            None => self.text.clone(),
+        };
+        let composed = Composed {
+            kernel,
+            bindings: text.bindings(kernel),
+            columns: text.columns(kernel),
+            text: text.compose(kernel),
+        };
+        let pipeline = self.pipelines.pipeline(device, composed)?;
+        built.insert(key, Arc::clone(&pipeline));
         Ok(pipeline)
     }
 }

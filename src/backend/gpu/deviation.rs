@@ -4,7 +4,7 @@ use super::attempt::Attempt;
 use super::batch::Batch;
 use super::chain::ChainStep;
 use super::chunking::{Chunking, Work};
-use super::compose::{Kernel, Slot};
+use super::compose::Slot;
 use super::counting;
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
@@ -163,7 +163,7 @@ fn roll(job: &mut Job<'_>, chunk: Chunk<'_>, delivery: &mut Delivery<'_>) -> Res
     let Workspace { inputs, listed, results, buffers, kernels, .. } = space;
     let kernels = &kernels[0];
     let mut batch = Batch::default();
-    batch.push_columns(Kernel::Sample, &kernels.sample, &params);
+    batch.push_columns(&kernels.sample, &params);
     let mut step = 0;
     while step <= params.horizon {
         let count = chunking.segment.min(params.horizon + 1 - step);
@@ -220,7 +220,7 @@ fn segment<'a>(
             let columns = if params.closed_loop == 0 { params.columns } else { chunking.row };
             kernels.drive(batch, buffers, columns, chunking.row, step);
         }
-        batch.push_columns(Kernel::Deviation, &kernels.rollout, &params.over(step, steps));
+        batch.push_columns(&kernels.rollout, &params.over(step, steps));
         step += steps;
     }
     if let Some(reduce) = &kernels.after {

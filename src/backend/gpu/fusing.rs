@@ -1,7 +1,7 @@
 //! Networks that rollouts run themselves, in workgroup memory: which are, and what they take.
 
 use super::attempt::MAX_TRIPS;
-use super::compose::Fused;
+use super::compose::{Form, Fused};
 use super::listing::{Adapter, AdapterKind};
 use crate::error::{Error, Result};
 use crate::policy::Mlp;
@@ -9,6 +9,10 @@ use crate::policy::Mlp;
 /// Widest network that rollouts run themselves: beyond, its activations leave no room for a second
 /// workgroup, and its parameters do not stay in the caches.
 const FUSED_WIDTH: usize = 128;
+/// Largest batch that gives each trajectory a workgroup: a few workgroups per multiprocessor.
+const SMALL: u32 = 512;
+/// Largest batch that leaves a device with tiles of 64 trajectories mostly idle.
+const MEDIUM: u32 = 16_384;
 
 /// How rollouts run the network that drives them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,39 +26,105 @@ pub enum NetworkKernels {
     Chosen,
     /// A dispatch per layer and step, activations in storage.
     Layered,
-    /// The rollout kernel runs all layers of all steps, activations in workgroup memory.
+    /// The rollout kernel runs all layers of all steps, in the form that fits the size of the batch.
     Fused,
+    /// The same in one form for batches of any size.
+    Form(Form),
 }
 
-/// The layers of `network` if rollouts on `adapter` run them themselves.
-///
-/// # Errors
-/// [`Error::Device`] if that is asked for and not possible.
-pub(super) fn fused(
-    adapter: &Adapter,
-    network: Option<&Mlp>,
-    wanted: NetworkKernels,
-) -> Result<Option<Fused>> {
-    let Some(mlp) = network.filter(|_| wanted != NetworkKernels::Layered) else {
-        return Ok(None);
-    };
-    let fused = Fused::new(mlp);
-    let widest = mlp.widths().into_iter().max().unwrap_or(0);
-    let fits = widest <= FUSED_WIDTH
-        && fused.workgroup_bytes() <= u64::from(adapter.max_workgroup_bytes)
-        && fused.lanes() <= adapter.max_workgroup_threads
-        && step_trips(&fused, 2) <= MAX_TRIPS;
-    match wanted {
-        NetworkKernels::Fused if !fits => Err(Error::Device(format!(
-            "a network of {widest} neurons per layer does not fuse: at most {FUSED_WIDTH}, and \
-             {} bytes of workgroup memory, of which {} has {}; run it in layers",
-            fused.workgroup_bytes(),
-            adapter.name,
-            adapter.max_workgroup_bytes
-        ))),
-        NetworkKernels::Chosen if adapter.kind == AdapterKind::Software => Ok(None),
-        _ => Ok(fits.then_some(fused)),
+/// The forms in which rollouts run a network themselves, from small batches to large ones; none where it
+/// has a dispatch per layer.
+#[derive(Debug)]
+pub(super) struct Forms(Vec<Sized>);
+
+/// A form for batches up to a size.
+#[derive(Debug)]
+struct Sized {
+    /// Most columns of a chunk.
+    columns: u32,
+    fused: Fused,
+}
+
+impl Forms {
+    /// Those of `network` on `adapter`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if they are asked for and not possible.
+    pub(super) fn new(
+        adapter: &Adapter,
+        network: Option<&Mlp>,
+        wanted: NetworkKernels,
+    ) -> Result<Self> {
+        let layered = wanted == NetworkKernels::Layered
+            || (wanted == NetworkKernels::Chosen && adapter.kind == AdapterKind::Software);
+        let Some(mlp) = network.filter(|_| !layered) else { return Ok(Self(Vec::new())) };
+        let candidates = match wanted {
+            NetworkKernels::Form(form) => vec![(u32::MAX, vec![form])],
+            _ => candidates(),
+        };
+        let mut forms = Vec::new();
+        for (columns, choices) in candidates {
+            let mut possible = choices.into_iter().filter_map(|form| fitting(adapter, mlp, form));
+            forms.extend(possible.next().map(|fused| Sized { columns, fused }));
+        }
+        // Without a form for large batches, those for small ones are none.
+        let whole = forms.last().is_some_and(|last| last.columns == u32::MAX);
+        match (whole, wanted) {
+            (true, _) => Ok(Self(forms)),
+            (false, NetworkKernels::Chosen) => Ok(Self(Vec::new())),
+            (false, NetworkKernels::Form(form)) => Err(Error::Device(format!(
+                "a network of the widths {:?} does not have the form {form:?} on {}",
+                mlp.widths(),
+                adapter.name
+            ))),
+            (false, _) => Err(does_not_fuse(adapter, mlp)),
+        }
     }
+
+    /// The one for batches of `columns` columns.
+    pub(super) fn of(&self, columns: u32) -> Option<&Fused> {
+        self.0.iter().find(|sized| columns <= sized.columns).map(|sized| &sized.fused)
+    }
+
+    /// The one for large batches.
+    pub(super) fn largest(&self) -> Option<Fused> {
+        self.0.last().map(|sized| sized.fused.clone())
+    }
+}
+
+/// Forms by the largest batch that they are for, each with those that stand in where a network does not
+/// have it. The sizes lie between those at which texts of these forms by themselves were the fastest of
+/// many on an H200: 158, 4,096 and 65,536 trajectories.
+fn candidates() -> Vec<(u32, Vec<Form>)> {
+    let tiles = |trajectories, neurons, columns| Form::Tiles { trajectories, neurons, columns };
+    let rows = |trajectories| Form::Rows { trajectories };
+    let slices = |trajectories| Form::Slices { trajectories };
+    vec![
+        (SMALL, vec![rows(1), tiles(8, 4, 4)]),
+        (MEDIUM, vec![rows(8), tiles(16, 4, 4)]),
+        (u32::MAX, vec![slices(64), slices(32), tiles(64, 8, 8), tiles(32, 8, 8), tiles(16, 4, 4)]),
+    ]
+}
+
+/// `mlp` in a form, if its workgroups fit on `adapter`.
+fn fitting(adapter: &Adapter, mlp: &Mlp, form: Form) -> Option<Fused> {
+    let widest = mlp.widths().into_iter().max().unwrap_or(0);
+    Fused::new(mlp, form).filter(|fused| {
+        widest <= FUSED_WIDTH
+            && fused.workgroup_bytes() <= u64::from(adapter.max_workgroup_bytes)
+            && fused.lanes() <= adapter.max_workgroup_threads
+            && step_trips(fused, 2) <= MAX_TRIPS
+    })
+}
+
+/// Why `mlp` does not run inside of rollouts on `adapter`.
+fn does_not_fuse(adapter: &Adapter, mlp: &Mlp) -> Error {
+    let widest = mlp.widths().into_iter().max().unwrap_or(0);
+    Error::Device(format!(
+        "a network of {widest} neurons per layer does not fuse: at most {FUSED_WIDTH}, and {} has {} \
+         bytes of workgroup memory and {} threads in a workgroup; run it in layers",
+        adapter.name, adapter.max_workgroup_bytes, adapter.max_workgroup_threads
+    ))
 }
 
 /// Loop iterations of a thread for one step of `sides` trajectories that runs the network itself.
@@ -79,11 +149,18 @@ pub(super) mod tests {
         Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
     }
 
-    /// Whether a network of these widths is fused on hardware with `bytes` of workgroup memory.
-    fn fuses(widths: &[usize], bytes: u32, kind: AdapterKind, wanted: NetworkKernels) -> bool {
+    /// The forms of a network of these widths on an adapter with `bytes` of workgroup memory, each with
+    /// the largest batch that it is for.
+    fn forms(
+        widths: &[usize],
+        bytes: u32,
+        kind: AdapterKind,
+        wanted: NetworkKernels,
+    ) -> Vec<(u32, Form)> {
         let adapter = Adapter { kind, max_workgroup_bytes: bytes, ..Adapter::made_up(1 << 27) };
-        let fused = fused(&adapter, Some(&network(widths)), wanted);
-        fused.is_ok_and(|fused| fused.is_some())
+        let forms = Forms::new(&adapter, Some(&network(widths)), wanted);
+        let all = forms.map(|forms| forms.0).unwrap_or_default();
+        all.iter().map(|sized| (sized.columns, sized.fused.form())).collect()
     }
 
     #[test]
@@ -91,13 +168,38 @@ pub(super) mod tests {
         use AdapterKind::{Discrete, Software};
         use NetworkKernels::{Chosen, Layered};
         let (least, usual) = (16 << 10, 32 << 10);
+        let fuses =
+            |widths: &[usize], bytes, kind, wanted| !forms(widths, bytes, kind, wanted).is_empty();
         assert!(fuses(&[12, 64, 64, 64, 3], least, Discrete, Chosen));
-        assert!(!fuses(&[12, 128, 128, 3], least, Discrete, Chosen), "16 KiB hold 64 neurons");
         assert!(fuses(&[12, 128, 128, 3], usual, Discrete, Chosen));
         assert!(!fuses(&[12, 129, 3], 1 << 20, Discrete, Chosen), "too wide");
         assert!(!fuses(&[12, 129, 3], 1 << 20, Discrete, NetworkKernels::Fused), "too wide");
         assert!(!fuses(&[12, 64, 3], usual, Software, Chosen));
         assert!(fuses(&[12, 64, 3], usual, Software, NetworkKernels::Fused));
         assert!(!fuses(&[12, 64, 3], usual, Discrete, Layered));
+    }
+
+    #[test]
+    fn forms_follow_sizes_widths_and_memory() {
+        let chosen = |widths: &[usize], bytes| {
+            forms(widths, bytes, AdapterKind::Discrete, NetworkKernels::Chosen)
+        };
+        let tiles = |trajectories, neurons, columns| Form::Tiles { trajectories, neurons, columns };
+        let slices = |trajectories| Form::Slices { trajectories };
+        let rows = |trajectories| Form::Rows { trajectories };
+        let [small, medium, large] = [SMALL, MEDIUM, u32::MAX];
+        assert_eq!(
+            chosen(&[12, 64, 64, 64, 3], 32 << 10),
+            [(small, rows(1)), (medium, rows(8)), (large, slices(64))]
+        );
+        assert_eq!(
+            chosen(&[12, 128, 128, 128, 3], 32 << 10),
+            [(small, tiles(8, 4, 4)), (medium, tiles(16, 4, 4)), (large, slices(32))],
+            "too many weights to keep, too much memory for 64 trajectories"
+        );
+        assert_eq!(chosen(&[12, 64, 64, 3], 16 << 10)[2], (large, slices(32)));
+        assert_eq!(chosen(&[12, 64, 32, 3], 32 << 10)[2], (large, tiles(64, 8, 8)), "two widths");
+        assert_eq!(chosen(&[12, 16, 3], 32 << 10)[2], (large, tiles(64, 8, 8)), "narrow");
+        assert_eq!(chosen(&[3, 2], 32 << 10)[0], (small, tiles(8, 4, 4)), "no hidden layer");
     }
 }

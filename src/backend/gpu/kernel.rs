@@ -13,9 +13,19 @@ use crate::error::Result;
 /// Changes the text of a kernel before it is compiled.
 pub(super) type Edit = Arc<dyn Fn(&str) -> String + Send + Sync>;
 
+/// A kernel before it is compiled.
+pub(super) struct Composed {
+    pub(super) kernel: Kernel,
+    pub(super) bindings: Vec<(Slot, Access)>,
+    /// Columns of a workgroup.
+    pub(super) columns: u32,
+    pub(super) text: String,
+}
+
 /// A compiled kernel and what it binds.
 pub(super) struct Pipeline {
     kernel: Kernel,
+    columns: u32,
     layout: wgpu::BindGroupLayout,
     bindings: Vec<(Slot, Access)>,
     pipeline: wgpu::ComputePipeline,
@@ -41,20 +51,15 @@ impl Pipelines {
         Self { edit: Some(edit), ..Self::default() }
     }
 
-    /// The pipeline of `kernel` with the text `composed`, from the cache or built now.
+    /// The pipeline of a kernel, from the cache or built now.
     ///
     /// # Errors
     /// [`crate::Error::DeviceFailed`] if the driver refuses the text.
-    pub(super) fn pipeline(
-        &self,
-        device: &Device,
-        kernel: Kernel,
-        bindings: Vec<(Slot, Access)>,
-        composed: String,
-    ) -> Result<Arc<Pipeline>> {
+    pub(super) fn pipeline(&self, device: &Device, composed: Composed) -> Result<Arc<Pipeline>> {
+        let Composed { kernel, bindings, columns, text } = composed;
         let text = match &self.edit {
-            Some(edit) => edit(&composed),
-            None => composed,
+            Some(edit) => edit(&text),
+            None => text,
         };
         let key = (kernel, text);
         let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
@@ -64,7 +69,8 @@ impl Pipelines {
         device.counters.add(Count::Pipeline);
         let module = self.module(device, kernel, &key.1);
         let cache = self.cache.as_ref().map(PipelineCache::handle);
-        let pipeline = Arc::new(Pipeline::new(device, kernel, bindings, &module, cache));
+        let built_now = Pipeline::new(device, kernel, bindings, &module, cache);
+        let pipeline = Arc::new(Pipeline { columns, ..built_now });
         device.check()?;
         built.insert(key, Arc::clone(&pipeline));
         Ok(pipeline)
@@ -87,7 +93,10 @@ impl Pipelines {
         // threads; the cell of a map is bounded by the number of its cells, as an integer; a window
         // of blocks is as long as a segment, whose dispatches alone are narrowed, and counts have a
         // place for each workgroup; the recorded physics has neither loops nor indices that are not
-        // constant, and every loop of the hand-written kernels ends.
+        // constant, and every loop of the hand-written kernels ends; the loops of a generated network
+        // run over its layers and their inputs, its trajectories divide the padding of columns, its
+        // threads beyond a layer read its last neurons and write none, and slices end with the layer,
+        // behind the last of which comes the first slice of the first.
         unsafe {
             let checks = wgpu::ShaderRuntimeChecks::unchecked();
             device.device.create_shader_module_trusted(descriptor, checks)
@@ -127,7 +136,7 @@ impl Pipeline {
             },
             cache,
         });
-        Self { kernel, layout, bindings, pipeline }
+        Self { kernel, columns: kernel.workgroup(), layout, bindings, pipeline }
     }
 
     /// Binds the buffer that `buffer` names for each slot.
@@ -165,7 +174,7 @@ impl Bound {
 
     /// Columns of a workgroup.
     pub(super) fn columns(&self) -> u32 {
-        self.pipeline.kernel.workgroup()
+        self.pipeline.columns
     }
 
     /// Chooses the kernel, with the parameters at `offset`.

@@ -50,6 +50,7 @@ mod upload;
 mod workspace;
 
 pub use adapter::Gpu;
+pub use compose::Form;
 #[cfg(feature = "train")]
 pub(crate) use device::contained;
 pub use fault::Injection;

@@ -114,7 +114,7 @@ impl Chunk<'_> {
         };
         let PlanWorkspace { inputs, buffers, kernels, results, shape, .. } = space;
         let mut batch = Timed::default();
-        batch.dispatches.push_columns(Kernel::MppiStart, &kernels.start, &params);
+        batch.dispatches.push_columns(&kernels.start, &params);
         let mut room = |batch: &mut Timed<'_>, steps: u32| -> Result<()> {
             let full = batch.steps > 0 && batch.steps + steps > chunking.timely_steps;
             if full || batch.dispatches.len() >= DISPATCHES {
@@ -135,7 +135,7 @@ impl Chunk<'_> {
                 }
             }
             let params = params.over(step, steps);
-            batch.dispatches.push_columns(Kernel::MppiRollout, &kernels.rollout, &params);
+            batch.dispatches.push_columns(&kernels.rollout, &params);
         }
         for step in (0..settings.horizon).step_by(chunking.update_steps as usize) {
             let steps = chunking.update_steps.min(settings.horizon - step);

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::buffer::{Buffer, Pool, Use};
 use super::compose::{Kernel, layer_kernel};
 use super::device::Device;
-use super::kernel::{Pipeline, Pipelines};
+use super::kernel::{Composed, Pipeline, Pipelines};
 use super::mppi_source::PlanSource;
 use super::network::upload;
 use super::traffic::Count;
@@ -72,7 +72,9 @@ impl PlanCompiled {
             Some(mlp) => (kernel.bindings(false), layer_kernel(mlp, kernel)),
             None => (self.source.text.bindings(kernel), self.source.text.compose(kernel)),
         };
-        let pipeline = self.pipelines.pipeline(device, kernel, bindings, text)?;
+        let columns = kernel.workgroup();
+        let composed = Composed { kernel, bindings, columns, text };
+        let pipeline = self.pipelines.pipeline(device, composed)?;
         built.insert((kernel, network), Arc::clone(&pipeline));
         Ok(pipeline)
     }

@@ -4,7 +4,7 @@ use super::batch::Batch;
 use super::buffer::{Buffer, Pool, Use};
 use super::compose::{
     Kernel, LayerShape, TILE_PITCH, TILE_QUADS, WORKGROUP, input_quads, output_quads,
-    parameter_quads,
+    packed_by_inputs, parameter_quads,
 };
 use super::device::Device;
 use super::kernel::Bound;
@@ -52,10 +52,18 @@ fn packed(mlp: &Mlp) -> Vec<[f32; 4]> {
 
 /// The parameters of all layers of `mlp`, on the device.
 pub(super) fn upload(device: &Device, pool: &Pool, mlp: &Mlp) -> Buffer {
+    store(device, pool, &packed(mlp))
+}
+
+/// The same as rollouts that run the network themselves read them.
+pub(super) fn upload_fused(device: &Device, pool: &Pool, mlp: &Mlp) -> Buffer {
+    store(device, pool, &packed_by_inputs(mlp))
+}
+
+fn store(device: &Device, pool: &Pool, packed: &[[f32; 4]]) -> Buffer {
     device.counters.add(Count::Pack);
-    let packed = packed(mlp);
-    let buffer = pool.take(device, Use::Storage, size_of_val(&packed[..]) as u64);
-    buffer.write(device, &packed);
+    let buffer = pool.take(device, Use::Storage, size_of_val(packed) as u64);
+    buffer.write(device, packed);
     buffer
 }
 

@@ -6,7 +6,7 @@ use super::attempt::Attempt;
 use super::batch::Batch;
 use super::chain::ChainStep;
 use super::chunking::{Chunking, Work};
-use super::compose::{Kernel, Slot};
+use super::compose::Slot;
 use super::counting;
 use super::job::{Job, Request, Subject};
 use super::opened::Opened;
@@ -149,7 +149,7 @@ fn roll(job: &mut Job<'_>, chunk: Chunk<'_>, delivery: &mut Delivery<'_>) -> Res
     };
     let mut course = Course { params, chunking: *chunking, step: 0, set: 0 };
     let mut batch = Batch::default();
-    batch.push_columns(Kernel::Sample, &kernels[0].sample, &params);
+    batch.push_columns(&kernels[0].sample, &params);
     while course.step <= params.horizon && !delivery.has(first) {
         let begins = course.step == 0;
         for _ in 0..chunking.rounds {
@@ -225,7 +225,7 @@ impl Course {
         steps(batch, kernels, buffers, chunking, params, step..end);
         self.step = end;
         if let Some(compact) = kernels.after.as_ref().filter(|_| !self.ended()) {
-            batch.push_columns(Kernel::Compact, compact, &params);
+            batch.push_columns(compact, &params);
             self.set += 1;
         }
     }
@@ -248,7 +248,7 @@ fn steps<'a>(
         if step < params.horizon {
             kernels.drive(batch, buffers, columns, row, step);
         }
-        batch.push_columns(Kernel::ReachAvoid, &kernels.rollout, &params.over(step, count));
+        batch.push_columns(&kernels.rollout, &params.over(step, count));
         step += count;
     }
 }

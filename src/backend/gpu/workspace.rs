@@ -107,6 +107,7 @@ impl Workspace {
             inputs: &inputs,
             listed: listed.as_ref(),
             buffers: &buffers,
+            columns: chunking.stride,
         };
         let kernels = (0..sets).map(|set| binder.kernels(shape, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(chunking.stride);
@@ -244,7 +245,7 @@ impl Kernels {
     ) {
         if let Some(observe) = &self.observe {
             let params = Params { columns, stride: row, step, ..Params::default() };
-            batch.push_columns(Kernel::Observe, observe, &params);
+            batch.push_columns(observe, &params);
         }
         if let Some(layers) = &buffers.layers {
             layers.forward(batch, &self.layers, columns, row);
@@ -259,6 +260,8 @@ struct Binder<'a> {
     inputs: &'a Inputs,
     listed: Option<&'a Listed>,
     buffers: &'a Buffers,
+    /// Most columns of a chunk.
+    columns: u32,
 }
 
 impl Binder<'_> {
@@ -313,7 +316,7 @@ impl Binder<'_> {
 
     /// `kernel` with its buffers; `ends` are its source and its sink, where it has such.
     fn bind(&self, kernel: Kernel, set: usize, ends: Option<[&Buffer; 2]>) -> Result<Bound> {
-        let pipeline = self.compiled.pipeline(&self.flight.device, kernel)?;
+        let pipeline = self.compiled.pipeline(&self.flight.device, kernel, self.columns)?;
         let buffer = |slot| match (slot, ends) {
             (Slot::Source, Some([source, _])) => source,
             (Slot::Sink, Some([_, sink])) => sink,

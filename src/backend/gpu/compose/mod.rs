@@ -1,6 +1,7 @@
 //! The text of each kernel: constants, recorded formulas and the files of `shaders/`, concatenated.
 
 mod chain;
+mod fused;
 mod glue;
 mod kernels;
 mod layers;
@@ -12,10 +13,11 @@ mod plant;
 
 pub use chain::ChainText;
 pub(super) use chain::{AskShape, ChainSizes};
+pub(super) use fused::packed as packed_by_inputs;
+pub use fused::{Form, Fused};
 pub use kernels::{
     Access, COUNTED, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
 };
-pub use layers::Fused;
 pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;

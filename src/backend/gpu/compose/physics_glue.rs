@@ -1,7 +1,8 @@
 //! Recorded functions under the names and with the arguments that the kernels call them by.
 
+use super::fused::Fused;
 use super::kernels::Slot;
-use super::layers::{Activations, Fused};
+use super::layers::Activations;
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::policy::Mlp;
 

@@ -1,10 +1,11 @@
 //! The text of the kernels of measures, pairs and networks.
 
 use super::chain::ChainText;
+use super::fused::{Fused, fused_text};
 use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
 use super::kernels::{Access, COUNTED, Kernel, Slot};
-use super::layers::{Fused, activation_glue, fused_text, layer_text};
+use super::layers::layer_text;
 use super::narrowed::block_constants;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
@@ -27,6 +28,9 @@ const REDUCE: &str = include_str!("../../../../shaders/reduce.wgsl");
 const COUNT: &str = include_str!("../../../../shaders/count.wgsl");
 const COUNT_PAIRS: &str = include_str!("../../../../shaders/count_pairs.wgsl");
 const OBSERVE: &str = include_str!("../../../../shaders/observe.wgsl");
+
+/// `begin_drive` where a thread keeps nothing for its steps.
+const NOTHING_TO_BEGIN: &str = "fn begin_drive(lane: u32) {\n}\n";
 
 /// The texts of the kernels of a model and who drives it; values of parameters and weights are no
 /// part of them.
@@ -125,7 +129,15 @@ impl PlantText {
         list
     }
 
-    /// Threads of a workgroup of `kernel`, which has [`Kernel::workgroup`] trajectories.
+    /// Trajectories of a workgroup of `kernel`.
+    pub fn columns(&self, kernel: Kernel) -> u32 {
+        match (kernel, self.fused()) {
+            (Kernel::ReachAvoid | Kernel::Deviation, Some(fused)) => fused.trajectories(),
+            _ => kernel.workgroup(),
+        }
+    }
+
+    /// Threads of a workgroup of `kernel`, which has [`PlantText::columns`] trajectories.
     pub fn lanes(&self, kernel: Kernel) -> u32 {
         match (kernel, self.fused()) {
             (Kernel::ReachAvoid | Kernel::Deviation, Some(fused)) => fused.lanes(),
@@ -192,14 +204,18 @@ impl PlantText {
     /// What judges and drives a rollout.
     fn rollout(&self, kernel: Kernel) -> String {
         let lanes = format!(
-            "const LANES: u32 = {}u;\n// Whether `drive` is called by all threads together.\n\
-             const TOGETHER: bool = {};\n",
+            "const LANES: u32 = {}u;\nconst COLUMNS: u32 = {}u;\n\
+             // Whether `drive` is called by all threads together.\nconst TOGETHER: bool = {};\n",
             self.lanes(kernel),
+            self.columns(kernel),
             self.fused().is_some()
         );
         let states = self.outline.states;
         let moves = match &self.chain {
-            Some(_) => [store_glue(states), ChainText::rollout_glue(&self.outline)].concat(),
+            Some(_) => {
+                let glue = ChainText::rollout_glue(&self.outline);
+                [&store_glue(states), &glue, NOTHING_TO_BEGIN].concat()
+            }
             None => [state_glue(states), self.functions(kernel), self.drive()].join("\n"),
         };
         [FINITE, FOLD, &lanes, &finite_glue(states), &moves, JUDGE].join("\n")
@@ -277,11 +293,11 @@ impl PlantText {
             return "fn drive(lane: u32, column: u32, x: array<f32, NX>, t: u32) \
                     -> array<f32, NU> {\n    \
                     return control_of(x, t);\n}\n"
-                .to_owned();
+                .to_owned()
+                + NOTHING_TO_BEGIN;
         };
         if let Some(fused) = &driving.fused {
-            let glue = activation_glue(driving.inputs, driving.outputs);
-            return fused_text(driving.activations, fused, &glue);
+            return fused_text(driving.activations, fused, driving.outputs);
         }
         let slot = Slot::Control as u32;
         let mut text = format!(
@@ -293,7 +309,8 @@ impl PlantText {
             text += &format!("    let v{quad} = control[{quad}u * stride + column];\n");
         }
         let all: Vec<String> = (0..driving.outputs).map(component).collect();
-        text + &format!("    return acted(x, array<f32, SAID>({}), t);\n}}\n", all.join(", "))
+        text += &format!("    return acted(x, array<f32, SAID>({}), t);\n}}\n", all.join(", "));
+        text + NOTHING_TO_BEGIN
     }
 }
 
