@@ -144,7 +144,7 @@ fn a_certificate_of_another_plant_is_refused() {
     let record = certificate(&program(&backend, &plant), &settings);
     let wider = DoubleIntegrator { corridor: 2.0, ..DoubleIntegrator::default() };
     let other = program(&backend, &Plant::of(wider, BangBang { acceleration: 1.0 }));
-    let checked = check(&other, &record, &settings, &Unwatched);
+    let checked = check(&other, &record, &settings, 1, &Unwatched);
     assert!(matches!(checked, Err(Error::Refused(_))), "{checked:?}");
     let queried = query(&other, &record, &settings, (&[[0.0; 2]]).into());
     assert!(matches!(queried, Err(Error::Refused(_))), "{queried:?}");

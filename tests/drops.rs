@@ -197,7 +197,7 @@ fn the_certificate_is_the_same_on_threads_and_holds_when_checked() {
     let text = serde_json::to_string(&sealed).expect("JSON");
     let read = Record::read(&text).expect("a record");
     assert_eq!(read, sealed);
-    let found = check(&program, &read, &settings, &Unwatched).expect("a check");
+    let found = check(&program, &read, &settings, 1, &Unwatched).expect("a check");
     assert!(found.holds, "{:?}", found.findings);
     edited_counts_are_noticed(&program, &read, &settings);
 }

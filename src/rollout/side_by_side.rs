@@ -144,7 +144,11 @@ mod tests {
     fn side_by_side_has_the_bits_of_one_at_a_time() {
         let plant = Plant::under(&std::sync::Arc::new(Model::of(DroneRace::default())), network());
         let spec = RolloutSpec::new(30, 0.95).unwrap();
-        let tightening = Tightening { target: vec![0.1; 31], constraint: vec![0.2; 31] };
+        let tightening = Tightening {
+            target: vec![0.1; 31],
+            constraint: vec![0.2; 31],
+            ..Tightening::default()
+        };
         let coordinate = |pair: usize, i: usize| (1.3 * (pair * 12 + i) as f32).sin();
         let pairs: Vec<[Vec<f32>; 2]> = (0..GROUP - 3)
             .map(|pair| {

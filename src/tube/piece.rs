@@ -148,7 +148,7 @@ mod tests {
     use super::super::affine::Symbols;
     use super::super::evaluate::values;
     use super::*;
-    use crate::formula::record;
+    use crate::formula::{Expr, record};
     use crate::real::Real;
 
     /// A margin that is doubled again and again has more ways through it than could be walked.
@@ -164,9 +164,9 @@ mod tests {
     #[test]
     fn the_smallest_piece_is_the_formula() {
         let graph = record(3, |x| {
-            let two = Real::lit(2.0);
+            let two = Expr::lit(2.0);
             let inner = x[0].min(x[1] - x[2]).min(-x[2].abs());
-            vec![two * (inner - (x[0] * x[1]).max(x[2])) / Real::lit(-0.5) * Real::lit(-1.0)]
+            vec![two * (inner - (x[0] * x[1]).max(x[2])) / Expr::lit(-0.5) * Expr::lit(-1.0)]
         });
         let known = depends(&graph, 3);
         for i in 0..200 {
