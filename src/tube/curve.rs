@@ -169,10 +169,13 @@ fn bent(function: Function, x: Interval) -> Option<Interval> {
 mod tests {
     use super::*;
 
+    /// A function as the platform has it.
+    type Scalar = fn(f64) -> f64;
+
     /// Every function over many intervals: its line and its offset hold the sampled values.
     #[test]
     fn lines_hold_the_function() {
-        let mut curves: Vec<(Curve, fn(f64) -> f64)> = vec![
+        let mut curves: Vec<(Curve, Scalar)> = vec![
             (Curve::Root, f64::sqrt),
             (Curve::Reciprocal, f64::recip),
             (Curve::Whole(2), |x| x * x),
@@ -180,7 +183,7 @@ mod tests {
             (Curve::Whole(-2), |x| 1.0 / (x * x)),
             (Curve::Power(1.7), |x| x.powf(f64::from(1.7_f32))),
         ];
-        let applied: [(Function, fn(f64) -> f64); 10] = [
+        let applied: [(Function, Scalar); 10] = [
             (Function::Sin, f64::sin),
             (Function::Cos, f64::cos),
             (Function::Tan, f64::tan),
