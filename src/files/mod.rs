@@ -36,6 +36,8 @@ pub use list::{StateList, States};
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
 #[cfg(feature = "import")]
 pub(crate) use plain::ARCHIVE_BYTES;
+#[cfg(feature = "gpu")]
+pub(crate) use plain::is_denied;
 pub(crate) use plain::{CONFIG_BYTES, RECORD_BYTES, open, read, read_text};
 pub use states::StateReader;
 #[cfg(feature = "cli")]

@@ -60,6 +60,13 @@ pub(crate) fn read_text(path: &Path, most: u64) -> Result<String> {
     })
 }
 
+/// Whether this user may not open `device` for reading and writing; no word about one that is not there.
+#[cfg(feature = "gpu")]
+pub(crate) fn is_denied(device: &Path) -> bool {
+    let opened = File::options().read(true).write(true).open(device);
+    opened.is_err_and(|error| error.kind() == ErrorKind::PermissionDenied)
+}
+
 /// Makes the names in `folder` outlast a power cut, where the system can.
 pub(super) fn sync(folder: &Path) {
     if cfg!(unix) {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::drivers::{manifest_folders, names};
 use super::visible::Maker;
-use crate::files::{CONFIG_BYTES, read_text};
+use crate::files::{CONFIG_BYTES, is_denied, read_text};
 
 /// Variables that name the only descriptions of drivers that count; the first that is set wins.
 const CHOSEN_MANIFESTS: [&str; 2] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
@@ -178,9 +178,7 @@ impl<'a> Surroundings<'a> {
 
 /// Why a device cannot be used, if it cannot.
 fn refused(device: &Path) -> Option<String> {
-    let opened = std::fs::OpenOptions::new().read(true).write(true).open(device);
-    let denied = |e: &std::io::Error| e.kind() == std::io::ErrorKind::PermissionDenied;
-    opened.err().filter(denied).map(|_| {
+    is_denied(device).then(|| {
         "is there, but this user may not open it: become a member of the group that owns it \
          (render or video), or let the container have the device"
             .to_owned()
