@@ -267,7 +267,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let machine = Machine::with(&[LOADED, CARD, MANIFEST]);
         let device = machine.0.path().join("dev/nvidia0");
-        std::fs::set_permissions(&device, std::fs::Permissions::from_mode(0)).unwrap();
+        std::fs::set_permissions(&device, std::fs::Permissions::from_mode(0o000)).unwrap();
         // The superuser may open everything.
         if std::fs::File::open(&device).is_err() {
             let says = machine.says(&[]);
