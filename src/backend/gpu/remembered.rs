@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::cache::folder as cache_folder;
-use super::listing::{Adapter, AdapterKind, adapters, layer_folders, manifest_folders, names};
+use super::listing::{Adapter, adapters, layer_folders, manifest_folders, names};
 use crate::digest::sha256;
 use crate::files::{CONFIG_BYTES, Staged, read_text};
 
@@ -36,13 +36,6 @@ pub fn has_hardware() -> bool {
     match (key(), cache_folder()) {
         (Some(key), Some(folder)) => remembered(&folder, &key, ask),
         _ => ask(),
-    }
-}
-
-impl Adapter {
-    /// Whether it is a GPU and not a program.
-    pub fn is_hardware(&self) -> bool {
-        self.kind != AdapterKind::Software
     }
 }
 

@@ -72,6 +72,11 @@ impl Adapter {
         }
     }
 
+    /// Whether it is a GPU and not a program.
+    pub fn is_hardware(&self) -> bool {
+        self.kind != AdapterKind::Software
+    }
+
     pub(super) fn new(adapter: &wgpu::Adapter) -> Self {
         let info = adapter.get_info();
         let limits = adapter.limits();

@@ -1,6 +1,6 @@
 //! Which adapter to open, and what is said where it is not there.
 
-use super::adapter::{Adapter, AdapterKind};
+use super::adapter::Adapter;
 use super::pci::PciAddress;
 use crate::error::Result;
 
@@ -39,17 +39,16 @@ impl Choice {
     }
 
     /// The first adapter that fits, of those listed.
-    pub(super) fn among<T>(&self, listed: Vec<(Adapter, T)>) -> Option<(Adapter, T)> {
-        let mut listed = listed.into_iter();
+    pub(super) fn among<'a, T>(&self, listed: &'a [(Adapter, T)]) -> Option<&'a (Adapter, T)> {
         match self {
-            Self::Hardware => listed.find(|(adapter, _)| adapter.kind != AdapterKind::Software),
-            Self::Any => listed.next(),
+            Self::Hardware => listed.iter().find(|(adapter, _)| adapter.is_hardware()),
+            Self::Any => listed.first(),
             Self::Named(part) => {
                 let part = part.to_lowercase();
-                listed.find(|(adapter, _)| adapter.name.to_lowercase().contains(&part))
+                listed.iter().find(|(adapter, _)| adapter.name.to_lowercase().contains(&part))
             }
-            Self::Listed(place) => listed.nth(*place),
-            Self::Pci(place) => listed.find(|(adapter, _)| adapter.pci == Some(*place)),
+            Self::Listed(place) => listed.get(*place),
+            Self::Pci(place) => listed.iter().find(|(adapter, _)| adapter.pci == Some(*place)),
         }
     }
 
@@ -86,6 +85,7 @@ impl Choice {
 
 #[cfg(test)]
 mod tests {
+    use super::super::adapter::AdapterKind;
     use super::*;
 
     /// Two equal cards and a program.
@@ -102,6 +102,7 @@ mod tests {
 
     #[test]
     fn a_text_names_a_place_a_number_or_a_name() {
+        let all = listed();
         for (text, place) in [
             ("pci:0000:c1:00.0", Some(1)),
             ("pci:c1:00.0", Some(1)),
@@ -113,13 +114,13 @@ mod tests {
             ("5090", None),
         ] {
             let choice = Choice::parse(text).unwrap();
-            let chosen = choice.among(listed()).map(|(_, place)| place);
+            let chosen = choice.among(&all).map(|(_, place)| *place);
             assert_eq!(chosen, place, "{text}");
-            let adapters: Vec<Adapter> = listed().into_iter().map(|(adapter, _)| adapter).collect();
+            let adapters: Vec<Adapter> = all.iter().map(|(adapter, _)| adapter.clone()).collect();
             let refusal = choice.nothing_fits(&adapters);
             assert!(refusal.contains("1: RTX 4090") && refusal.contains("pci:0000:c1:00.0"));
         }
         assert!(Choice::parse("pci:here").is_err());
-        assert_eq!(Choice::Hardware.among(listed()).unwrap().1, 0);
+        assert_eq!(Choice::Hardware.among(&all).unwrap().1, 0);
     }
 }

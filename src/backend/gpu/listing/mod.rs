@@ -37,24 +37,14 @@ pub struct Listing {
 /// The adapters that this process may use, best first; empty where there is no driver. Cards that
 /// `CUDA_VISIBLE_DEVICES`, `HIP_VISIBLE_DEVICES` or `ROCR_VISIBLE_DEVICES` hide are left out.
 pub fn adapters() -> Vec<Adapter> {
-    found(&instance()).listed.into_iter().map(|(adapter, _)| adapter).collect()
+    found(&instance()).adapters()
 }
 
 /// The same with what is to be said of them.
 pub fn listing() -> Listing {
     let found = found(&instance());
-    let hardware = found.listed.iter().filter(|(adapter, _)| adapter.kind != AdapterKind::Software);
-    let makers: Vec<Maker> = hardware.map(|(_, handle)| maker(handle)).collect();
-    // What is hidden is there, so that no driver is missing.
-    let hidden = !found.notes.is_empty();
-    let diagnosis = if hidden || !cfg!(target_os = "linux") {
-        Vec::new()
-    } else {
-        Surroundings::of_process(Path::new(ROOT)).diagnosis(&makers)
-    };
-    let notes = found.notes.into_iter().chain(found.obstacle).collect();
-    let adapters = found.listed.into_iter().map(|(adapter, _)| adapter).collect();
-    Listing { adapters, notes, diagnosis }
+    let (adapters, diagnosis) = (found.adapters(), found.diagnosis());
+    Listing { adapters, notes: found.notes.into_iter().chain(found.obstacle).collect(), diagnosis }
 }
 
 /// Access to the drivers of this machine.
@@ -72,18 +62,16 @@ pub(super) fn instance() -> wgpu::Instance {
 /// [`Error::Device`] if there is none, and where the environment says which cards may be used in words
 /// that cannot be followed.
 pub(super) fn chosen(choice: &Choice) -> Result<(Adapter, wgpu::Adapter)> {
-    let Found { listed, notes, obstacle } = found(&instance());
-    if let (Some(problem), false) = (obstacle, matches!(choice, Choice::Pci(_))) {
+    let found = found(&instance());
+    if let (Some(problem), false) = (&found.obstacle, matches!(choice, Choice::Pci(_))) {
         let problem =
             format!("{problem}, or name the card by its place (--device pci:0000:01:00.0)");
         return Err(Error::Device(problem));
     }
-    let adapters: Vec<Adapter> = listed.iter().map(|(adapter, _)| adapter.clone()).collect();
-    choice.among(listed).ok_or_else(|| {
-        let mut problem = choice.nothing_fits(&adapters);
-        let more = if notes.is_empty() { listing().diagnosis } else { notes };
-        more.iter().for_each(|reason| problem += &format!("; {reason}"));
-        Error::Device(problem)
+    choice.among(&found.listed).cloned().ok_or_else(|| {
+        let reasons = found.notes.iter().cloned().chain(found.diagnosis());
+        let said = std::iter::once(choice.nothing_fits(&found.adapters())).chain(reasons);
+        Error::Device(said.collect::<Vec<String>>().join("; "))
     })
 }
 
@@ -105,6 +93,24 @@ struct Found {
     notes: Vec<String>,
     /// Why it cannot be followed.
     obstacle: Option<String>,
+}
+
+impl Found {
+    /// The adapters without their handles.
+    fn adapters(&self) -> Vec<Adapter> {
+        self.listed.iter().map(|(adapter, _)| adapter.clone()).collect()
+    }
+
+    /// Why cards whose devices are there are not listed; nothing where cards are hidden, whose drivers
+    /// are there.
+    fn diagnosis(&self) -> Vec<String> {
+        if !self.notes.is_empty() || !cfg!(target_os = "linux") {
+            return Vec::new();
+        }
+        let hardware = self.listed.iter().filter(|(adapter, _)| adapter.is_hardware());
+        let makers: Vec<Maker> = hardware.map(|(_, handle)| maker(handle)).collect();
+        Surroundings::of_process(Path::new(ROOT)).diagnosis(&makers)
+    }
 }
 
 /// Adapters that can run compute kernels and that the environment leaves to this process.

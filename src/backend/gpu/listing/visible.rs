@@ -113,7 +113,6 @@ fn cuda(cards: &[Card], assigned: &Assigned) -> Result<Vec<PciAddress>, String> 
         }
     }
     known.sort_by_key(|card| card.pci);
-    known.dedup_by_key(|card| card.pci);
     let alike = own.windows(2).all(|pair| pair[0].name == pair[1].name);
     let by_bus = assigned.cuda_order.as_deref() == Some("PCI_BUS_ID");
     let counted = asked.split(',').any(|entry| entry.trim().parse::<u32>().is_ok());
