@@ -2,6 +2,7 @@
 
 use super::section::Config;
 use crate::scenario::bound::CountRule;
+use crate::scenario::growth_plan::GrowthMethod;
 use crate::scenario::settings::Program;
 
 /// Counts by the simple bound what `config` does not give: the pairs of the deviation bound and the
@@ -33,7 +34,8 @@ fn pairs(config: &Config) -> Option<Program> {
 /// The claim of a round of growth.
 fn starts(config: &Config) -> Program {
     let asked = &config.growth;
-    let rounds = if asked.split_beta { f64::from(asked.rounds.max(1)) } else { 1.0 };
+    let splits = asked.split_beta && asked.method == GrowthMethod::Shrinking;
+    let rounds = if splits { f64::from(asked.rounds.max(1)) } else { 1.0 };
     Program { decision_vars: 1, epsilon: asked.epsilon, beta: asked.beta / rounds }
 }
 

@@ -8,6 +8,7 @@ use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
+use crate::scenario::growth_plan::{GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::studies::SystemSection;
@@ -110,6 +111,10 @@ pub(crate) fn common(
                 BoundarySearch::Rays
             },
             heading: Vec::new(),
+            method: if rigorous { GrowthMethod::Upward } else { GrowthMethod::Shrinking },
+            shape: GrowthShape::Ball,
+            factor: GrowthPlan::UPWARD.factor,
+            pilot: GrowthPlan::UPWARD.pilot,
         },
         study: None,
         train: None,

@@ -7,6 +7,7 @@ use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::model::text::NetworkFile;
 use crate::rollout::PairControl;
+use crate::scenario::growth_plan::{GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::studies::{StudySettings, SystemSection};
 use crate::train::settings::TrainSettings;
@@ -211,7 +212,7 @@ pub struct SliceAxisSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GrowthSection {
-    /// First radius.
+    /// The largest radius: the first when shrinking, the last upward.
     pub radius: f64,
     /// Rounds M.
     pub rounds: u32,
@@ -229,4 +230,26 @@ pub struct GrowthSection {
     pub boundary: BoundarySearch,
     /// States `[x, vx, y, vy]` of the slice search that prefers cells ahead; empty for none.
     pub heading: Vec<String>,
+    /// Which way radii go; what an older version stored shrinks.
+    #[serde(default)]
+    pub method: GrowthMethod,
+    /// What grows.
+    #[serde(default)]
+    pub shape: GrowthShape,
+    /// Upward: each radius over the one before it.
+    #[serde(default = "factor")]
+    pub factor: f64,
+    /// Starts of the pilot that fixes the axes of an ellipsoid or a box.
+    #[serde(default = "pilot")]
+    pub pilot: u64,
+}
+
+/// The factor of radii that nobody asked for.
+fn factor() -> f64 {
+    GrowthPlan::UPWARD.factor
+}
+
+/// The pilot that nobody asked for.
+fn pilot() -> u64 {
+    GrowthPlan::UPWARD.pilot
 }

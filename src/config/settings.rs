@@ -5,6 +5,7 @@ use super::section::{Config, SliceAxisSection};
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
+use crate::scenario::growth_plan::GrowthPlan;
 use crate::scenario::limits::{finite, positive, positive_f32};
 use crate::scenario::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings, SliceAxis,
@@ -114,6 +115,12 @@ impl Config {
             varies: self.varies(axes)?,
             boundary: asked.boundary,
             heading: self.heading(axes)?,
+            plan: GrowthPlan {
+                method: asked.method,
+                shape: asked.shape,
+                factor: asked.factor,
+                pilot: asked.pilot,
+            },
         };
         settings.check().map(|()| settings)
     }

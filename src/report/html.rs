@@ -1,6 +1,7 @@
 //! The page: verdict, statements, figures and numbers of a record.
 
 use super::figures;
+use super::growth;
 use super::palette;
 use super::shell::{self, HATCH, Scripts, items};
 use super::table;
@@ -158,7 +159,7 @@ fn numbers(record: &Record) -> String {
          {}</section>\n",
         table::claims(record),
         table::narrow(record),
-        table::wide(record),
+        table::wide(record) + &growth::upward(record),
         table::steps(record),
         shell::configuration(&record.provenance)
     )

@@ -8,6 +8,7 @@
 mod contour;
 pub(crate) mod figure;
 mod figures;
+mod growth;
 mod html;
 pub(crate) mod palette;
 pub(crate) mod plot;

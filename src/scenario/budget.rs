@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// The ledger of all claims; growth books every round it may take.
 pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
-    let rounds = f64::from(growth.rounds);
+    let rounds = f64::from(growth.booked_rounds());
     let global = settings.global.beta;
     let budget = settings.deviation.beta + 2.0 * global + rounds * growth.round_beta();
     let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
@@ -17,7 +17,8 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
         ("global", "conditional failure", global),
         ("global", "interval of the certified share", global),
     ];
-    let rounds = (0..growth.rounds).map(|round| ("growth", "round", round, growth.round_beta()));
+    let rounds =
+        (0..growth.booked_rounds()).map(|round| ("growth", "round", round, growth.round_beta()));
     let once = claims.into_iter().map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
     for (claim, purpose, round, beta) in once.chain(rounds) {
         let entry =

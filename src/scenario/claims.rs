@@ -77,6 +77,10 @@ fn broken_statement(deviation: &DeviationRecord) -> Option<String> {
 fn growth_statement(growth: &GrowthRecord) -> Option<String> {
     match growth.outcome {
         GrowthOutcome::Verified => None,
+        GrowthOutcome::Exhausted if growth.upward.is_some() => Some(
+            "Local growth is exhausted: the first of its radii was refused, nothing is verified."
+                .to_owned(),
+        ),
         GrowthOutcome::Exhausted => Some(format!(
             "Local growth is exhausted: each of {} rounds had a failure, no ball is verified.",
             growth.rounds.len()

@@ -96,6 +96,8 @@ impl GrowthSettings {
         sample_size("growth.scenarios", self.scenarios)?;
         share("growth.epsilon", self.epsilon)?;
         share("growth.beta", self.beta)?;
+        sample_size("growth.pilot", self.plan.pilot)?;
+        self.check_plan()?;
         if self.varies.contains(&true) {
             return Ok(());
         }
@@ -135,6 +137,7 @@ impl Settings {
 mod tests {
     use super::*;
     use crate::rollout::{PairControl, RolloutSpec};
+    use crate::scenario::growth_plan::GrowthPlan;
     use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint, SliceAxis};
 
     /// Sound settings of two states.
@@ -169,6 +172,7 @@ mod tests {
                 varies: vec![true, false],
                 boundary: BoundarySearch::Rays,
                 heading: None,
+                plan: GrowthPlan::SHRINKING,
             },
         }
     }

@@ -24,3 +24,11 @@ pub const CHECK: Purpose = Purpose::numbered(10);
 pub const CHECK_PERTURBATION: Purpose = Purpose::numbered(11);
 /// The rollouts drawn in a report.
 pub const PICTURE: Purpose = Purpose::numbered(12);
+/// Starts in the sets of local growth upward.
+pub const GROWTH_UPWARD: Purpose = Purpose::numbered(30);
+/// Starts of the pilot that fixes the axes of an ellipsoid or a box.
+pub const GROWTH_PILOT: Purpose = Purpose::numbered(31);
+/// Starts of a sequential claim.
+pub const SEQUENTIAL: Purpose = Purpose::numbered(32);
+/// Their perturbations.
+pub const SEQUENTIAL_PERTURBATION: Purpose = Purpose::numbered(33);

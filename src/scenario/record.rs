@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use super::claim::Claim;
+pub use super::growth_plan::UpwardRecord;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 /// The oldest version that is read. Its physics were hashed with parameters as literals, which no
 /// text of today gives again.
 pub const OLDEST_SCHEMA: u32 = 1;
@@ -279,7 +280,7 @@ pub struct GrowthRecord {
     /// Its distance from the state in the coordinates that vary.
     #[serde(with = "crate::files::number", default)]
     pub distance: Option<f64>,
-    /// Radius of the verified ball; 0 if none was.
+    /// Radius of the verified set; 0 if none was.
     #[serde(with = "crate::files::number")]
     pub radius: f64,
     /// Volume of the verified ball in the coordinates that vary.
@@ -293,6 +294,9 @@ pub struct GrowthRecord {
     pub claim: Option<Claim>,
     /// Some starts of the last round, at most 400, for the picture.
     pub samples: Vec<SampleRecord>,
+    /// What growth upward fixed beforehand; none of Algorithm 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upward: Option<UpwardRecord>,
 }
 
 /// What came of local growth.

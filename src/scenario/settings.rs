@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
+use super::growth_plan::GrowthPlan;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
@@ -96,7 +97,7 @@ pub enum BoundarySearch {
 /// Local growth, section 5 and Algorithm 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrowthSettings {
-    /// First radius, `r_max`.
+    /// The largest radius, `r_max`: the first of Algorithm 1, the last of growth upward.
     pub radius: f32,
     /// Rounds M.
     pub rounds: u32,
@@ -115,6 +116,8 @@ pub struct GrowthSettings {
     /// The two coordinates whose velocity says what is ahead, and their velocities: the slice
     /// search of the study prefers cells there. Indices `[x, vx, y, vy]`.
     pub heading: Option<[usize; 4]>,
+    /// Which way radii go, and what grows.
+    pub plan: GrowthPlan,
 }
 
 /// Everything that `certify` needs to know beside the plant and the backend.
@@ -247,6 +250,7 @@ impl Settings {
                 varies: vec![true; axes.len()],
                 boundary: BoundarySearch::Rays,
                 heading: None,
+                plan: GrowthPlan::SHRINKING,
             },
         })
     }

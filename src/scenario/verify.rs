@@ -11,15 +11,13 @@ use super::origin::{Hashes, hashes, provenance};
 use super::purpose;
 use super::record::{Record, SCHEMA, finite_margin};
 use super::settings::Settings;
-use super::tier::{Tier, tier, verified_ball};
+use super::tier::{Tier, tier, verified_set};
 use super::tightened::tightening;
 use super::{Context, Unwatched, Watch, compare, global};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
-use crate::rollout::{
-    Ball, Keep, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening,
-};
+use crate::rollout::{Keep, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening};
 
 /// Fresh starts that a verified ball is tried with.
 const FRESH_STARTS: u64 = 20_000;
@@ -171,8 +169,8 @@ pub fn check(
     ));
     let share = global::share_overlaps(&record.global, &fresh);
     findings.push(share);
-    if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
-        let failures = fresh_failures(context, settings, ball)?;
+    if let Some(set) = verified_set(&record.growth, settings.state.len()) {
+        let failures = fresh_failures(context, settings, set)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
         findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
     }
@@ -251,12 +249,12 @@ fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
 }
 
 /// Failures among fresh starts in the verified ball.
-fn fresh_failures(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
+fn fresh_failures(context: Context<'_>, settings: &Settings, region: Region) -> Result<u64> {
     context.watch.begin("fresh starts in the ball", FRESH_STARTS);
     let stream = Stream::new(settings.seed, purpose::CHECK, 1);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
-        starts: Starts::Drawn { region: Region::Ball(ball), stream },
+        starts: Starts::Drawn { region, stream },
         range: 0..FRESH_STARTS,
         spec: settings.spec,
         tightening: &tightening,
