@@ -140,7 +140,10 @@ fn no_round_costs_more_than_the_whole_sequence() {
         let found = radii(system, &single, call);
         any.iter_mut().zip(found).for_each(|(any, radius)| *any |= radius.is_some());
     }
-    assert!(violates("wedge, on after a refusal", any.into_iter().filter(|any| *any).count() as u64));
+    assert!(violates(
+        "wedge, on after a refusal",
+        any.into_iter().filter(|any| *any).count() as u64
+    ));
 }
 
 /// Sound radii below, one just above the claim, one farther on.

@@ -63,7 +63,8 @@ fn table(record: &Record) -> Vec<String> {
         "claim", "N", "failed", "d", "epsilon", "beta", "simple", "exact", "risk"
     )];
     let claims = [&record.deviation.claim, &record.global.claim];
-    rows.extend(claims.into_iter().chain(&record.growth.claim).map(row));
+    let sequential = record.sequential.iter().map(|asked| &asked.claim);
+    rows.extend(claims.into_iter().chain(&record.growth.claim).chain(sequential).map(row));
     rows
 }
 

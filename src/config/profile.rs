@@ -4,6 +4,7 @@ use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
 };
+use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
@@ -116,6 +117,7 @@ pub(crate) fn common(
             factor: GrowthPlan::UPWARD.factor,
             pilot: GrowthPlan::UPWARD.pilot,
         },
+        sequential: SequentialSection::default(),
         study: None,
         train: None,
         sources: Sources::default(),

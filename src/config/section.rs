@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
@@ -53,6 +54,9 @@ pub struct Config {
     pub state: StateSection,
     /// Local growth.
     pub growth: GrowthSection,
+    /// A claim whose starts are looked at one after the other.
+    #[serde(default)]
+    pub sequential: SequentialSection,
     /// The experiments of a study; only the plants of studies have them. Files call them by their first.
     #[serde(default, rename = "race", skip_serializing_if = "Option::is_none")]
     pub study: Option<StudySettings>,

@@ -65,6 +65,7 @@ impl Config {
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
+            sequential: self.sequential.settings()?,
         })
     }
 

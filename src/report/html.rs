@@ -3,6 +3,7 @@
 use super::figures;
 use super::growth;
 use super::palette;
+use super::sequential;
 use super::shell::{self, HATCH, Scripts, items};
 use super::table;
 use super::text::{escape, number, upper};
@@ -159,7 +160,7 @@ fn numbers(record: &Record) -> String {
          {}</section>\n",
         table::claims(record),
         table::narrow(record),
-        table::wide(record) + &growth::upward(record),
+        table::wide(record) + &growth::upward(record) + &sequential::sequential(record),
         table::steps(record),
         shell::configuration(&record.provenance)
     )

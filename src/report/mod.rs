@@ -13,6 +13,7 @@ mod html;
 pub(crate) mod palette;
 pub(crate) mod plot;
 pub(crate) mod scale;
+mod sequential;
 pub(crate) mod sheet;
 pub(crate) mod shell;
 mod slice;

@@ -40,8 +40,12 @@ pub(crate) fn pairs(title: &str, pairs: &[(&str, String)]) -> String {
 /// The claims side by side.
 pub(crate) fn claims(record: &Record) -> String {
     let growth = record.growth.claim.as_ref();
-    let claims: Vec<&Claim> =
-        [&record.deviation.claim, &record.global.claim].into_iter().chain(growth).collect();
+    let sequential = record.sequential.as_ref().map(|asked| &asked.claim);
+    let claims: Vec<&Claim> = [&record.deviation.claim, &record.global.claim]
+        .into_iter()
+        .chain(growth)
+        .chain(sequential)
+        .collect();
     let row = |name: &str, value: &dyn Fn(&Claim) -> String| {
         let values = claims.iter().map(|claim| value(claim));
         std::iter::once(name.to_owned()).chain(values).collect()

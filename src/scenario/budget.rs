@@ -11,7 +11,8 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let rounds = f64::from(growth.booked_rounds());
     let global = settings.global.beta;
     let budget = settings.deviation.beta + 2.0 * global + rounds * growth.round_beta();
-    let mut ledger = Ledger::new(budget.min(1.0 - f64::EPSILON))?;
+    let sequential = settings.sequential.map_or(0.0, |asked| asked.beta);
+    let mut ledger = Ledger::new((budget + sequential).min(1.0 - f64::EPSILON))?;
     let claims = [
         ("deviation", "bound", settings.deviation.beta),
         ("global", "conditional failure", global),
@@ -20,7 +21,8 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let rounds =
         (0..growth.booked_rounds()).map(|round| ("growth", "round", round, growth.round_beta()));
     let once = claims.into_iter().map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
-    for (claim, purpose, round, beta) in once.chain(rounds) {
+    let sequential = settings.sequential.map(|asked| ("sequential", "at any time", 0, asked.beta));
+    for (claim, purpose, round, beta) in once.chain(rounds).chain(sequential) {
         let entry =
             Entry { claim: claim.to_owned(), purpose: purpose.to_owned(), call: 0, round, beta };
         if let Spend::Refused { left } = ledger.spend(entry) {

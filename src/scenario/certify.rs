@@ -14,7 +14,7 @@ use super::record::{
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
-use super::{Context, Watch, boundary, claims, deviation, global, growth};
+use super::{Context, Watch, boundary, claims, deviation, global, growth, sequential};
 use crate::backend::Program;
 use crate::error::Result;
 use crate::model::Plant;
@@ -47,17 +47,20 @@ pub fn certify(
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
+    let sequential = sequential::record(context, settings, &tightening, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
-    let mut statements = claims::statements(settings, &deviation, &global, &growth);
+    let stepwise = sequential.as_ref();
+    let mut statements = claims::statements(settings, &deviation, &global, &growth, stepwise);
     statements.extend(claims::of_samples(plant, settings, &picture));
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + slice.check_margin.len() as u64
-        + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
+        + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>()
+        + stepwise.map_or(0, |asked| asked.draws);
     Ok(Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
-        holds: claims::holds(&deviation, &global, &growth),
+        holds: claims::holds(&deviation, &global, &growth, stepwise),
         statements,
         provenance: provenance(program, settings.seed, config),
         system: system_record(&plant.model, settings),
@@ -69,6 +72,7 @@ pub fn certify(
         state,
         slice,
         growth,
+        sequential,
         beta_total: ledger.total(),
         ledger: spendings(&ledger),
         picture,

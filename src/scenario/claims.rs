@@ -1,7 +1,9 @@
 //! What a record claims as a whole: whether all of it was obtained, and its sentences.
 
+use super::record::SequentialRecord;
 use super::record::{DeviationRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord};
 use super::sampling;
+use super::sequential_record::SequentialOutcome;
 use super::settings::Settings;
 use crate::model::Plant;
 use crate::rollout::{HUGE, StateList};
@@ -11,11 +13,13 @@ pub(super) fn holds(
     deviation: &DeviationRecord,
     global: &GlobalRecord,
     growth: &GrowthRecord,
+    sequential: Option<&SequentialRecord>,
 ) -> bool {
     deviation.non_finite == 0
         && global.accepted > 0
         && deviation.claim.epsilon.is_some_and(|asked| global.claim.certified_risk <= asked)
         && growth.outcome == GrowthOutcome::Verified
+        && sequential.is_none_or(|claim| claim.outcome == SequentialOutcome::Certified)
 }
 
 /// The claims in words.
@@ -24,12 +28,14 @@ pub(super) fn statements(
     deviation: &DeviationRecord,
     global: &GlobalRecord,
     growth: &GrowthRecord,
+    sequential: Option<&SequentialRecord>,
 ) -> Vec<String> {
     let claims = [Some(&deviation.claim), Some(&global.claim), growth.claim.as_ref()];
     let mut statements: Vec<String> =
         claims.iter().flatten().map(|claim| claim.statement.clone()).collect();
     statements.insert(2, share_statement(global, settings));
     statements.extend(growth_statement(growth));
+    statements.extend(sequential.map(|asked| asked.claim.statement.clone()));
     statements.extend(broken_statement(deviation));
     statements
 }

@@ -7,7 +7,7 @@ use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{deviation, global, growth};
+use super::{deviation, global, growth, sequential};
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::GENERATOR;
@@ -34,12 +34,15 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;
     record.global = global::derived(model, settings, &stored.global)?;
     record.growth = growth::derived(model, settings, &stored.growth)?;
+    record.sequential = sequential::derived(model, settings, stored.sequential.as_ref())?;
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);
-    record.statements = statements(settings, &record.deviation, &record.global, &record.growth);
+    let stepwise = record.sequential.as_ref();
+    record.holds = holds(&record.deviation, &record.global, &record.growth, stepwise);
+    record.statements =
+        statements(settings, &record.deviation, &record.global, &record.growth, stepwise);
     record.statements.extend(of_samples(plant, settings, &record.picture));
-    record.holds = holds(&record.deviation, &record.global, &record.growth);
     Ok(record)
 }
 

@@ -1,5 +1,6 @@
 //! What the numbers of settings may be, one rule for settings from a file and those made by hand.
 
+use super::sequential_record::SequentialSettings;
 use super::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings,
 };
@@ -7,6 +8,8 @@ use crate::error::{Error, Result};
 
 /// Most rollouts or pairs of a sample: a fast GPU's work of a day.
 const MOST_SAMPLES: u64 = 1_000_000_000_000;
+/// Most draws that are looked at one after the other: the evidence is summed anew after each start.
+const MOST_SEQUENTIAL: u64 = 100_000;
 /// Most rounds of growth: each has a random stream of its own.
 const MOST_ROUNDS: u32 = 10_000;
 
@@ -105,6 +108,23 @@ impl GrowthSettings {
     }
 }
 
+impl SequentialSettings {
+    /// Refuses numbers out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        share("sequential.epsilon", self.epsilon)?;
+        share("sequential.beta", self.beta)?;
+        if !(1..=MOST_SEQUENTIAL).contains(&self.most) {
+            let problem = format!("{} is not within 1..={MOST_SEQUENTIAL}", self.most);
+            return Err(Error::invalid("sequential.most", problem));
+        }
+        if !self.carried.is_finite() {
+            let problem = format!("{} is not a finite number", self.carried);
+            return Err(Error::invalid("sequential.carried", problem));
+        }
+        positive_f32("sequential.radius", self.radius.into()).map(drop)
+    }
+}
+
 impl Settings {
     /// Refuses numbers that no settings have, whoever made them: a horizon or discount out of range,
     /// a box or state that is not finite, a radius, risk, beta or count out of range.
@@ -129,6 +149,7 @@ impl Settings {
         self.constants.check()?;
         self.deviation.check()?;
         self.global.check()?;
+        self.sequential.iter().try_for_each(SequentialSettings::check)?;
         self.growth.check()
     }
 }
@@ -174,6 +195,7 @@ mod tests {
                 heading: None,
                 plan: GrowthPlan::SHRINKING,
             },
+            sequential: None,
         }
     }
 

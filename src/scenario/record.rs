@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::claim::Claim;
 pub use super::growth_plan::UpwardRecord;
+pub use super::sequential_record::SequentialRecord;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
@@ -65,6 +66,9 @@ pub struct Record {
     pub slice: SliceRecord,
     /// Local growth.
     pub growth: GrowthRecord,
+    /// The sequential claim, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequential: Option<SequentialRecord>,
     /// What of beta was spent on which claim.
     pub ledger: Vec<Spending>,
     /// Sum of the ledger: all claims hold together with confidence one minus this.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
 use super::growth_plan::GrowthPlan;
+use super::sequential_record::SequentialSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
@@ -144,6 +145,8 @@ pub struct Settings {
     pub state: Vec<f32>,
     /// Local growth.
     pub growth: GrowthSettings,
+    /// A claim whose starts are looked at one after the other, where one is asked for.
+    pub sequential: Option<SequentialSettings>,
 }
 
 /// Risk, beta and decision variables of each scenario program of a joint method.
@@ -252,6 +255,7 @@ impl Settings {
                 heading: None,
                 plan: GrowthPlan::SHRINKING,
             },
+            sequential: None,
         })
     }
 }

@@ -94,6 +94,7 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             heading: None,
             plan: GrowthPlan::SHRINKING,
         },
+        sequential: None,
     }
 }
 

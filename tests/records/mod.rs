@@ -178,6 +178,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
                 samples: samples.collect(),
                 upward: None,
             },
+            sequential: None,
             ledger: ledger(),
             beta_total: 4e-3,
             picture: PictureRecord { rollouts: rollouts.collect() },
