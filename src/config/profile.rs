@@ -76,6 +76,7 @@ pub(crate) fn common(
     Config {
         profile,
         seed: 1,
+        attempt: None,
         system,
         model: None,
         networks: Vec::new(),

@@ -26,6 +26,9 @@ pub struct Config {
     pub profile: Profile,
     /// Seed of every random stream.
     pub seed: u64,
+    /// Number of the attempt at these claims, from 1; none of a certificate that counts as the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attempt: Option<u32>,
     /// The system and its parameters, where it is one that the program carries.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemSection>,

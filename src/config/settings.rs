@@ -51,7 +51,7 @@ impl Config {
             Constant::Computed => Ok(None),
             Constant::Given(value) => positive(key, value).map(Some),
         };
-        Ok(Settings {
+        let settings = Settings {
             seed: self.seed,
             spec: self.checked_spec()?,
             low,
@@ -66,7 +66,9 @@ impl Config {
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
             sequential: self.sequential.settings()?,
-        })
+            attempt: None,
+        };
+        self.attempt.map_or(Ok(settings.clone()), |attempt| settings.as_attempt(attempt))
     }
 
     /// Lower and upper corner of the box.

@@ -114,6 +114,7 @@ fn limits(record: &Record) -> Vec<String> {
          horizon; not about the machine that the model stands for."
             .to_owned(),
     ];
+    limits.push(attempt(record));
     if !record.slice.check_margin.is_empty() {
         limits.push(
             "The picture of the slice is made of single rollouts. What lies between two cells was \
@@ -147,6 +148,22 @@ fn limits(record: &Record) -> Vec<String> {
         _ => {}
     }
     limits
+}
+
+/// What the certificate counts as among others of the same claims.
+fn attempt(record: &Record) -> String {
+    match &record.attempt {
+        None => "It counts as the only attempt at these claims. Whoever certifies again, with another seed or \
+                 changed settings, and shows the better one, draws anew: that is another attempt, and only \
+                 `--attempt 2` and on pay for it, on top of all of this one's beta."
+            .to_owned(),
+        Some(attempt) => format!(
+            "It is attempt {} at these claims and books {} of each beta that was asked for; all numbered \
+             attempts together book no more than that beta, a first one without a number as much again.",
+            attempt.number,
+            upper(attempt.share)
+        ),
+    }
 }
 
 fn numbers(record: &Record) -> String {

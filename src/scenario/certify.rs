@@ -73,6 +73,7 @@ pub fn certify(
         slice,
         growth,
         sequential,
+        attempt: settings.attempt_record(),
         beta_total: ledger.total(),
         ledger: spendings(&ledger),
         picture,

@@ -35,6 +35,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.global = global::derived(model, settings, &stored.global)?;
     record.growth = growth::derived(model, settings, &stored.growth)?;
     record.sequential = sequential::derived(model, settings, stored.sequential.as_ref())?;
+    record.attempt = settings.attempt_record();
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);

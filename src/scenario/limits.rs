@@ -196,6 +196,7 @@ mod tests {
                 plan: GrowthPlan::SHRINKING,
             },
             sequential: None,
+            attempt: None,
         }
     }
 

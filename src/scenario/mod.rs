@@ -1,5 +1,6 @@
 //! Certificates: what scenarios, drawn and rolled out, allow one to claim.
 
+mod attempt;
 pub mod bound;
 pub mod boundary;
 mod budget;
@@ -37,6 +38,7 @@ pub mod tier;
 mod tightened;
 mod verify;
 
+pub use attempt::{AttemptRecord, attempt_share};
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
 #[cfg(feature = "cli")]

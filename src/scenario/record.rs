@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use super::attempt::AttemptRecord;
 pub use super::claim::Claim;
 pub use super::growth_plan::UpwardRecord;
 pub use super::sequential_record::SequentialRecord;
@@ -69,6 +70,9 @@ pub struct Record {
     /// The sequential claim, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequential: Option<SequentialRecord>,
+    /// The numbered attempt; none of a certificate that counts as the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attempt: Option<AttemptRecord>,
     /// What of beta was spent on which claim.
     pub ledger: Vec<Spending>,
     /// Sum of the ledger: all claims hold together with confidence one minus this.

@@ -147,6 +147,9 @@ pub struct Settings {
     pub growth: GrowthSettings,
     /// A claim whose starts are looked at one after the other, where one is asked for.
     pub sequential: Option<SequentialSettings>,
+    /// Number of the attempt that the betas are booked for; none of a certificate that counts as the only
+    /// one. Set by [`Settings::as_attempt`].
+    pub attempt: Option<u32>,
 }
 
 /// Risk, beta and decision variables of each scenario program of a joint method.
@@ -256,6 +259,7 @@ impl Settings {
                 plan: GrowthPlan::SHRINKING,
             },
             sequential: None,
+            attempt: None,
         })
     }
 }

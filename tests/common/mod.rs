@@ -95,6 +95,7 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             plan: GrowthPlan::SHRINKING,
         },
         sequential: None,
+        attempt: None,
     }
 }
 

@@ -179,6 +179,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
                 upward: None,
             },
             sequential: None,
+            attempt: None,
             ledger: ledger(),
             beta_total: 4e-3,
             picture: PictureRecord { rollouts: rollouts.collect() },
