@@ -5,6 +5,7 @@ use super::section::{Config, SliceAxisSection};
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
+use crate::scenario::Keys;
 use crate::scenario::growth_plan::GrowthPlan;
 use crate::scenario::limits::{finite, positive, positive_f32};
 use crate::scenario::settings::{
@@ -67,6 +68,7 @@ impl Config {
             growth: self.growth_settings(axes)?,
             sequential: self.sequential.settings()?,
             attempt: None,
+            keys: Keys::Claim,
         };
         self.attempt.map_or(Ok(settings.clone()), |attempt| settings.as_attempt(attempt))
     }

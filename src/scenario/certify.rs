@@ -8,8 +8,8 @@ use super::fit::check_sizes;
 use super::origin::{provenance, system_record};
 use super::purpose;
 use super::record::{
-    GrowthRecord, PictureRecord, Record, RolloutRecord, SCHEMA, StateRecord, Timing, decimal,
-    finite_margin,
+    GrowthRecord, PictureRecord, Provenance, Record, RolloutRecord, SCHEMA, StateRecord, Timing,
+    decimal, finite_margin,
 };
 use super::settings::Settings;
 use super::tier::tier;
@@ -38,6 +38,7 @@ pub fn certify(
     let begun = Instant::now();
     let context = Context { program, watch };
     let (plant, backend) = (program.plant(), program.backend());
+    let settings = &settings.keyed(plant);
     check_sizes(settings, &plant.model)?;
     check_settings(settings)?;
     let ledger = ledger(settings)?;
@@ -62,7 +63,10 @@ pub fn certify(
         digests: BTreeMap::new(),
         holds: claims::holds(&deviation, &global, &growth, stepwise),
         statements,
-        provenance: provenance(program, settings.seed, config),
+        provenance: Provenance {
+            generator: settings.keys.generator().to_owned(),
+            ..provenance(program, settings.seed, config)
+        },
         system: system_record(&plant.model, settings),
         horizon: settings.spec.horizon,
         gamma: decimal(settings.spec.gamma),

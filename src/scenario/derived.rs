@@ -10,7 +10,6 @@ use super::tier::tier;
 use super::{deviation, global, growth, sequential};
 use crate::error::Result;
 use crate::model::{Model, Plant};
-use crate::rollout::GENERATOR;
 
 /// `stored` with everything that follows from `settings` and its own counts computed again: claims,
 /// intervals, constants, the ledger, margins of the states, words. What rollouts came to is taken
@@ -24,7 +23,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.horizon = settings.spec.horizon;
     record.gamma = decimal(settings.spec.gamma);
     record.provenance.seed = settings.seed;
-    record.provenance.generator = GENERATOR.to_owned();
+    record.provenance.generator = settings.keys.generator().to_owned();
     record.provenance.policy = plant.controller.name.clone();
     let Hashes { physics_sha256, policy_sha256 } = hashes(plant);
     record.provenance.physics_sha256 = physics_sha256;

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::{
     DeviationTask, Keep, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, StateList, States, Stream, Tightening, replay,
+    RolloutSpec, Starts, StateList, States, Tightening, replay,
 };
 
 /// Pairs that are run in f32 and f64 to measure the f32 error.
@@ -112,7 +112,7 @@ pub fn conditional(
 ) -> Result<GlobalRecord> {
     let draws = settings.global.draws;
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
+    let [nominal, perturbation] = purposes.map(|purpose| settings.stream(purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Drawn { region, stream: nominal },
@@ -247,7 +247,7 @@ fn band_of(f32_error: f64) -> f64 {
 /// on pairs drawn from the box.
 pub fn band(context: Context<'_>, settings: &Settings, tightening: &Tightening) -> Result<f64> {
     let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
+    let [nominal, perturbation] = purposes.map(|purpose| settings.stream(purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Drawn {

@@ -13,7 +13,7 @@ use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecor
 use super::settings::{GrowthSettings, Settings};
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::rollout::{Ball, Stream};
+use crate::rollout::Ball;
 
 /// Outcome of the growth.
 ///
@@ -82,7 +82,7 @@ pub fn grow(
     let mut samples = Vec::new();
     context.watch.begin("local growth", asked.scenarios * u64::from(asked.rounds));
     for number in 0..asked.rounds {
-        let stream = Stream::new(settings.seed, purpose::GROWTH, call * asked.rounds + number);
+        let stream = settings.stream(purpose::GROWTH, call * asked.rounds + number);
         let family = Family::balls(ball.center.clone(), &ball.varies);
         let drawn = Drawn::pictured(stream, asked.scenarios);
         let round = round(context, settings, &family, ball.radius, drawn, band)?;

@@ -8,7 +8,6 @@ use super::purpose;
 use super::record::{RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
 use crate::error::{Error, Result};
-use crate::rollout::Stream;
 
 /// The least share of the largest weight that a coordinate has: the pilot sees no more in few failures.
 const LEAST_WEIGHT: f64 = 0.1;
@@ -87,7 +86,7 @@ pub(super) fn climb(
     context.watch.begin("local growth", asked.scenarios * u64::from(asked.rounds));
     let mut climb = Climb { verified: None, rounds: Vec::new(), samples: Vec::new() };
     for (number, radius) in (0..).zip(asked.radii()) {
-        let stream = Stream::new(settings.seed, purpose::GROWTH_UPWARD, number);
+        let stream = settings.stream(purpose::GROWTH_UPWARD, number);
         let drawn = Drawn::pictured(stream, asked.scenarios);
         let Round { record, samples } = round(context, settings, family, radius, drawn, band)?;
         let accepted = record.failures <= allowed;
@@ -134,7 +133,7 @@ pub(super) fn fixed(
     if fixed.shape != GrowthShape::Ball {
         let pilot = asked.plan.pilot;
         context.watch.begin("pilot of local growth", pilot);
-        let stream = Stream::new(settings.seed, purpose::GROWTH_PILOT, 0);
+        let stream = settings.stream(purpose::GROWTH_PILOT, 0);
         let drawn = Drawn { stream, count: pilot, kept: pilot };
         let seen = round(context, settings, &balls, asked.radius, drawn, band)?;
         fixed.widths = widths(&seen.samples, &balls);

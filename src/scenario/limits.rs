@@ -158,6 +158,7 @@ impl Settings {
 mod tests {
     use super::*;
     use crate::rollout::{PairControl, RolloutSpec};
+    use crate::scenario::Keys;
     use crate::scenario::growth_plan::GrowthPlan;
     use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint, SliceAxis};
 
@@ -197,6 +198,7 @@ mod tests {
             },
             sequential: None,
             attempt: None,
+            keys: Keys::Seed,
         }
     }
 

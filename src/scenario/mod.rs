@@ -21,6 +21,7 @@ pub mod growth_batch;
 pub mod growth_plan;
 mod growth_set;
 mod growth_upward;
+mod keys;
 pub mod ledger;
 pub(crate) mod limits;
 pub mod linear;
@@ -41,6 +42,7 @@ mod verify;
 pub use attempt::{AttemptRecord, attempt_share};
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
+pub use keys::Keys;
 #[cfg(feature = "cli")]
 pub(crate) use origin::provenance;
 pub use origin::{Hashes, hashes};

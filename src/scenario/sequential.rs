@@ -15,7 +15,7 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::model::Model;
 use crate::rollout::{
-    Ball, DeviationTask, Pairs, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
+    Ball, DeviationTask, Pairs, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
 };
 
 /// Draws of the first batch; each next one has twice as many.
@@ -133,7 +133,7 @@ fn of_set(
     tightening: &Tightening,
     band: f64,
 ) -> Result<Vec<Option<bool>>> {
-    let stream = |purpose| Stream::new(settings.seed, purpose, 0);
+    let stream = |purpose| settings.stream(purpose, 0);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let task = DeviationTask {
         pairs: Pairs {
@@ -172,7 +172,7 @@ fn of_region(
     range: Range<u64>,
     band: f64,
 ) -> Result<Vec<Option<bool>>> {
-    let stream = Stream::new(settings.seed, purpose::SEQUENTIAL, 1);
+    let stream = settings.stream(purpose::SEQUENTIAL, 1);
     let none = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region: region(settings, asked)?, stream },

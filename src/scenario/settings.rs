@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
 use super::growth_plan::GrowthPlan;
+use super::keys::Keys;
 use super::sequential_record::SequentialSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -150,6 +151,8 @@ pub struct Settings {
     /// Number of the attempt that the betas are booked for; none of a certificate that counts as the only
     /// one. Set by [`Settings::as_attempt`].
     pub attempt: Option<u32>,
+    /// Where the key of the streams that claims rest on comes from.
+    pub keys: Keys,
 }
 
 /// Risk, beta and decision variables of each scenario program of a joint method.
@@ -260,6 +263,7 @@ impl Settings {
             },
             sequential: None,
             attempt: None,
+            keys: Keys::Claim,
         })
     }
 }

@@ -7,9 +7,10 @@ use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
+use super::keys::Keys;
 use super::origin::{Hashes, hashes, provenance};
 use super::purpose;
-use super::record::{Record, SCHEMA, finite_margin};
+use super::record::{Provenance, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier, verified_set};
 use super::tightened::tightening;
@@ -95,7 +96,8 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
 fn check_derived(program: &Program<'_>, record: &Record, settings: &Settings) -> Result<()> {
     let mut again = derived(program.plant(), settings, record)?;
     let here = provenance(program, settings.seed, record.provenance.config.clone());
-    again.provenance = here;
+    let generator = settings.keys.generator().to_owned();
+    again.provenance = Provenance { generator, ..here };
     let finding = compare::fields(record, &again);
     if finding.holds {
         return Ok(());
@@ -116,6 +118,7 @@ pub fn query(
     states: States<'_>,
 ) -> Result<Vec<QueryRow>> {
     let plant = program.plant();
+    let settings = &with_keys_of(record, settings);
     check_identity(plant, record)?;
     check_sizes(settings, &plant.model)?;
     check_derived(program, record, settings)?;
@@ -153,6 +156,7 @@ pub fn check(
     watch: &dyn Watch,
 ) -> Result<CheckReport> {
     check_identity(program.plant(), record)?;
+    let settings = &with_keys_of(record, settings);
     let again = certify(program, settings, record.provenance.config.clone(), watch)?;
     let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
@@ -175,6 +179,11 @@ pub fn check(
         findings.push(refuted("failures in the verified ball", risk, failures, FRESH_STARTS));
     }
     Ok(CheckReport::new(findings))
+}
+
+/// `settings` with the keys that `record` was made with.
+fn with_keys_of(record: &Record, settings: &Settings) -> Settings {
+    Settings { keys: Keys::of(&record.provenance.generator), ..settings.clone() }
 }
 
 /// Compares the stored record with the one computed again from its seed.

@@ -10,6 +10,7 @@ use reachcast::policy::Mlp;
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{PairControl, RolloutSpec};
+use reachcast::scenario::Keys;
 use reachcast::scenario::growth_plan::GrowthPlan;
 use reachcast::scenario::settings::{
     BoundarySearch, ConstantSettings, DeviationSettings, DeviationSource, GlobalSettings,
@@ -96,6 +97,7 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
         },
         sequential: None,
         attempt: None,
+        keys: Keys::Seed,
     }
 }
 
