@@ -19,7 +19,7 @@ pub enum SequentialOf {
     Ball,
 }
 
-/// A claim whose starts are looked at one after the other, `docs/method.md` section 11.
+/// A claim whose starts are looked at one after the other, `docs/method.md` section 8.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SequentialSettings {
     /// Whose starts.
