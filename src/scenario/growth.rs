@@ -178,7 +178,13 @@ fn derived_upward(
     }
     let radius = verified_by(asked, &record.rounds, allowed);
     let radii = asked.radii().into_iter().map(decimal).collect();
-    let upward = UpwardRecord { allowed, radii, shape: asked.plan.shape, ..stored };
+    let mut upward = UpwardRecord { allowed, radii, shape: asked.plan.shape, ..stored };
+    if upward.shape == GrowthShape::Ball {
+        upward.widths = Family::balls(Vec::new(), &asked.varies).widths;
+        (upward.pilot, upward.pilot_failures) = (0, 0);
+    } else {
+        upward.pilot = asked.plan.pilot;
+    }
     conclude_upward(&mut record, model, settings, upward, radius)?;
     Ok(record)
 }

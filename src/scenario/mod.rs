@@ -21,6 +21,7 @@ pub mod growth_batch;
 pub mod growth_plan;
 mod growth_set;
 mod growth_upward;
+mod key_source;
 mod keys;
 pub mod ledger;
 pub(crate) mod limits;
@@ -42,7 +43,7 @@ mod verify;
 pub use attempt::{AttemptRecord, attempt_share};
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
-pub use keys::Keys;
+pub use key_source::Keys;
 #[cfg(feature = "cli")]
 pub(crate) use origin::provenance;
 pub use origin::{Hashes, hashes};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bound::CountRule;
 use super::growth_plan::GrowthPlan;
-use super::keys::Keys;
+use super::key_source::Keys;
 use super::sequential_record::SequentialSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;

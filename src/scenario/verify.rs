@@ -7,7 +7,7 @@ use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
-use super::keys::Keys;
+use super::key_source::Keys;
 use super::origin::{Hashes, hashes, provenance};
 use super::purpose;
 use super::record::{Provenance, Record, SCHEMA, finite_margin};
