@@ -280,6 +280,7 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
     // The failures that were allowed, not those that were seen: which round is the last depends on these.
     let allowed = record.upward.as_ref().map_or(0, |upward| upward.allowed);
     let set = set_words(record);
+    let norm = if set.starts_with("ball") { "Euclidean " } else { "" };
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(
@@ -291,7 +292,7 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
             spent_words(asked, allowed)
         ),
         measure: format!(
-            "start uniform in the {set} in {}",
+            "start uniform in the {norm}{set} in {}",
             match dimension {
                 all if all == states => format!("all {states} coordinates"),
                 some => format!(
@@ -317,9 +318,9 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
 fn set_words(record: &GrowthRecord) -> String {
     match &record.upward {
         // As published, with four digits.
-        None => format!("Euclidean ball of radius {:.4}", record.radius),
+        None => format!("ball of radius {:.4}", record.radius),
         Some(upward) => match upward.shape {
-            GrowthShape::Ball => format!("Euclidean ball of radius {}", record.radius),
+            GrowthShape::Ball => format!("ball of radius {}", record.radius),
             other => format!(
                 "{} of radius {} (of equal volume or mean side)",
                 other.name(),
