@@ -6,8 +6,8 @@ const REGION_BALL: u32 = 1u;
 const NORMAL_PAIRS: u32 = (NX + 1u) / 2u;
 const BLOCK_WORDS: u32 = 4u;
 
-// One per coordinate: (low, high - low, -) of a box, (centre, radius, varies) of a ball. Else the
-// listed starts of the columns, see `listed_start`.
+// One per coordinate: (low, high - low, -) of a box, (centre, half axis, varies) of a ball or an
+// ellipsoid. Else the listed starts of the columns, see `listed_start`.
 @group(0) @binding(1) var<storage, read> region: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> state: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> folds: array<Fold>;

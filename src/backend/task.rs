@@ -25,6 +25,7 @@ pub(super) fn check_task(
         let [one, other] = match region {
             Region::Box { low, high } => [low.len(), high.len()],
             Region::Ball(ball) => [ball.center.len(), ball.varies.len()],
+            Region::Ellipsoid(set) => [set.center.len(), set.half_axes.len()],
         };
         if one != other {
             let problem = format!("sides of {one} and {other} coordinates");

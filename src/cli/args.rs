@@ -72,6 +72,15 @@ Examples:
         out: Option<PathBuf>,
         #[command(flatten)]
         replace: Replace,
+        /// Also look at starts one after the other until their risk is shown: of the certified set, of the
+        /// box, or of a ball around the state (section [sequential])
+        #[arg(long, value_name = "OF", num_args = 0..=1, default_missing_value = "set",
+              value_parser = ["set", "box", "ball"], require_equals = true)]
+        sequential: Option<String>,
+        /// Number of this attempt at the same claims: it books beta times 6 / (pi^2 K^2), and scenarios that
+        /// are not given follow. Beside an earlier certificate without a number, the second attempt is 2
+        #[arg(long, value_name = "K")]
+        attempt: Option<u32>,
         #[command(flatten, next_help_heading = "Configuration")]
         changes: Changes,
     },
@@ -210,8 +219,14 @@ impl Command {
         let own =
             |changes, out: &Option<PathBuf>, replace| Own { changes, out: out.clone(), replace };
         match self {
-            Self::Certify { changes, out, replace, .. }
-            | Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
+            Self::Certify { changes, out, replace, sequential, attempt, .. } => {
+                let mut changes = changes.clone();
+                let of = sequential.iter().map(|of| format!("sequential.of={of}"));
+                changes.keys.set.extend(of);
+                changes.keys.set.extend(attempt.map(|number| format!("attempt={number}")));
+                own(changes, out, *replace)
+            }
+            Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
             Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
             Self::Falsify(asked) => own(asked.changes.clone(), &asked.out, asked.replace),

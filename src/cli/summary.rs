@@ -104,6 +104,12 @@ fn growth(record: &Record) -> String {
     let growth = &record.growth;
     let rounds = growth.rounds.len();
     match growth.outcome {
+        GrowthOutcome::Verified if growth.upward.is_some() => {
+            format!("verified radius {} in {rounds} rounds upward", growth.radius)
+        }
+        GrowthOutcome::Exhausted if growth.upward.is_some() => {
+            "exhausted: the first radius was refused".to_owned()
+        }
         GrowthOutcome::Verified => {
             format!("verified a ball of radius {} in round {rounds}", lower(growth.radius))
         }

@@ -1,7 +1,9 @@
 //! Scenario counts that nobody gave: they follow from the claim that is asked for.
 
 use super::section::Config;
+use crate::scenario::attempt_share;
 use crate::scenario::bound::CountRule;
+use crate::scenario::growth_plan::GrowthMethod;
 use crate::scenario::settings::Program;
 
 /// Counts by the simple bound what `config` does not give: the pairs of the deviation bound and the
@@ -26,15 +28,18 @@ pub(super) fn follow(config: &mut Config, deviation: Option<Config>, growth: Opt
 
 /// The claim of the deviation bound; none out of range.
 fn pairs(config: &Config) -> Option<Program> {
-    let settings = config.deviation_settings().ok()?;
+    let mut settings = config.deviation_settings().ok()?;
+    settings.beta *= config.attempt.map_or(1.0, attempt_share);
     Some(Program::new(&settings, config.rollout.horizon))
 }
 
 /// The claim of a round of growth.
 fn starts(config: &Config) -> Program {
     let asked = &config.growth;
-    let rounds = if asked.split_beta { f64::from(asked.rounds.max(1)) } else { 1.0 };
-    Program { decision_vars: 1, epsilon: asked.epsilon, beta: asked.beta / rounds }
+    let share = config.attempt.map_or(1.0, attempt_share);
+    let splits = asked.split_beta && asked.method == GrowthMethod::Shrinking;
+    let rounds = if splits { f64::from(asked.rounds.max(1)) } else { 1.0 };
+    Program { decision_vars: 1, epsilon: asked.epsilon, beta: share * asked.beta / rounds }
 }
 
 /// The scenarios that a claim needs; none if there is no such number.

@@ -73,6 +73,7 @@ pub(super) fn overlay(base: &mut Table, over: Table) {
 /// The keys of `defaults` and those that have no default.
 pub(super) fn with_optional(defaults: &Table) -> Table {
     let mut valid = defaults.clone();
+    valid.insert("attempt".to_owned(), Value::Integer(1));
     // Of a model, the description knows which keys its policy has.
     if !defaults.contains_key("model") {
         let policy = ["file", "formula"].map(|key| (key.to_owned(), Value::String(String::new())));

@@ -12,6 +12,7 @@ mod open;
 mod plant;
 pub(crate) mod profile;
 mod section;
+mod sequential;
 mod settings;
 mod sources;
 #[cfg(test)]
@@ -29,6 +30,7 @@ pub use section::{
     GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,
     StateSection,
 };
+pub use sequential::SequentialSection;
 pub use value::{Constant, Coordinates, Named};
 
 pub(crate) use plant::{check_network, no_formula};

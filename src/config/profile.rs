@@ -6,10 +6,12 @@ use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
 };
+use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
+use crate::scenario::growth_plan::{GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::SystemSection;
@@ -76,6 +78,7 @@ pub(crate) fn common(
     Config {
         profile,
         seed: 1,
+        attempt: None,
         system,
         model: None,
         networks: Vec::new(),
@@ -127,7 +130,12 @@ pub(crate) fn common(
                 BoundarySearch::Rays
             },
             heading: Vec::new(),
+            method: if rigorous { GrowthMethod::Upward } else { GrowthMethod::Shrinking },
+            shape: GrowthShape::Ball,
+            factor: GrowthPlan::UPWARD.factor,
+            pilot: GrowthPlan::UPWARD.pilot,
         },
+        sequential: SequentialSection::default(),
         study: None,
         train: None,
         sources: Sources::default(),

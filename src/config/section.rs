@@ -4,11 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use super::deterministic::DeterministicSection;
 use super::drops::{CalibrationSection, DropsSection, TighteningSource, no_risk, share_draws};
+use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::model::text::NetworkFile;
 use crate::rollout::PairControl;
+use crate::scenario::growth_plan::{GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::Assumption;
 use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::{StudySettings, SystemSection};
@@ -27,6 +29,9 @@ pub struct Config {
     pub profile: Profile,
     /// Seed of every random stream.
     pub seed: u64,
+    /// Number of the attempt at these claims, from 1; none of a certificate that counts as the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attempt: Option<u32>,
     /// The system and its parameters, where it is one that the program carries.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemSection>,
@@ -64,6 +69,9 @@ pub struct Config {
     pub state: StateSection,
     /// Local growth.
     pub growth: GrowthSection,
+    /// A claim whose starts are looked at one after the other.
+    #[serde(default)]
+    pub sequential: SequentialSection,
     /// The experiments of a study; only the plants of studies have them. Files call them by their first.
     #[serde(default, rename = "race", skip_serializing_if = "Option::is_none")]
     pub study: Option<StudySettings>,
@@ -246,7 +254,7 @@ pub struct SliceAxisSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GrowthSection {
-    /// First radius.
+    /// The largest radius: the first when shrinking, the last upward.
     pub radius: f64,
     /// Rounds M.
     pub rounds: u32,
@@ -264,4 +272,26 @@ pub struct GrowthSection {
     pub boundary: BoundarySearch,
     /// States `[x, vx, y, vy]` of the slice search that prefers cells ahead; empty for none.
     pub heading: Vec<String>,
+    /// Which way radii go; what an older version stored shrinks.
+    #[serde(default)]
+    pub method: GrowthMethod,
+    /// What grows.
+    #[serde(default)]
+    pub shape: GrowthShape,
+    /// Upward: each radius over the one before it.
+    #[serde(default = "factor")]
+    pub factor: f64,
+    /// Starts of the pilot that fixes the axes of an ellipsoid or a box.
+    #[serde(default = "pilot")]
+    pub pilot: u64,
+}
+
+/// The factor of radii that nobody asked for.
+fn factor() -> f64 {
+    GrowthPlan::UPWARD.factor
+}
+
+/// The pilot that nobody asked for.
+fn pilot() -> u64 {
+    GrowthPlan::UPWARD.pilot
 }

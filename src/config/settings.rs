@@ -5,11 +5,12 @@ use super::section::{Config, SliceAxisSection};
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::rollout::RolloutSpec;
-use crate::scenario::BoxSettings;
+use crate::scenario::growth_plan::GrowthPlan;
 use crate::scenario::limits::{finite, not_negative, positive_f32};
 use crate::scenario::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings, SliceAxis,
 };
+use crate::scenario::{BoxSettings, Keys};
 use crate::system::Axis;
 
 /// Most values of a slice axis: a finer step is a slip, and its picture could not be drawn.
@@ -51,7 +52,7 @@ impl Config {
             Constant::Computed => Ok(None),
             Constant::Given(value) => not_negative(key, value).map(Some),
         };
-        Ok(Settings {
+        let settings = Settings {
             seed: self.seed,
             spec: self.checked_spec()?,
             low,
@@ -70,7 +71,11 @@ impl Config {
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,
             growth: self.growth_settings(axes)?,
-        })
+            sequential: self.sequential.settings()?,
+            attempt: None,
+            keys: Keys::Claim,
+        };
+        self.attempt.map_or(Ok(settings.clone()), |attempt| settings.as_attempt(attempt))
     }
 
     /// Lower and upper corner of the box.
@@ -126,6 +131,12 @@ impl Config {
             varies: self.varies(axes)?,
             boundary: asked.boundary,
             heading: self.heading(axes)?,
+            plan: GrowthPlan {
+                method: asked.method,
+                shape: asked.shape,
+                factor: asked.factor,
+                pilot: asked.pilot,
+            },
         };
         settings.check().map(|()| settings)
     }

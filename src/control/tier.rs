@@ -9,9 +9,10 @@ use crate::scenario::fit::check_sizes;
 use crate::scenario::global::{band, check_margins, slice_through};
 use crate::scenario::growth::{Growth, check_scenarios};
 use crate::scenario::growth_batch::{Request, grow_each};
+use crate::scenario::growth_plan::GrowthShape;
 use crate::scenario::ledger::{Entry, Ledger, Spend};
 use crate::scenario::sets::chosen;
-use crate::scenario::settings::Settings;
+use crate::scenario::settings::{GrowthSettings, Settings};
 use crate::scenario::{Context, Tightened, Unwatched, tightened};
 
 pub use crate::scenario::tier::Tier;
@@ -97,6 +98,7 @@ impl<'a> Certifier<'a> {
     pub fn new(program: &'a Program<'a>, settings: &'a Settings, asked: Asked) -> Result<Self> {
         if asked.local {
             check_scenarios(&settings.growth)?;
+            check_ball(&settings.growth)?;
         }
         check_sizes(settings, &program.plant().model)?;
         let context = Context { program, watch: &Unwatched };
@@ -247,5 +249,16 @@ impl<'a> Certifier<'a> {
             standings[i].growth = Some(LocalGrowth { ball, verified, rounds, f64_reruns });
         }
         Ok(())
+    }
+}
+
+/// Refuses what grows where it is no ball.
+fn check_ball(asked: &GrowthSettings) -> Result<()> {
+    match asked.plan.shape {
+        GrowthShape::Ball => Ok(()),
+        other => {
+            let problem = format!("`{}` is for `certify`; tier 2 grows balls", other.name());
+            Err(Error::invalid("growth.shape", problem))
+        }
     }
 }

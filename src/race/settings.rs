@@ -9,6 +9,7 @@ use crate::race::barrier::{BarrierFilter, BarrierForm, Widening};
 use crate::race::cost::{QuadraticCost, RaceCost};
 use crate::race::system::DroneRace;
 use crate::rollout::{MppiSettings, MppiSpec, NoiseKind, Sigma};
+use crate::scenario::growth_plan::GrowthMethod;
 use crate::system::System;
 
 /// Most control steps of a race: each has random streams of its own.
@@ -80,6 +81,9 @@ pub struct HybridSettings {
     pub domain: Domain,
     /// Whether tier 2, the locally verified ball, is used.
     pub local: bool,
+    /// How the ball of tier 2 is looked for, whatever `growth.method` a certificate has.
+    #[serde(default)]
+    pub growth: GrowthMethod,
     /// Whether tier 3, recovery, is used; without it the policy flies there too.
     pub recovery_tier: bool,
     /// Whether the target, once reached, counts as held.

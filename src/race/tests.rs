@@ -22,6 +22,7 @@ use crate::race::cost::{Fence, LaneCost, RaceCost, RecoveryCost, Safety};
 use crate::race::system::DroneRace;
 use crate::rollout::{NoiseKind, RolloutSpec};
 use crate::scenario::Unwatched;
+use crate::scenario::growth_plan::GrowthMethod;
 use crate::scenario::settings::{ConstantSettings, Settings, SliceAxis};
 use crate::system::System;
 
@@ -127,6 +128,7 @@ fn race() -> RaceSettings {
             global: true,
             domain: Domain::Anywhere,
             local: true,
+            growth: GrowthMethod::Shrinking,
             recovery_tier: true,
             latch: true,
             near_gate: true,

@@ -2,7 +2,9 @@
 
 use super::deterministic;
 use super::figures;
+use super::growth;
 use super::palette;
+use super::sequential;
 use super::sets;
 use super::shell::{self, HATCH, Scripts, items};
 use super::table;
@@ -119,6 +121,7 @@ fn limits(record: &Record) -> Vec<String> {
          horizon; not about the machine that the model stands for."
             .to_owned(),
     ];
+    limits.push(attempt(record));
     if !record.slice.check_margin.is_empty() {
         limits.push(
             "The picture of the slice is made of single rollouts. What lies between two cells was \
@@ -154,6 +157,22 @@ fn limits(record: &Record) -> Vec<String> {
     limits
 }
 
+/// What the certificate counts as among others of the same claims.
+fn attempt(record: &Record) -> String {
+    match &record.attempt {
+        None => "It counts as the only attempt at these claims. Whoever certifies again, with another seed or \
+                 changed settings, and shows the better one, draws anew: that is another attempt, and only \
+                 `--attempt 2` and on pay for it, on top of all of this one's beta."
+            .to_owned(),
+        Some(attempt) => format!(
+            "It is attempt {} at these claims and books {} of each beta that was asked for; all numbered \
+             attempts together book no more than that beta, a first one without a number as much again.",
+            attempt.number,
+            upper(attempt.share)
+        ),
+    }
+}
+
 fn numbers(record: &Record) -> String {
     format!(
         "<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
@@ -167,7 +186,7 @@ fn numbers(record: &Record) -> String {
         sets::sets(record),
         table::narrow(record) + &deterministic::table(record),
         sets::drops(record),
-        table::wide(record),
+        table::wide(record) + &growth::upward(record) + &sequential::sequential(record),
         table::steps(record),
         shell::configuration(&record.provenance)
     )

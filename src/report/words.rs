@@ -120,13 +120,18 @@ fn growth(record: &Record) -> Verdict<'_> {
         GrowthOutcome::Verified => (
             format!("radius {}", lower(growth.radius)),
             growth.claim.as_ref().map_or_else(String::new, |claim| {
-                let risk = upper(claim.certified_risk);
-                format!("Chance of failure for a start in the verified ball: at most {risk}.")
+                let (risk, set) = (upper(claim.certified_risk), grown(record));
+                format!("Chance of failure for a start in the verified {set}: at most {risk}.")
             }),
         ),
         GrowthOutcome::Exhausted => (
             "not verified".to_owned(),
-            "Every round had failures, so no ball is certified.".to_owned(),
+            match &growth.upward {
+                None => "Every round had failures, so no ball is certified.".to_owned(),
+                Some(_) => {
+                    format!("The first radius was refused, so no {} is certified.", grown(record))
+                }
+            },
         ),
         GrowthOutcome::NoBoundary => (
             "no boundary".to_owned(),
@@ -141,6 +146,11 @@ fn growth(record: &Record) -> Verdict<'_> {
         detail,
         claim: growth.claim.as_ref(),
     }
+}
+
+/// What local growth grew.
+pub(crate) fn grown(record: &Record) -> &'static str {
+    record.growth.upward.as_ref().map_or("ball", |upward| upward.shape.name())
 }
 
 /// How the steps of the deviation bound hold together.

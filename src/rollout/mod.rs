@@ -1,6 +1,7 @@
 //! What a batch of rollouts is: starts, horizon, measure; no word about who runs it.
 
 pub mod drops;
+mod ellipsoid;
 mod fold;
 mod held;
 mod measure_tally;
@@ -20,6 +21,7 @@ mod tally;
 mod tally_origin;
 
 pub use crate::files::{StateList, States};
+pub use ellipsoid::Ellipsoid;
 pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
 pub use held::Keep;
 pub use measure_tally::{Extreme, MeasureCounts, MeasureTally, Measures};

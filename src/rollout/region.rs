@@ -1,5 +1,6 @@
-//! Sets of states with the uniform distribution on them: boxes and balls.
+//! Sets of states with the uniform distribution on them: boxes, balls and ellipsoids.
 
+use super::ellipsoid::Ellipsoid;
 use super::sample::{Stream, normal_pair, unit};
 use crate::error::{Error, Result};
 use crate::real::{Lanes, Real};
@@ -16,6 +17,8 @@ pub enum Region {
     },
     /// A Euclidean ball in some coordinates, the others frozen.
     Ball(Ball),
+    /// An axis-parallel ellipsoid in some coordinates, the others frozen.
+    Ellipsoid(Ellipsoid),
 }
 
 /// A Euclidean ball in the coordinates that are not frozen.
@@ -78,6 +81,7 @@ impl Region {
         match self {
             Self::Box { low, .. } => low.len(),
             Self::Ball(ball) => ball.center.len(),
+            Self::Ellipsoid(set) => set.center.len(),
         }
     }
 
@@ -86,6 +90,16 @@ impl Region {
         match self {
             Self::Box { low, high } => low.iter().zip(high).map(|(low, high)| low < high).collect(),
             Self::Ball(ball) => ball.varies.clone(),
+            Self::Ellipsoid(set) => set.varies(),
+        }
+    }
+
+    /// What it is, in a sentence.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Box { .. } => "box",
+            Self::Ball(_) => "ball",
+            Self::Ellipsoid(_) => "ellipsoid",
         }
     }
 
@@ -98,15 +112,23 @@ impl Region {
                 widths.filter(|width| *width > 0.0).product()
             }
             Self::Ball(ball) => {
-                // V_n = V_{n-2} 2 pi / n, from V_0 = 1 and V_1 = 2.
-                let unit = |n: usize| {
-                    let first = if n.is_multiple_of(2) { 1.0 } else { 2.0 };
-                    let factors = (2..=n).filter(|k| k % 2 == n % 2);
-                    factors.fold(first, |v, k| v * std::f64::consts::TAU / k as f64)
-                };
                 let dimension = ball.dimension();
-                unit(dimension) * f64::from(ball.radius).powi(dimension as i32)
+                unit_volume(dimension) * f64::from(ball.radius).powi(dimension as i32)
             }
+            Self::Ellipsoid(set) => {
+                let halves = || set.half_axes.iter().filter(|half| **half > 0.0);
+                let product = halves().map(|half| f64::from(*half)).product::<f64>();
+                unit_volume(halves().count()) * product
+            }
+        }
+    }
+
+    /// Whether `x` lies in the region, its frozen coordinates as the region has them.
+    pub fn contains(&self, x: &[f32]) -> bool {
+        match self {
+            Self::Box { low, high } => (0..x.len()).all(|i| low[i] <= x[i] && x[i] <= high[i]),
+            Self::Ball(ball) => ball.contains(x),
+            Self::Ellipsoid(set) => set.contains(x),
         }
     }
 
@@ -122,6 +144,12 @@ impl Region {
                     *x = Lanes::lit(*center) + Lanes::lit(ball.radius) * *x;
                 }
             }
+            Self::Ellipsoid(set) => {
+                sample_ball(stream, first, |i| set.half_axes[i] > 0.0, x);
+                for (x, (center, half)) in x.iter_mut().zip(set.center.iter().zip(&set.half_axes)) {
+                    *x = Lanes::lit(*center) + Lanes::lit(*half) * *x;
+                }
+            }
         }
     }
 
@@ -131,6 +159,13 @@ impl Region {
         self.sample::<1>(stream, index, &mut x);
         x.into_iter().map(|lane| lane.0[0]).collect()
     }
+}
+
+/// Volume of the unit ball in `n` dimensions: `V_n = V_{n-2} 2 pi / n`, from V_0 = 1 and V_1 = 2.
+fn unit_volume(n: usize) -> f64 {
+    let first = if n.is_multiple_of(2) { 1.0 } else { 2.0 };
+    let factors = (2..=n).filter(|k| k % 2 == n % 2);
+    factors.fold(first, |v, k| v * std::f64::consts::TAU / k as f64)
 }
 
 /// Uniform offsets in the unit ball of the coordinates that vary, 0 in the others; `x` has a row

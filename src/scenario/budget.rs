@@ -27,14 +27,19 @@ fn bound_of(joint: Joint) -> &'static str {
 /// The ledger of all claims; growth books every round it may take.
 pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
     let growth = &settings.growth;
-    let rounds = f64::from(growth.rounds);
+    let rounds = f64::from(growth.booked_rounds());
     let global = settings.global.beta;
     let whole_box =
         settings.whole_box.map(|asked| ("box", "interval of the failing share", asked.beta));
     let share = "interval of the certified share";
     let deterministic = settings.deterministic.map(|asked| ("deterministic", share, asked.beta));
-    let more: Vec<_> =
-        whole_box.into_iter().chain(drops_claims(settings)).chain(deterministic).collect();
+    let sequential = settings.sequential.map(|asked| ("sequential", "at any time", asked.beta));
+    let more: Vec<_> = whole_box
+        .into_iter()
+        .chain(drops_claims(settings))
+        .chain(deterministic)
+        .chain(sequential)
+        .collect();
     let of_more: f64 = more.iter().map(|(.., beta)| beta).sum();
     let deviation = settings.deviation.spent(settings.spec.horizon);
     let budget = deviation + 2.0 * global + of_more + rounds * growth.round_beta();
@@ -44,7 +49,8 @@ pub(super) fn ledger(settings: &Settings) -> Result<Ledger> {
         ("global", "conditional failure", global),
         ("global", "interval of the certified share", global),
     ];
-    let rounds = (0..growth.rounds).map(|round| ("growth", "round", round, growth.round_beta()));
+    let rounds =
+        (0..growth.booked_rounds()).map(|round| ("growth", "round", round, growth.round_beta()));
     let once =
         claims.into_iter().chain(more).map(|(claim, purpose, beta)| (claim, purpose, 0, beta));
     for (claim, purpose, round, beta) in once.chain(rounds) {

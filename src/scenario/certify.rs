@@ -8,15 +8,16 @@ use super::fit::check_sizes;
 use super::origin::{provenance, system_record};
 use super::purpose;
 use super::record::{
-    GrowthRecord, PictureRecord, Record, RolloutRecord, SCHEMA, StateRecord, Timing, decimal,
-    finite_margin,
+    GrowthRecord, PictureRecord, Provenance, Record, RolloutRecord, SCHEMA, StateRecord, Timing,
+    decimal, finite_margin,
 };
 use super::sets::{self, Sets};
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
 use super::{
-    Context, Watch, boundary, claims, deterministic_set, deviation, global, growth, whole_box,
+    Context, Watch, boundary, claims, deterministic_set, deviation, global, growth, sequential,
+    whole_box,
 };
 use crate::backend::Program;
 use crate::error::Result;
@@ -41,6 +42,7 @@ pub fn certify(
     let begun = Instant::now();
     let context = Context { program, watch };
     let (plant, backend) = (program.plant(), program.backend());
+    let settings = &settings.keyed(plant);
     check_sizes(settings, &plant.model)?;
     check_settings(settings)?;
     let ledger = ledger(settings)?;
@@ -63,6 +65,7 @@ pub fn certify(
     let slice = global::slice(context, settings, &tightening, global.band)?;
     let boundary = boundary::search(context, settings, &tightening, &slice)?;
     let growth = growth::record(context, settings, boundary, global.band)?;
+    let sequential = sequential::record(context, settings, &tightening, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
     let deterministic = deterministic_set::record(context, settings)?;
@@ -70,13 +73,17 @@ pub fn certify(
         + whole_box.as_ref().map_or(0, |found| found.draws)
         + slice.check_margin.len() as u64
         + settings.deterministic.map_or(0, |asked| asked.starts)
-        + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>();
+        + growth.rounds.iter().map(|round| round.scenarios).sum::<u64>()
+        + sequential.as_ref().map_or(0, |asked| asked.draws);
     let mut record = Record {
         schema: SCHEMA,
         digests: BTreeMap::new(),
         holds: false,
         statements: Vec::new(),
-        provenance: provenance(program, settings.seed, config),
+        provenance: Provenance {
+            generator: settings.keys.generator().to_owned(),
+            ..provenance(program, settings.seed, config)
+        },
         system: system_record(&plant.model, settings),
         horizon: settings.spec.horizon,
         gamma: decimal(settings.spec.gamma),
@@ -91,6 +98,8 @@ pub fn certify(
         state,
         slice,
         growth,
+        sequential,
+        attempt: settings.attempt_record(),
         beta_total: ledger.total(),
         ledger: spendings(&ledger),
         picture,

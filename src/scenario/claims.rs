@@ -3,7 +3,9 @@
 use super::box_record::BoxRecord;
 use super::record::{
     DeterministicRecord, GlobalRecord, GrowthOutcome, GrowthRecord, PictureRecord, Record,
+    SequentialRecord,
 };
+use super::sequential_record::SequentialOutcome;
 use super::settings::Settings;
 use super::{empty, probe, sampling, sets, side};
 use crate::model::Plant;
@@ -20,6 +22,12 @@ pub(super) fn holds(record: &Record) -> bool {
         && growth.outcome == GrowthOutcome::Verified
         && box_holds(record.whole_box.as_ref())
         && deterministic_holds(record.deterministic.as_ref())
+        && sequential_holds(record.sequential.as_ref())
+}
+
+/// Whether the sequential claim, where one was asked for, was obtained.
+fn sequential_holds(record: Option<&SequentialRecord>) -> bool {
+    record.is_none_or(|record| record.outcome == SequentialOutcome::Certified)
 }
 
 /// Whether the risk of the whole box is at most the one asked for, where one was.
@@ -54,6 +62,7 @@ pub(super) fn statements(plant: &Plant, settings: &Settings, record: &Record) ->
         statements.extend(empty::reasons(model, record, &settings.spec));
     }
     statements.extend(growth_statement(growth));
+    statements.extend(record.sequential.as_ref().map(|asked| asked.claim.statement.clone()));
     statements.extend(side::statement(model, settings, growth));
     // Margin drops rest on no constant.
     if record.drops.is_none() {
@@ -99,6 +108,10 @@ fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
 fn growth_statement(growth: &GrowthRecord) -> Option<String> {
     match growth.outcome {
         GrowthOutcome::Verified => None,
+        GrowthOutcome::Exhausted if growth.upward.is_some() => Some(
+            "Local growth is exhausted: the first of its radii was refused, nothing is verified."
+                .to_owned(),
+        ),
         GrowthOutcome::Exhausted => Some(format!(
             "Local growth is exhausted: each of {} rounds had a failure, no ball is verified.",
             growth.rounds.len()

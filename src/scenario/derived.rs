@@ -6,10 +6,9 @@ use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
-use super::{constants, deterministic_set, deviation, global, growth, sets, whole_box};
+use super::{constants, deterministic_set, deviation, global, growth, sequential, sets, whole_box};
 use crate::error::Result;
 use crate::model::{Model, Plant};
-use crate::rollout::GENERATOR;
 
 /// `stored` with everything that follows from `settings` and its own counts computed again: claims,
 /// intervals, constants, the ledger, margins of the states, words. What rollouts came to is taken
@@ -23,7 +22,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.horizon = settings.spec.horizon;
     record.gamma = decimal(settings.spec.gamma);
     record.provenance.seed = settings.seed;
-    record.provenance.generator = GENERATOR.to_owned();
+    record.provenance.generator = settings.keys.generator().to_owned();
     record.provenance.policy = plant.controller.name.clone();
     let Hashes { physics_sha256, policy_sha256 } = hashes(plant);
     record.provenance.physics_sha256 = physics_sha256;
@@ -39,6 +38,8 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
         whole_box::derived(model, settings, &record.global, stored.whole_box.as_ref())?;
     record.deterministic = deterministic_set::derived(settings, stored.deterministic.as_ref());
     record.growth = growth::derived(model, settings, &stored.growth)?;
+    record.sequential = sequential::derived(model, settings, stored.sequential.as_ref())?;
+    record.attempt = settings.attempt_record();
     let ledger = ledger(settings)?;
     (record.ledger, record.beta_total) = (spendings(&ledger), ledger.total());
     margins(&mut record, model, settings);

@@ -84,7 +84,7 @@ fn candidates(
     asked: &DeterministicSettings,
 ) -> Result<StateList> {
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let stream = Stream::new(settings.seed, purpose::DETERMINISTIC, 0);
+    let stream = settings.stream(purpose::DETERMINISTIC, 0);
     let starts = (0..asked.starts).map(|index| region.point(stream, index));
     let starts = StateList::new(settings.low.len()).with(starts);
     context.watch.begin("nominal rollouts", asked.starts);

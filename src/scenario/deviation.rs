@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{
     DeviationTask, Farthest, HUGE, Keep, PairControl, PairTally, Pairs, Purpose, Region,
-    RolloutSpec, Starts, Stream, Tightening,
+    RolloutSpec, Starts, Tightening,
 };
 use crate::rounding::{complement, upper};
 
@@ -144,7 +144,7 @@ fn draw(
     [nominal, perturbation]: [Purpose; 2],
     count: u64,
 ) -> Result<PairTally> {
-    let stream = |purpose| Stream::new(settings.seed, purpose, 0);
+    let stream = |purpose| settings.stream(purpose, 0);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let task = DeviationTask {
         pairs: Pairs {

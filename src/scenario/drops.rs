@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::drops::{Shapes, drops};
 use crate::rollout::replay::{Margins, PairMargins, pair_margins};
-use crate::rollout::{Pairs, Purpose, Region, Starts, Stream};
+use crate::rollout::{Pairs, Purpose, Region, Starts};
 
 /// The least unit of a step, of the largest of its margin: a direction that dies out would leave a unit
 /// near zero, which one pair could exceed many times over.
@@ -132,7 +132,7 @@ fn with_floor(largest: Vec<f64>) -> Vec<f64> {
 
 /// The pairs of two streams.
 pub(super) fn pairs(settings: &Settings, purposes: [Purpose; 2]) -> Result<Pairs<'static>> {
-    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
+    let [nominal, perturbation] = purposes.map(|purpose| settings.stream(purpose, 0));
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     Ok(Pairs {
         nominal: Starts::Drawn { region, stream: nominal },

@@ -7,13 +7,11 @@ use super::bound::{interval, lower_bound};
 use super::finding::{Figure, Finding};
 use super::record::{DeviationRecord, GlobalRecord, Record};
 use super::settings::{Joint, Settings};
-use super::tier::verified_ball;
+use super::tier::verified_set;
 use super::{Context, deterministic_set, global, pairs_f64, purpose, sets, whole_box};
 use crate::error::Result;
 use crate::rollout::side_by_side::PairGroup;
-use crate::rollout::{
-    Ball, Keep, Pairs, Query, ReachAvoidTask, Region, Starts, Stream, Tightening,
-};
+use crate::rollout::{Keep, Pairs, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
 
 /// Fresh starts that a verified ball is tried with.
 const STARTS: u64 = 20_000;
@@ -47,8 +45,8 @@ pub(super) fn findings(
         findings.push(whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?);
     }
     findings.extend(deterministic_set::adversaries(context, settings)?);
-    if let Some(ball) = verified_ball(&record.growth, settings.state.len()) {
-        let failures = in_ball(context, settings, ball)?;
+    if let Some(set) = verified_set(&record.growth, settings.state.len()) {
+        let failures = in_set(context, settings, set)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
         findings.push(refuted("failures in the verified ball", risk, failures, STARTS));
     }
@@ -150,13 +148,13 @@ fn pairs_beyond(context: Context<'_>, settings: &Settings, bound: &[f64]) -> Res
     Ok(counts)
 }
 
-/// Failures among fresh starts in the verified ball.
-fn in_ball(context: Context<'_>, settings: &Settings, ball: Ball) -> Result<u64> {
+/// Failures among fresh starts in the verified set.
+fn in_set(context: Context<'_>, settings: &Settings, region: Region) -> Result<u64> {
     context.watch.begin("fresh starts in the ball", STARTS);
     let stream = Stream::new(settings.seed, purpose::CHECK, 1);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {
-        starts: Starts::Drawn { region: Region::Ball(ball), stream },
+        starts: Starts::Drawn { region, stream },
         range: 0..STARTS,
         spec: settings.spec,
         tightening: &tightening,

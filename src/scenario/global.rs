@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::{
     DeviationTask, Keep, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, StateList, States, Stream, Tightening, replay,
+    RolloutSpec, Starts, StateList, States, Tightening, replay,
 };
 use crate::rounding::upper;
 
@@ -112,7 +112,7 @@ pub fn conditional(
 ) -> Result<GlobalRecord> {
     let draws = settings.global.draws;
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
+    let [nominal, perturbation] = purposes.map(|purpose| settings.stream(purpose, 0));
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Drawn { region, stream: nominal },

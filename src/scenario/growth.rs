@@ -1,22 +1,21 @@
-//! Local growth, Algorithm 1: the largest ball around a boundary point that passes clean.
+//! Local growth: Algorithm 1, the largest ball around a boundary point that passes clean, and the record
+//! of either method.
 
 use super::Context;
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
 use super::boundary::{self, Boundary};
 use super::coordinates::{Coordinates, coordinates};
+use super::growth_plan::{GrowthMethod, GrowthShape, UpwardRecord};
+use super::growth_set::{Drawn, Family, round};
+use super::growth_upward::{climb, fixed, verified_by};
 use super::purpose;
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
 use super::spacing::is_fine;
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::rollout::{
-    Ball, NON_FINITE, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
-};
+use crate::rollout::Ball;
 use crate::rounding::{complement, lower};
-
-/// Starts of the last round that are kept for the picture.
-const KEPT_SAMPLES: u64 = 400;
 
 /// Outcome of the growth.
 ///
@@ -35,14 +34,22 @@ pub enum Growth {
 
 impl GrowthSettings {
     /// Beta of one round: the procedure stops at the first clean round, so all M rounds must hold
-    /// at once (section 8.2).
+    /// at once (section 8.2). Upward all of beta: a fixed sequence is refused for good by its first refusal.
     pub(super) fn round_beta(&self) -> f64 {
-        if self.split_beta { self.beta / f64::from(self.rounds) } else { self.beta }
+        self.beta / if self.split_beta { f64::from(self.booked_rounds()) } else { 1.0 }
     }
 
     /// Beta of one call, all its rounds together.
     pub fn call_beta(&self) -> f64 {
-        if self.split_beta { self.beta } else { self.beta * f64::from(self.rounds) }
+        if self.split_beta { self.beta } else { self.beta * f64::from(self.booked_rounds()) }
+    }
+
+    /// Rounds that spend beta, each of its own: all of Algorithm 1, upward as one.
+    pub(super) fn booked_rounds(&self) -> u32 {
+        match self.plan.method {
+            GrowthMethod::Shrinking => self.rounds,
+            GrowthMethod::Upward => 1,
+        }
     }
 }
 
@@ -57,13 +64,7 @@ pub struct GrowthRun {
     pub samples: Vec<SampleRecord>,
 }
 
-/// What one round showed.
-struct Round {
-    record: RoundRecord,
-    samples: Vec<SampleRecord>,
-}
-
-/// Grows a ball around `boundary` for at most M rounds of N fresh starts each. `call` numbers the
+/// Grows a ball around `boundary` by Algorithm 1, for at most M rounds of N fresh starts each. `call` numbers the
 /// calls of a run, so that none reuses another's samples.
 pub fn grow(
     context: Context<'_>,
@@ -83,8 +84,10 @@ pub fn grow(
     let mut samples = Vec::new();
     context.watch.begin("local growth", asked.scenarios * u64::from(asked.rounds));
     for number in 0..asked.rounds {
-        let stream = Stream::new(settings.seed, purpose::GROWTH, call * asked.rounds + number);
-        let round = round(context, settings, &ball, stream, band)?;
+        let stream = settings.stream(purpose::GROWTH, call * asked.rounds + number);
+        let family = Family::balls(ball.center.clone(), &ball.varies);
+        let drawn = Drawn::pictured(stream, asked.scenarios);
+        let round = round(context, settings, &family, ball.radius, drawn, band)?;
         samples = round.samples;
         let nearest = round.record.nearest_failure;
         rounds.push(round.record);
@@ -132,57 +135,6 @@ pub(crate) fn check_scenarios(asked: &GrowthSettings) -> Result<()> {
     })
 }
 
-/// One round: N fresh starts in the ball, their outcomes, and the nearest failure.
-fn round(
-    context: Context<'_>,
-    settings: &Settings,
-    ball: &Ball,
-    stream: Stream,
-    band: f64,
-) -> Result<Round> {
-    let starts = Starts::Drawn { region: Region::Ball(ball.clone()), stream };
-    let tightening = Tightening::none(&settings.spec);
-    let task = ReachAvoidTask {
-        starts,
-        range: 0..settings.growth.scenarios,
-        spec: settings.spec,
-        tightening: &tightening,
-        query: Query::Measure,
-    };
-    let mut record = RoundRecord {
-        radius: decimal(ball.radius),
-        scenarios: settings.growth.scenarios,
-        failures: 0,
-        nearest_failure: None,
-        non_finite: 0,
-        f64_reruns: 0,
-    };
-    let mut samples = Vec::new();
-    context.program.reach_avoid(&task, &mut |first, values| {
-        for (index, value) in (first..).zip(values) {
-            let start = task.starts.start(index);
-            let mut value = f64::from(*value);
-            if value.abs() <= band {
-                value = replay::measure(context.plant(), &start, &settings.spec, &tightening);
-                record.f64_reruns += 1;
-            }
-            let success = value > 0.0;
-            if !success {
-                record.failures += 1;
-                record.non_finite += u64::from(value == f64::from(NON_FINITE));
-                let distance = ball.distance(&start);
-                let nearest = record.nearest_failure.map_or(distance, |n| n.min(distance));
-                record.nearest_failure = Some(nearest);
-            }
-            if index < KEPT_SAMPLES {
-                samples.push(SampleRecord { x: start, success });
-            }
-        }
-        context.watch.advance(values.len() as u64)
-    })?;
-    Ok(Round { record, samples })
-}
-
 /// What `stored` says as its own failures and `settings` give it.
 pub(super) fn derived(
     model: &Model,
@@ -202,6 +154,11 @@ pub(super) fn derived(
     };
     record.distance = Some(boundary::distance(&center, &settings.state));
     record.outcome = GrowthOutcome::Exhausted;
+    if let Some(upward) =
+        stored.upward.clone().filter(|_| asked.plan.method == GrowthMethod::Upward)
+    {
+        return derived_upward(model, settings, record, upward);
+    }
     let mut ball = Ball { center, radius: asked.radius, varies: asked.varies.to_vec() };
     for (number, round) in (0..).zip(&mut record.rounds) {
         (round.radius, round.scenarios) = (decimal(ball.radius), asked.scenarios);
@@ -209,9 +166,51 @@ pub(super) fn derived(
         ball = next.unwrap_or(ball);
     }
     if record.rounds.last().is_some_and(|round| round.failures == 0) {
-        verified(&mut record, model, settings, ball)?;
+        let family = Family::balls(ball.center, &ball.varies);
+        verified(&mut record, model, settings, &family, ball.radius)?;
     }
     Ok(record)
+}
+
+/// The record of a growth upward as its own failures and `settings` give it; the widths are the pilot's.
+fn derived_upward(
+    model: &Model,
+    settings: &Settings,
+    mut record: GrowthRecord,
+    stored: UpwardRecord,
+) -> Result<GrowthRecord> {
+    let asked = &settings.growth;
+    let allowed = asked.allowed_failures().unwrap_or(0);
+    for (round, radius) in record.rounds.iter_mut().zip(asked.radii()) {
+        (round.radius, round.scenarios) = (decimal(radius), asked.scenarios);
+    }
+    let radius = verified_by(asked, &record.rounds, allowed);
+    let radii = asked.radii().into_iter().map(decimal).collect();
+    let mut upward = UpwardRecord { allowed, radii, shape: asked.plan.shape, ..stored };
+    if upward.shape == GrowthShape::Ball {
+        upward.widths = Family::balls(Vec::new(), &asked.varies).widths;
+        (upward.pilot, upward.pilot_failures) = (0, 0);
+    } else {
+        upward.pilot = asked.plan.pilot;
+    }
+    conclude_upward(&mut record, model, settings, upward, radius)?;
+    Ok(record)
+}
+
+/// Enters what growth upward came to.
+fn conclude_upward(
+    record: &mut GrowthRecord,
+    model: &Model,
+    settings: &Settings,
+    upward: UpwardRecord,
+    radius: Option<f32>,
+) -> Result<()> {
+    let family = upward.family(record.center.clone().unwrap_or_default());
+    record.upward = Some(upward);
+    match radius.filter(|_| family.widths.len() == model.states.len()) {
+        Some(radius) => verified(record, model, settings, &family, radius),
+        None => Ok(()),
+    }
 }
 
 /// The record of a growth that had nothing to grow from.
@@ -227,20 +226,22 @@ fn nothing(asked: &GrowthSettings) -> GrowthRecord {
         rounds: Vec::new(),
         claim: None,
         samples: Vec::new(),
+        upward: None,
     }
 }
 
-/// Enters a ball that passed clean.
+/// Enters a set that passed.
 fn verified(
     record: &mut GrowthRecord,
     model: &Model,
     settings: &Settings,
-    ball: Ball,
+    family: &Family,
+    radius: f32,
 ) -> Result<()> {
     record.outcome = GrowthOutcome::Verified;
-    record.radius = decimal(ball.radius);
-    record.claim = Some(claim(model, settings, &ball)?);
-    record.volume = Region::Ball(ball).volume();
+    record.radius = decimal(radius);
+    record.volume = family.at(radius).volume();
+    record.claim = Some(claim(model, settings, record)?);
     Ok(())
 }
 
@@ -259,39 +260,47 @@ pub(super) fn record(
     };
     record.center = Some(boundary.point.clone());
     record.distance = Some(boundary.distance);
+    record.outcome = GrowthOutcome::Exhausted;
+    if asked.plan.method == GrowthMethod::Upward {
+        let upward = fixed(context, settings, &boundary.point, band)?;
+        let family = upward.family(boundary.point);
+        let climb = climb(context, settings, &family, upward.allowed, band)?;
+        (record.rounds, record.samples) = (climb.rounds, climb.samples);
+        conclude_upward(&mut record, context.model(), settings, upward, climb.verified)?;
+        return Ok(record);
+    }
     let GrowthRun { outcome, rounds, samples } = grow(context, settings, &boundary, band, 0)?;
     record.rounds = rounds;
     record.samples = samples;
-    record.outcome = GrowthOutcome::Exhausted;
     if let Growth::Verified(ball) = outcome {
-        verified(&mut record, context.model(), settings, ball)?;
+        let family = Family::balls(ball.center, &ball.varies);
+        verified(&mut record, context.model(), settings, &family, ball.radius)?;
     }
     Ok(record)
 }
 
 /// The claim in words and numbers.
-fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
+fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Claim> {
     let asked = &settings.growth;
     let (beta_used, states) = (asked.round_beta(), model.states.len());
     let Coordinates { dimension, frozen } = coordinates(model, &asked.varies);
+    let passed = || record.rounds.iter().find(|round| round.radius == record.radius);
+    // The failures that were allowed, not those that were seen: which round is the last depends on these.
+    let allowed = record.upward.as_ref().map_or(0, |upward| upward.allowed);
+    let set = set_words(record);
+    let norm = if set.starts_with("ball") { "Euclidean " } else { "" };
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(
-            "With confidence 1 - {}, a start drawn from the verified ball of radius {} reaches \
-             the target safely within {} steps with probability at least {}{}.",
+            "With confidence 1 - {}, a start drawn from the verified {set} reaches the target safely \
+             within {} steps with probability at least {}{}.",
             asked.beta,
-            lower(decimal(ball.radius)),
             settings.spec.horizon,
             complement(asked.epsilon),
-            if asked.split_beta || asked.rounds == 1 {
-                ""
-            } else {
-                " (as published: each round spends all of beta, which holds for one round only)"
-            }
+            spent_words(asked, allowed)
         ),
         measure: format!(
-            "start uniform in the Euclidean ball of radius {} in {}",
-            lower(decimal(ball.radius)),
+            "start uniform in the {norm}{set} in {}",
             match dimension {
                 all if all == states => format!("all {states} coordinates"),
                 some => format!(
@@ -302,13 +311,44 @@ fn claim(model: &Model, settings: &Settings, ball: &Ball) -> Result<Claim> {
         dimension,
         frozen,
         scenarios: asked.scenarios,
-        failures: 0,
+        failures: passed().map_or(0, |round| round.failures),
         decision_vars: 1,
         epsilon: Some(asked.epsilon),
         beta: asked.beta,
         beta_used,
         required_simple: Some(simple_scenarios(asked.epsilon, beta_used, 1)?),
         required_exact: Some(required_scenarios(asked.epsilon, beta_used, 1)?),
-        certified_risk: certified_risk(asked.scenarios, 0, beta_used),
+        certified_risk: certified_risk(asked.scenarios, allowed, beta_used),
     })
+}
+
+/// The verified set in words.
+fn set_words(record: &GrowthRecord) -> String {
+    match &record.upward {
+        None => format!("ball of radius {}", lower(record.radius)),
+        Some(upward) => match upward.shape {
+            GrowthShape::Ball => format!("ball of radius {}", lower(record.radius)),
+            other => format!(
+                "{} of radius {} (of equal volume or mean side)",
+                other.name(),
+                lower(record.radius)
+            ),
+        },
+    }
+}
+
+/// How beta is spent, where it needs a word.
+fn spent_words(asked: &GrowthSettings, allowed: u64) -> String {
+    match asked.plan.method {
+        GrowthMethod::Upward => format!(
+            " (radii fixed beforehand and tried from the smallest up, with all of beta, until one has more \
+             than {allowed} failures among {})",
+            asked.scenarios
+        ),
+        GrowthMethod::Shrinking if asked.split_beta || asked.rounds == 1 => String::new(),
+        GrowthMethod::Shrinking => {
+            " (as published: each round spends all of beta, which holds for one round only)"
+                .to_owned()
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Algorithm 1 for many balls at once: a round of all that are open is one batch.
+//! Local growth of many balls at once: a round of all that are open is one batch.
 
 use std::ops::Range;
 
@@ -6,8 +6,9 @@ use rayon::prelude::*;
 
 use super::Context;
 use super::growth::{Growth, check_scenarios, next_ball};
+use super::growth_plan::GrowthMethod;
 use super::purpose;
-use super::settings::Settings;
+use super::settings::{GrowthSettings, Settings};
 use crate::error::Result;
 use crate::real::Lanes;
 use crate::rollout::{
@@ -48,10 +49,20 @@ struct Open {
     request: usize,
     rounds: u32,
     f64_reruns: u64,
+    /// Upward: the largest radius that was accepted.
+    verified: Option<f32>,
 }
 
-/// Grows a ball for each request, for at most M rounds of N fresh starts each, as
-/// [`super::growth::grow`] does one; a measure within `band` of zero is that of f64.
+/// What a round showed of a ball.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// Distance of the nearest failure from the centre.
+    nearest: Option<f64>,
+    failures: u64,
+}
+
+/// Grows a ball for each request, for at most M rounds of N fresh starts each, by Algorithm 1 as
+/// [`super::growth::grow`] does one, or upward; a measure within `band` of zero is that of f64.
 ///
 /// # Errors
 /// [`crate::Error::TooFewScenarios`], and those of the backend.
@@ -64,10 +75,11 @@ pub fn grow_each(
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let open = |(request, center): (usize, Vec<f32>)| Open {
-        ball: Ball { center, radius: asked.radius, varies: asked.varies.clone() },
+        ball: Ball { center, radius: first_radius(asked), varies: asked.varies.clone() },
         request,
         rounds: 0,
         f64_reruns: 0,
+        verified: None,
     };
     let centers = requests.iter().map(|request| request.center.clone()).enumerate();
     let mut balls: Vec<Open> = centers.map(open).collect();
@@ -76,50 +88,80 @@ pub fn grow_each(
         round(context, settings, requests, &mut balls, band)?
             .into_iter()
             .zip(std::mem::take(&mut balls))
-            .for_each(|(nearest, mut open)| {
-                let next = nearest.and_then(|far| next_ball(asked, number, &open.ball, far));
-                if let Some(ball) = next {
+            .for_each(|(seen, mut open)| match next(asked, &mut open, number, seen) {
+                Some(ball) => {
                     open.ball = ball;
                     balls.push(open);
-                } else {
+                }
+                None => {
                     let request = open.request;
-                    grown[request] = Some(finished(open, nearest));
+                    grown[request] = Some(finished(open));
                 }
             });
     }
     Ok(grown.into_iter().flatten().collect())
 }
 
-/// The ball as it ended, its nearest failure that far, or nowhere.
-fn finished(open: Open, nearest: Option<f64>) -> Grown {
-    let Open { ball, rounds, f64_reruns, .. } = open;
-    let outcome = match nearest {
-        None => Growth::Verified(ball),
-        Some(_) => Growth::Exhausted { last_radius: ball.radius },
+/// The radius of the first round.
+fn first_radius(asked: &GrowthSettings) -> f32 {
+    match asked.plan.method {
+        GrowthMethod::Shrinking => asked.radius,
+        GrowthMethod::Upward => asked.radii().first().copied().unwrap_or(asked.radius),
+    }
+}
+
+/// The ball of the round after `number`, which showed `seen`; none where it was the last. Notes the
+/// radius of a round that passed.
+fn next(asked: &GrowthSettings, open: &mut Open, number: u32, seen: Seen) -> Option<Ball> {
+    let allowed = match asked.plan.method {
+        GrowthMethod::Shrinking => 0,
+        GrowthMethod::Upward => asked.allowed_failures().unwrap_or(0),
+    };
+    let passed = seen.failures <= allowed;
+    if passed {
+        open.verified = Some(open.ball.radius);
+    }
+    match asked.plan.method {
+        GrowthMethod::Shrinking => {
+            seen.nearest.and_then(|far| next_ball(asked, number, &open.ball, far))
+        }
+        GrowthMethod::Upward => {
+            let radius = asked.radii().get(number as usize + 1).copied().filter(|_| passed)?;
+            Some(Ball { radius, ..open.ball.clone() })
+        }
+    }
+}
+
+/// The ball as it ended.
+fn finished(open: Open) -> Grown {
+    let Open { ball, rounds, f64_reruns, verified, .. } = open;
+    let outcome = match verified {
+        Some(radius) => Growth::Verified(Ball { radius, ..ball }),
+        None => Growth::Exhausted { last_radius: ball.radius },
     };
     Grown { outcome, rounds, f64_reruns }
 }
 
-/// One round of all balls: the distance of the nearest failure of each.
+/// One round of all balls: what each showed.
 fn round(
     context: Context<'_>,
     settings: &Settings,
     requests: &[Request],
     balls: &mut [Open],
     band: f64,
-) -> Result<Vec<Option<f64>>> {
+) -> Result<Vec<Seen>> {
     if balls.is_empty() {
         return Ok(Vec::new());
     }
     let count = settings.growth.scenarios;
     let total = count * balls.len() as u64;
-    let mut nearest: Vec<Option<f64>> = vec![None; balls.len()];
+    let mut seen = vec![Seen::default(); balls.len()];
     for first in (0..total).step_by(LISTED) {
         let range = first..total.min(first + LISTED as u64);
-        piece(context, settings, requests, balls, range, &mut nearest, band)?;
+        piece(context, settings, requests, balls, range, &mut seen, band)?;
     }
     balls.iter_mut().for_each(|open| open.rounds += 1);
-    Ok(nearest)
+    Ok(seen)
 }
 
 /// The starts `range` of a round, N for each ball after the other.
@@ -129,14 +171,18 @@ fn piece(
     requests: &[Request],
     balls: &mut [Open],
     range: Range<u64>,
-    nearest: &mut [Option<f64>],
+    seen: &mut [Seen],
     band: f64,
 ) -> Result<()> {
     let count = settings.growth.scenarios;
     let draw = |(place, open): (usize, &Open)| {
         let Request { seed, call, .. } = &requests[open.request];
         let use_number = call * settings.growth.rounds + open.rounds;
-        let stream = Stream::new(*seed, purpose::GROWTH, use_number);
+        let purpose = match settings.growth.plan.method {
+            GrowthMethod::Shrinking => purpose::GROWTH,
+            GrowthMethod::Upward => purpose::GROWTH_UPWARD,
+        };
+        let stream = Stream::new(*seed, purpose, use_number);
         let own = |index: u64| index.saturating_sub(place as u64 * count).min(count);
         drawn(&Region::Ball(open.ball.clone()), stream, own(range.start)..own(range.end))
     };
@@ -162,7 +208,9 @@ fn piece(
             }
             if value.is_nan() || value <= 0.0 {
                 let distance = balls[place].ball.distance(start);
-                nearest[place] = Some(nearest[place].map_or(distance, |near| near.min(distance)));
+                let Seen { nearest, failures } = &mut seen[place];
+                *nearest = Some(nearest.map_or(distance, |near| near.min(distance)));
+                *failures += 1;
             }
         }
         context.watch.advance(values.len() as u64)

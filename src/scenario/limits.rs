@@ -2,6 +2,7 @@
 
 use super::deterministic_settings::DeterministicSettings;
 use super::drops_settings::DropSettings;
+use super::sequential_record::SequentialSettings;
 use super::settings::{
     ConstantSettings, DeviationSettings, GlobalSettings, GrowthSettings, Settings,
 };
@@ -10,6 +11,8 @@ use crate::error::{Error, Result};
 
 /// Most rollouts or pairs of a sample: a fast GPU's work of a day.
 const MOST_SAMPLES: u64 = 1_000_000_000_000;
+/// Most draws that are looked at one after the other: the evidence is summed anew after each start.
+const MOST_SEQUENTIAL: u64 = 100_000;
 /// Most rounds of growth: each has a random stream of its own.
 const MOST_ROUNDS: u32 = 10_000;
 
@@ -116,10 +119,29 @@ impl GrowthSettings {
         sample_size("growth.scenarios", self.scenarios)?;
         share("growth.epsilon", self.epsilon)?;
         share("growth.beta", self.beta)?;
+        sample_size("growth.pilot", self.plan.pilot)?;
+        self.check_plan()?;
         if self.varies.contains(&true) {
             return Ok(());
         }
         Err(Error::invalid("growth.varies", "no coordinate varies; one at least has to"))
+    }
+}
+
+impl SequentialSettings {
+    /// Refuses numbers out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        share("sequential.epsilon", self.epsilon)?;
+        share("sequential.beta", self.beta)?;
+        if !(1..=MOST_SEQUENTIAL).contains(&self.most) {
+            let problem = format!("{} is not within 1..={MOST_SEQUENTIAL}", self.most);
+            return Err(Error::invalid("sequential.most", problem));
+        }
+        if !self.carried.is_finite() {
+            let problem = format!("{} is not a finite number", self.carried);
+            return Err(Error::invalid("sequential.carried", problem));
+        }
+        positive_f32("sequential.radius", self.radius.into()).map(drop)
     }
 }
 
@@ -150,6 +172,7 @@ impl Settings {
         self.deterministic.as_ref().map_or(Ok(()), DeterministicSettings::check)?;
         self.whole_box.map_or(Ok(()), |asked| asked.check())?;
         self.drops.as_ref().map_or(Ok(()), DropSettings::check)?;
+        self.sequential.iter().try_for_each(SequentialSettings::check)?;
         self.growth.check()?;
         spacing::check(self)
     }
@@ -159,6 +182,8 @@ impl Settings {
 mod tests {
     use super::*;
     use crate::rollout::{PairControl, RolloutSpec};
+    use crate::scenario::Keys;
+    use crate::scenario::growth_plan::GrowthPlan;
     use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint, SliceAxis};
 
     /// Sound settings of two states.
@@ -196,7 +221,11 @@ mod tests {
                 varies: vec![true, false],
                 boundary: BoundarySearch::Rays,
                 heading: None,
+                plan: GrowthPlan::SHRINKING,
             },
+            sequential: None,
+            attempt: None,
+            keys: Keys::Seed,
         }
     }
 

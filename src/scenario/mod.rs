@@ -1,6 +1,7 @@
 //! Certificates: what scenarios, drawn and rolled out, allow one to claim.
 
 mod assumptions;
+mod attempt;
 pub mod bound;
 pub mod boundary;
 mod box_record;
@@ -25,6 +26,7 @@ pub mod drops;
 pub mod drops_record;
 pub mod drops_settings;
 mod empty;
+pub mod evidence;
 pub mod falsify;
 mod finding;
 pub(crate) mod fit;
@@ -32,6 +34,11 @@ mod fresh;
 pub mod global;
 pub mod growth;
 pub mod growth_batch;
+pub mod growth_plan;
+mod growth_set;
+mod growth_upward;
+mod key_source;
+mod keys;
 pub mod ledger;
 pub(crate) mod limits;
 pub mod linear;
@@ -44,6 +51,8 @@ pub mod purpose;
 pub mod record;
 pub mod sampling;
 pub mod sequence;
+mod sequential;
+pub mod sequential_record;
 pub(crate) mod sets;
 pub mod settings;
 mod side;
@@ -57,10 +66,12 @@ mod verify;
 mod visited;
 mod whole_box;
 
+pub use attempt::{AttemptRecord, attempt_share};
 pub use box_record::BoxRecord;
 pub use box_settings::BoxSettings;
 pub use certify::{certify, check_settings};
 pub use finding::{CheckReport, Figure, Finding};
+pub use key_source::Keys;
 #[cfg(feature = "cli")]
 pub(crate) use origin::provenance;
 pub use origin::{Hashes, hashes};

@@ -48,3 +48,11 @@ pub const FRESH_PERTURBATION: Purpose = Purpose::numbered(25);
 pub const DETERMINISTIC_ADVERSARY: Purpose = Purpose::numbered(23);
 /// Starts of the certified share of a deterministic certificate.
 pub const DETERMINISTIC: Purpose = Purpose::numbered(26);
+/// Starts in the sets of local growth upward.
+pub const GROWTH_UPWARD: Purpose = Purpose::numbered(27);
+/// Starts of the pilot that fixes the axes of an ellipsoid or a box.
+pub const GROWTH_PILOT: Purpose = Purpose::numbered(28);
+/// Starts of a sequential claim.
+pub const SEQUENTIAL: Purpose = Purpose::numbered(29);
+/// Their perturbations.
+pub const SEQUENTIAL_PERTURBATION: Purpose = Purpose::numbered(37);

@@ -4,11 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use super::attempt::AttemptRecord;
 use super::box_record::BoxRecord;
 pub use super::claim::Claim;
 pub use super::constant_record::{Assumption, ConstantRecord, ConstantsRecord, VisitedRecord};
 pub use super::deterministic_record::{DeterministicRecord, RadiiRecord};
 use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
+pub use super::growth_plan::UpwardRecord;
+pub use super::sequential_record::SequentialRecord;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
@@ -85,6 +88,12 @@ pub struct Record {
     pub slice: SliceRecord,
     /// Local growth.
     pub growth: GrowthRecord,
+    /// The sequential claim, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequential: Option<SequentialRecord>,
+    /// The numbered attempt; none of a certificate that counts as the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attempt: Option<AttemptRecord>,
     /// What of beta was spent on which claim.
     pub ledger: Vec<Spending>,
     /// Sum of the ledger: all claims hold together with confidence one minus this.
@@ -107,8 +116,9 @@ impl Record {
         let calibration = self.calibration.iter().map(|calibration| &calibration.claim);
         let first = [&self.deviation.claim, &self.global.claim].into_iter();
         let whole_box = self.whole_box.iter().map(|found| &found.claim);
+        let sequential = self.sequential.iter().map(|asked| &asked.claim);
         let sets = first.chain(whole_box).chain(drops).chain(calibration);
-        sets.chain(&self.growth.claim).collect()
+        sets.chain(&self.growth.claim).chain(sequential).collect()
     }
 
     /// Whether nothing speaks against the Lipschitz constants, where the certified set rests on them:
@@ -298,7 +308,7 @@ pub struct GrowthRecord {
     /// Its distance from the state in the coordinates that vary.
     #[serde(with = "crate::files::number", default)]
     pub distance: Option<f64>,
-    /// Radius of the verified ball; 0 if none was.
+    /// Radius of the verified set; 0 if none was.
     #[serde(with = "crate::files::number")]
     pub radius: f64,
     /// Volume of the verified ball in the coordinates that vary.
@@ -312,6 +322,9 @@ pub struct GrowthRecord {
     pub claim: Option<Claim>,
     /// Some starts of the last round, at most 400, for the picture.
     pub samples: Vec<SampleRecord>,
+    /// What growth upward fixed beforehand; none of Algorithm 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upward: Option<UpwardRecord>,
 }
 
 /// What came of local growth.

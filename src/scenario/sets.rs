@@ -17,7 +17,7 @@ use crate::model::Model;
 use crate::rollout::drops::Shapes;
 use crate::rollout::{
     DeviationTask, Keep, NON_FINITE, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec,
-    Starts, Stream, Tightening,
+    Starts, Tightening,
 };
 
 /// Starts of the pilot that fixes the levels.
@@ -210,7 +210,7 @@ fn pilot_scores(context: Context<'_>, settings: &Settings, shapes: &Shapes) -> R
     context.watch.begin("pilot of the levels", PILOT);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     // The first stream of the purpose is that of the pairs.
-    let stream = Stream::new(settings.seed, purpose::DROPS_PILOT_NOMINAL, 1);
+    let stream = settings.stream(purpose::DROPS_PILOT_NOMINAL, 1);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region, stream },
         range: 0..PILOT,
@@ -291,7 +291,7 @@ fn inside<const SETS: usize>(
 ) -> Result<[u64; SETS]> {
     context.watch.begin("share of the sets", draws);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let stream = Stream::new(settings.seed, purpose::FRESH_SHARE, 0);
+    let stream = settings.stream(purpose::FRESH_SHARE, 0);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region, stream },
         range: 0..draws,
@@ -328,7 +328,7 @@ fn by_constants(
     }
     let lost = tightened::tightening(&deviation.bound, constants, &settings.spec);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let stream = Stream::new(settings.seed, purpose::FRESH_SHARE, 0);
+    let stream = settings.stream(purpose::FRESH_SHARE, 0);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region, stream },
         range: 0..draws.min(settings.global.draws),

@@ -7,6 +7,9 @@ use super::box_settings::BoxSettings;
 use super::constant_record::Assumption;
 use super::deterministic_settings::DeterministicSettings;
 use super::drops_settings::DropSettings;
+use super::growth_plan::GrowthPlan;
+use super::key_source::Keys;
+use super::sequential_record::SequentialSettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::{PairControl, RolloutSpec};
@@ -115,7 +118,7 @@ pub enum BoundarySearch {
 /// Local growth, section 5 and Algorithm 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrowthSettings {
-    /// First radius, `r_max`.
+    /// The largest radius, `r_max`: the first of Algorithm 1, the last of growth upward.
     pub radius: f32,
     /// Rounds M.
     pub rounds: u32,
@@ -134,6 +137,8 @@ pub struct GrowthSettings {
     /// The two coordinates whose velocity says what is ahead, and their velocities: the slice
     /// search of the study prefers cells there. Indices `[x, vx, y, vy]`.
     pub heading: Option<[usize; 4]>,
+    /// Which way radii go, and what grows.
+    pub plan: GrowthPlan,
 }
 
 /// Everything that `certify` needs to know beside the plant and the backend.
@@ -166,6 +171,13 @@ pub struct Settings {
     pub state: Vec<f32>,
     /// Local growth.
     pub growth: GrowthSettings,
+    /// A claim whose starts are looked at one after the other, where one is asked for.
+    pub sequential: Option<SequentialSettings>,
+    /// Number of the attempt that the betas are booked for; none of a certificate that counts as the only
+    /// one. Set by [`Settings::as_attempt`].
+    pub attempt: Option<u32>,
+    /// Where the key of the streams that claims rest on comes from.
+    pub keys: Keys,
 }
 
 /// Risk, beta and decision variables of each scenario program of a joint method.
@@ -275,7 +287,11 @@ impl Settings {
                 varies: vec![true; axes.len()],
                 boundary: BoundarySearch::Rays,
                 heading: None,
+                plan: GrowthPlan::SHRINKING,
             },
+            sequential: None,
+            attempt: None,
+            keys: Keys::Claim,
         })
     }
 }

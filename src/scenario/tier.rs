@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::growth_set::Family;
 use super::record::{GrowthOutcome, GrowthRecord};
-use crate::rollout::Ball;
+use crate::rollout::Region;
 
 /// Who controls at a state, section 6 of `docs/method.md` and Algorithm 2; a file has its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -39,7 +40,7 @@ pub(super) fn tier(
     growth: &GrowthRecord,
     x: &[f32],
 ) -> Tier {
-    let local = || verified_ball(growth, x.len()).is_some_and(|ball| ball.contains(x));
+    let local = || verified_set(growth, x.len()).is_some_and(|set| set.contains(x));
     match () {
         () if target_margin > 0.0 => Tier::Target,
         () if check_margin > 0.0 => Tier::Global,
@@ -48,15 +49,15 @@ pub(super) fn tier(
     }
 }
 
-/// The verified ball of `states` coordinates, where there is one: a record that was edited may have
+/// The verified set of `states` coordinates, where there is one: a record that was edited may have
 /// any number of them.
-pub(super) fn verified_ball(growth: &GrowthRecord, states: usize) -> Option<Ball> {
+pub(super) fn verified_set(growth: &GrowthRecord, states: usize) -> Option<Region> {
     let whole = |center: &&Vec<f32>| center.len() == states && growth.varies.len() == states;
     let verified = growth.outcome == GrowthOutcome::Verified;
-    let center = growth.center.as_ref().filter(whole).filter(|_| verified)?;
-    Some(Ball {
-        center: center.clone(),
-        radius: growth.radius as f32,
-        varies: growth.varies.clone(),
-    })
+    let center = growth.center.as_ref().filter(whole).filter(|_| verified)?.clone();
+    let family = match &growth.upward {
+        None => Family::balls(center, &growth.varies),
+        Some(upward) => upward.family(center),
+    };
+    (family.widths.len() == states).then(|| family.at(growth.radius as f32))
 }

@@ -7,8 +7,9 @@ use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
 use super::fresh;
+use super::key_source::Keys;
 use super::origin::{Hashes, hashes, provenance};
-use super::record::{HASHED_ALIKE, Record, SCHEMA, finite_margin};
+use super::record::{HASHED_ALIKE, Provenance, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier};
 use super::{Context, Unwatched, Watch, compare, global, sets, whole_box};
@@ -89,7 +90,8 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
 fn check_derived(program: &Program<'_>, record: &Record, settings: &Settings) -> Result<()> {
     let mut again = derived(program.plant(), settings, record)?;
     let here = provenance(program, settings.seed, record.provenance.config.clone());
-    again.provenance = here;
+    let generator = settings.keys.generator().to_owned();
+    again.provenance = Provenance { generator, ..here };
     let finding = compare::fields(record, &again);
     if finding.holds {
         return Ok(());
@@ -110,6 +112,7 @@ pub fn query(
     states: States<'_>,
 ) -> Result<Vec<QueryRow>> {
     let plant = program.plant();
+    let settings = &with_keys_of(record, settings);
     check_identity(plant, record)?;
     check_sizes(settings, &plant.model)?;
     let settings = &whole_box::as_recorded(settings, record);
@@ -149,7 +152,7 @@ pub fn check(
     watch: &dyn Watch,
 ) -> Result<CheckReport> {
     check_identity(program.plant(), record)?;
-    let settings = &whole_box::as_recorded(settings, record);
+    let settings = &whole_box::as_recorded(&with_keys_of(record, settings), record);
     let again = certify(program, settings, record.provenance.config.clone(), watch)?;
     let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
@@ -157,6 +160,11 @@ pub fn check(
     findings.extend(not_compared(record));
     findings.extend(fresh::findings(context, record, settings, fresh_seed)?);
     Ok(CheckReport::new(fresh_seed, findings))
+}
+
+/// `settings` with the keys that `record` was made with.
+fn with_keys_of(record: &Record, settings: &Settings) -> Settings {
+    Settings { keys: Keys::of(&record.provenance.generator), ..settings.clone() }
 }
 
 /// Compares the stored record with the one computed again from its seed.

@@ -5,7 +5,7 @@ use super::settings::Settings;
 use super::{Context, pairs_f64, purpose};
 use crate::error::Result;
 use crate::rollout::side_by_side::PairGroup;
-use crate::rollout::{Pairs, Region, Starts, Stream};
+use crate::rollout::{Pairs, Region, Starts};
 
 /// Most pilot pairs that are looked at.
 const MOST_PAIRS: u64 = 256;
@@ -14,7 +14,7 @@ const WIDENED: f64 = 0.1;
 
 /// Rolls out pilot pairs in f64, so that every backend comes to the same hull.
 pub(super) fn visited(context: Context<'_>, settings: &Settings) -> Result<VisitedRecord> {
-    let stream = |purpose| Stream::new(settings.seed, purpose, 0);
+    let stream = |purpose| settings.stream(purpose, 0);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let pairs = Pairs {
         nominal: Starts::Drawn { region, stream: stream(purpose::PILOT_NOMINAL) },

@@ -14,7 +14,7 @@ use super::verdict::{risk_above, risk_below, verdict};
 use crate::error::Result;
 use crate::model::Model;
 use crate::rollout::{
-    NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
+    NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
 };
 
 /// The first version of the record that says something of the whole box.
@@ -114,7 +114,7 @@ fn task<'a>(
 ) -> Result<ReachAvoidTask<'a>> {
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     Ok(ReachAvoidTask {
-        starts: Starts::Drawn { region, stream: Stream::new(settings.seed, purpose, 0) },
+        starts: Starts::Drawn { region, stream: settings.stream(purpose, 0) },
         range: 0..settings.global.draws,
         spec: settings.spec,
         tightening,

@@ -13,6 +13,8 @@ use reachcast::policy::Mlp;
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{PairControl, RolloutSpec};
+use reachcast::scenario::Keys;
+use reachcast::scenario::growth_plan::GrowthPlan;
 use reachcast::scenario::settings::{
     BoundarySearch, ConstantSettings, DeviationSettings, DeviationSource, GlobalSettings,
     GrowthSettings, Joint, Settings, SliceAxis,
@@ -101,7 +103,11 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
             varies: vec![true; NX],
             boundary: BoundarySearch::Slice,
             heading: None,
+            plan: GrowthPlan::SHRINKING,
         },
+        sequential: None,
+        attempt: None,
+        keys: Keys::Seed,
     }
 }
 

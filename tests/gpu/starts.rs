@@ -3,8 +3,8 @@
 use reachcast::backend::gpu::Gpu;
 use reachcast::model::Plant;
 use reachcast::rollout::{
-    Ball, DeviationTask, PairControl, Pairs, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
-    Stream, Tightening,
+    Ball, DeviationTask, Ellipsoid, PairControl, Pairs, Query, ReachAvoidTask, Region, RolloutSpec,
+    Starts, Stream, Tightening,
 };
 use reachcast::scenario::purpose;
 
@@ -51,6 +51,9 @@ fn starts_have_the_host_bits() {
         let ball = Ball { center, radius: 0.55, varies: varies.to_vec() };
         gpu = revealed_starts::<6>(gpu, &drawn(Region::Ball(ball), 7), first);
     }
+    let center = vec![0.3, -0.2, 1.0, 0.0, 5.0, -0.7];
+    let set = Ellipsoid { center, half_axes: vec![0.55, 0.1, 0.0, 3.0, 0.25, 1e-3] };
+    gpu = revealed_starts::<6>(gpu, &drawn(Region::Ellipsoid(set), 7), first);
     let interval = Region::new_box([-1.0], [2.0]).expect("an interval");
     revealed_starts::<1>(gpu, &drawn(interval, 7), 0);
 }

@@ -181,7 +181,10 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
                     ..claim("growth", 0.0571)
                 }),
                 samples: samples.collect(),
+                upward: None,
             },
+            sequential: None,
+            attempt: None,
             ledger: ledger(),
             beta_total: 4e-3,
             picture: PictureRecord { rollouts: rollouts.collect() },

@@ -93,6 +93,10 @@ impl Inputs {
                     let varies = f32::from(u8::from(ball.varies[i]));
                     [ball.center[i], ball.radius, varies, 0.0]
                 }
+                Region::Ellipsoid(set) => {
+                    let varies = f32::from(u8::from(set.half_axes[i] > 0.0));
+                    [set.center[i], set.half_axes[i], varies, 0.0]
+                }
             };
             self.0.put(REGION, 4 * i, &vector);
         }

@@ -88,7 +88,7 @@ impl Params {
             params.stream = stream.id();
             params.region_kind = match region {
                 Region::Box { .. } => REGION_BOX,
-                Region::Ball(_) => REGION_BALL,
+                Region::Ball(_) | Region::Ellipsoid(_) => REGION_BALL,
             };
         }
         params

@@ -57,7 +57,8 @@ impl RaceInput {
         let folder = folder_of(path).to_owned();
         let policy = config.policy_source(&folder)?;
         let networks = Networks::read(&race, &folder)?;
-        let certificates = config.settings(&DroneRace::default().states())?;
+        let mut certificates = config.settings(&DroneRace::default().states())?;
+        certificates.growth.plan.method = race.hybrid.growth;
         let system = system(&config)?;
         policy_of(&system, &policy)?;
         Ok(Self { config, folder, race, certificates, system, policy, networks })

@@ -12,6 +12,7 @@ use crate::race::settings::{
     RaceSettings, RecoveryPoint, STUDY_PLAN_GAIN, STUDY_RECOVERY, STUDY_VALUE_WEIGHT, SigmaSetting,
 };
 use crate::rollout::NoiseKind;
+use crate::scenario::growth_plan::GrowthMethod;
 
 /// Improvements of the fast plan, and of MPPI alone, at each control step in `rigorous`.
 const FAST_ITERATIONS: u32 = 3;
@@ -95,6 +96,7 @@ fn study_hybrid() -> HybridSettings {
         global: true,
         domain: Domain::Anywhere,
         local: true,
+        growth: GrowthMethod::Shrinking,
         recovery_tier: true,
         latch: true,
         near_gate: true,

@@ -181,7 +181,8 @@ struct Certified<'p, 'a> {
 pub(super) fn certificates(grid: &Grid<'_>) -> Findings {
     let all: Vec<Certified<'_, '_>> = grid.points.iter().filter_map(certified).collect();
     let best = grid.best.and_then(|best| certified(&grid.points[best]));
-    let parts = [best.map(|best| largest_share(grid, &best)), largest_ball(grid, &all), held(&all)];
+    let parts =
+        [best.map(|best| largest_share(grid, &best, &all)), largest_ball(grid, &all), held(&all)];
     let (headlines, found) = parts.into_iter().flatten().unzip();
     Findings { headlines, found, limits: certificate_limits(&all) }
 }
@@ -190,12 +191,17 @@ fn certified<'p, 'a>(point: &'p Point<'a>) -> Option<Certified<'p, 'a>> {
     Some(Certified { point, certificate: certificate(point.record)? })
 }
 
-fn largest_share(grid: &Grid<'_>, best: &Certified<'_, '_>) -> (Headline, String) {
+fn largest_share(
+    grid: &Grid<'_>,
+    best: &Certified<'_, '_>,
+    all: &[Certified<'_, '_>],
+) -> (Headline, String) {
     let (name, value) = (grid.name(best.point), percent(share(best.certificate)));
     let interval = percents(best.certificate.share_interval);
     let found =
         format!("The largest share of the box is certified at {name}: {value} ({interval}).");
-    let details = vec![format!("At {name}."), format!("Interval: {interval}.")];
+    let mut details = vec![format!("At {name}."), format!("Interval: {interval}.")];
+    details.extend(picked(all));
     (Headline { title: "Largest certified share".to_owned(), value, details }, found)
 }
 
@@ -211,8 +217,22 @@ fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline,
     };
     let (name, radius) = (grid.name(largest.point), lower(radius(largest)));
     let found = format!("The largest verified ball has radius {radius}, at {name}.");
-    let details = vec![format!("At {name}.")];
+    let mut details = vec![format!("At {name}.")];
+    details.extend(picked(all));
     Some((Headline { title, value: format!("radius {radius}"), details }, found))
+}
+
+/// That a point was picked after a look at all of them, with the beta that covers the choice; nothing of a
+/// single point.
+fn picked(all: &[Certified<'_, '_>]) -> Option<String> {
+    let total: f64 = all.iter().map(|one| one.certificate.beta_total).sum();
+    let count = all.len();
+    let covered = if total < 1.0 {
+        format!("beta {} covers the choice.", upper(total))
+    } else {
+        "their betas sum to 1 or more, so nothing covers the choice.".to_owned()
+    };
+    (count > 1).then(|| format!("Picked after a look at {count} points: {covered}"))
 }
 
 fn held(all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {

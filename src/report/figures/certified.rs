@@ -7,6 +7,7 @@ use crate::report::slice::Grid;
 use crate::report::span::Span;
 use crate::report::text::{lower, ordinary};
 use crate::report::words;
+use crate::scenario::growth_plan::GrowthShape;
 use crate::scenario::record::{GrowthOutcome, Record};
 
 const CENTER: &str = "<path class=\"center\" d=\"M-6 0H6M0-6V6\"/>";
@@ -19,8 +20,10 @@ struct Ball {
     radius: f64,
     /// Radius of what the plane cuts out of it; `None` if it passes by.
     section: Option<f64>,
-    /// Whether the ball extends along each axis of the slice.
-    extends: [bool; 2],
+    /// Half-width along each axis of the slice at radius 1; 0 where it does not extend.
+    widths: [f64; 2],
+    /// Whether it has corners.
+    shape: GrowthShape,
 }
 
 impl Ball {
@@ -35,17 +38,34 @@ impl Ball {
         let states = slice_states(record);
         let center = growth.center.as_deref()?;
         let varies = |state: usize| growth.varies.get(state).copied().unwrap_or(true);
-        let away: f64 = (0..center.len())
-            .filter(|&state| varies(state) && !states.contains(&state))
-            .filter_map(|state| Some(entry(center, state)? - entry(&record.state.x, state)?))
-            .map(|gap| gap * gap)
-            .sum();
-        let left = radius * radius - away;
+        let upward = growth.upward.as_ref();
+        let shape = upward.map_or(GrowthShape::Ball, |upward| upward.shape);
+        let width = |state: usize| match upward {
+            Some(upward) => upward.widths.get(state).map_or(0.0, |width| f64::from(*width)),
+            None => f64::from(u8::from(varies(state))),
+        };
+        let away = (0..center.len())
+            .filter(|&state| width(state) > 0.0 && !states.contains(&state))
+            .filter_map(|state| {
+                let gap = entry(center, state)? - entry(&record.state.x, state)?;
+                Some((gap / width(state)).powi(2))
+            });
+        let section = match shape {
+            GrowthShape::Box => {
+                let inside = away.fold(0.0, f64::max) < radius * radius;
+                inside.then_some(radius)
+            }
+            _ => {
+                let left = radius * radius - away.sum::<f64>();
+                (left > 0.0).then(|| left.sqrt())
+            }
+        };
         ordinary(radius).then_some(Self {
             center: point(center, states)?,
             radius,
-            section: (left > 0.0).then(|| left.sqrt()),
-            extends: states.map(varies),
+            section,
+            widths: states.map(width),
+            shape,
         })
     }
 
@@ -55,20 +75,25 @@ impl Ball {
     }
 
     fn draw(&self, plot: &mut Plot, verified: bool) {
-        let half = |plot: &Plot, radius: f64| {
-            let lengths = plot.lengths(radius);
-            [0, 1].map(|axis| if self.extends[axis] { lengths[axis] } else { 0.0 })
-        };
         if self.shadowed() {
-            let half = half(plot, self.radius);
-            plot.ellipse("shadow", self.center, half);
+            self.outline(plot, "shadow", self.radius);
         }
         if let Some(section) = self.section {
-            let class = if verified { "ball" } else { "ball unverified" };
-            let half = half(plot, section);
-            plot.ellipse("ball-halo", self.center, half);
-            plot.ellipse(class, self.center, half);
+            self.outline(plot, "ball-halo", section);
+            self.outline(plot, if verified { "ball" } else { "ball unverified" }, section);
         }
+    }
+
+    /// The set of that radius in the plane, its centre in the middle.
+    fn outline(&self, plot: &mut Plot, class: &str, radius: f64) {
+        let half = self.widths.map(|width| radius * width);
+        let [x, y] = self.center;
+        if self.shape == GrowthShape::Box {
+            let data = plot.rectangle([x - half[0], y - half[1], x + half[0], y + half[1]]);
+            return plot.path(class, &data);
+        }
+        let lengths = [0, 1].map(|axis| plot.lengths(half[axis])[axis]);
+        plot.ellipse(class, self.center, lengths);
     }
 }
 
@@ -121,6 +146,7 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
     }
     let positive = values.iter().filter(|&&value| value > 0.0).count();
     let mut caption = format!("{positive} of {} cells are certified.", values.len());
+    let set = words::grown(record);
     let varied = record.growth.varies.iter().filter(|&&varies| varies).count();
     match (record.growth.outcome, ball) {
         (GrowthOutcome::NoBoundary, _) => {
@@ -128,8 +154,8 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
         }
         (outcome, Some(ball)) => {
             let kind = match outcome {
-                GrowthOutcome::Verified => "verified ball",
-                _ => "last ball tried, which is not verified,",
+                GrowthOutcome::Verified => format!("verified {set}"),
+                _ => format!("last {set} tried, which is not verified,"),
             };
             let radius = lower(ball.radius);
             caption += &format!(" The {kind} has radius {radius} in {varied} coordinates");
@@ -173,7 +199,7 @@ fn spans(grid: &Grid, ball: Option<&Ball>) -> [Span; 2] {
         let (low, high) = (spans[axis].low, spans[axis].high);
         let near = |value: f64| value.clamp(2.0 * low - high, 2.0 * high - low);
         let circle = ball.map(|ball| {
-            let reach = if ball.extends[axis] { 1.04 * ball.radius } else { 0.0 };
+            let reach = 1.04 * ball.radius * ball.widths[axis];
             [ball.center[axis] - reach, ball.center[axis] + reach]
         });
         let all = marks.chain(circle.into_iter().flatten()).map(near);

@@ -1,11 +1,12 @@
 //! The rounds of local growth: radius tried and failures.
 
 use crate::report::figure::{Figure, Swatch, cross, dot};
+use crate::report::growth::caption;
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
 use crate::report::text::{count, lower, ordinary};
 use crate::report::words;
-use crate::scenario::record::{GrowthOutcome, Record};
+use crate::scenario::record::Record;
 
 const NEAREST: &str = "<path class=\"nearest\" d=\"M-9 0H9\"/>";
 
@@ -17,28 +18,26 @@ pub(super) fn figure(record: &Record) -> Figure {
     } else {
         Ok(drawing(record))
     };
+    let [accepted, refused, nearest] = match &growth.upward {
+        None => {
+            ["round without failure", "round with failures", "nearest failure: the next radius"]
+        }
+        Some(_) => ["round accepted", "round refused", "nearest failure"],
+    };
     let mut legend = Vec::new();
     if drawing.is_ok() {
         legend = vec![
-            (Swatch::Mark(dot(5.0)), "round without failure".to_owned()),
-            (Swatch::Mark(cross(4.0)), "round with failures".to_owned()),
-            (Swatch::Mark(NEAREST.to_owned()), "nearest failure: the next radius".to_owned()),
+            (Swatch::Mark(dot(5.0)), accepted.to_owned()),
+            (Swatch::Mark(cross(4.0)), refused.to_owned()),
+            (Swatch::Mark(NEAREST.to_owned()), nearest.to_owned()),
         ];
     }
-    let outcome = match growth.outcome {
-        GrowthOutcome::Verified => "The last round had no failure: its ball is verified.",
-        GrowthOutcome::Exhausted => "No round was clean: no ball is certified.",
-        GrowthOutcome::NoBoundary => "There was no boundary to grow from.",
-    };
     Figure {
         id: "figure-growth",
         title: "Rounds of local growth".to_owned(),
         drawing,
         legend,
-        caption: format!(
-            "Each round draws fresh starts from a ball and shrinks it to the nearest failure; the \
-             labels count failures among starts. {outcome}"
-        ),
+        caption: caption(record),
     }
 }
 
@@ -48,6 +47,7 @@ fn drawing(record: &Record) -> String {
     let highest = Span::of(radii.flatten().chain([0.0])).map_or(0.0, |span| span.high);
     let x = Span { low: 0.5, high: rounds.len() as f64 + 0.5 };
     let y = Span { low: 0.0, high: if highest > 0.0 { 1.18 * highest } else { 1.0 } };
+    let allowed = record.growth.upward.as_ref().map_or(0, |upward| upward.allowed);
     let mut plot = Plot::new("growth", x, y, Proportions::Free(190.0));
     for (index, round) in rounds.iter().enumerate() {
         let at = index as f64 + 1.0;
@@ -56,7 +56,7 @@ fn drawing(record: &Record) -> String {
         if let Some(nearest) = round.nearest_failure.filter(|&nearest| ordinary(nearest)) {
             plot.mark([at, nearest], NEAREST);
         }
-        let mark = if round.failures == 0 { dot(6.0) } else { cross(5.0) };
+        let mark = if round.failures <= allowed { dot(6.0) } else { cross(5.0) };
         // Beyond eight rounds only the failures fit above a mark.
         let label = if rounds.len() > 8 {
             count(round.failures)

@@ -6,7 +6,7 @@ use super::worst::Worst;
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::{
-    DeviationTask, PairControl, Pairs, Region, RolloutSpec, Starts, Stream, Tightening, replay,
+    DeviationTask, PairControl, Pairs, Region, RolloutSpec, Starts, Tightening, replay,
 };
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, purpose};
@@ -81,7 +81,7 @@ pub(in crate::scenario) fn failing_pairs(
 /// The pairs of the conditional sample.
 fn task<'a>(settings: &Settings, tightening: &'a Tightening) -> Result<DeviationTask<'a>> {
     let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-    let [nominal, perturbation] = purposes.map(|purpose| Stream::new(settings.seed, purpose, 0));
+    let [nominal, perturbation] = purposes.map(|purpose| settings.stream(purpose, 0));
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     Ok(DeviationTask {
         pairs: Pairs {

@@ -7,8 +7,8 @@ use super::record::FalsifyRecord;
 use crate::rollout::{Region, RolloutSpec};
 use crate::scenario::bound::lower_bound;
 use crate::scenario::record::{Claim, Record};
-use crate::scenario::tier::verified_ball;
-use crate::scenario::tightened::tightening;
+use crate::scenario::sets::tightening;
+use crate::scenario::tier::verified_set;
 
 /// Chance that uniform draws call a true claim false.
 const FALSE_ALARM: f64 = 1e-6;
@@ -27,15 +27,15 @@ pub struct Target {
 }
 
 impl Target {
-    /// The ball that the local growth of `record` verified, of a model with so many states.
+    /// The set that the local growth of `record` verified, of a model with so many states.
     ///
     /// # Errors
     /// A sentence where none was verified.
     pub fn ball(record: &Record, states: usize) -> Result<Self, String> {
-        match verified_ball(&record.growth, states) {
-            Some(ball) => Ok(Self {
-                words: format!("the verified ball of radius {}", ball.radius),
-                region: Region::Ball(ball),
+        match verified_set(&record.growth, states) {
+            Some(region) => Ok(Self {
+                words: format!("the verified {} of radius {}", region.name(), record.growth.radius),
+                region,
                 pairs: None,
                 claim: record.growth.claim.clone(),
             }),
@@ -54,7 +54,7 @@ impl Target {
         let pairs = PairSettings {
             radius: record.deviation.radius as f32,
             control: record.deviation.control,
-            tightening: tightening(&record.deviation.bound, &record.constants, spec),
+            tightening: tightening(record, spec),
         };
         Ok(Self {
             words: "the perturbed starts of the certified set".to_owned(),

@@ -4,7 +4,7 @@ use super::pairs::halves;
 use super::settings::FalsifySettings;
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::rollout::{Ball, Pairs, Region, Starts, Stream};
+use crate::rollout::{Pairs, Region, Starts, Stream};
 
 /// What a start that rounding put outside of a ball is drawn in by, first; twice that next.
 const DRAWN_IN: f64 = 1e-7;
@@ -78,24 +78,25 @@ impl Domain {
                 }
                 x
             }
-            Region::Ball(ball) => self.in_ball(ball, u),
+            Region::Ball(ball) => self.in_round(&ball.center, |_| ball.radius, u),
+            Region::Ellipsoid(set) => self.in_round(&set.center, |i| set.half_axes[i], u),
         }
     }
 
-    /// The start of a ball at `u`.
-    fn in_ball(&self, ball: &Ball, u: &[f64]) -> Vec<f32> {
+    /// The start of a ball or an ellipsoid of these half axes at `u`.
+    fn in_round(&self, center: &[f32], half: impl Fn(usize) -> f32, u: &[f64]) -> Vec<f32> {
         let length = u.iter().map(|u| u * u).sum::<f64>().sqrt();
-        let mut scale = f64::from(ball.radius) / length.max(1.0);
+        let mut scale = 1.0 / length.max(1.0);
         let mut drawn_in = DRAWN_IN;
         loop {
-            let mut x = ball.center.clone();
+            let mut x = center.to_vec();
             for (&i, u) in self.varying.iter().zip(u) {
-                x[i] = (f64::from(ball.center[i]) + scale * u) as f32;
+                x[i] = (f64::from(center[i]) + scale * f64::from(half(i)) * u) as f32;
             }
-            if ball.contains(&x) || scale <= 0.0 {
+            if self.region.contains(&x) || scale <= 0.0 {
                 return x;
             }
-            scale = (scale - drawn_in * f64::from(ball.radius)).max(0.0);
+            scale = (scale - drawn_in).max(0.0);
             drawn_in *= 2.0;
         }
     }
@@ -118,6 +119,9 @@ impl Domain {
             }
             Region::Ball(ball) => {
                 (f64::from(x[i]) - f64::from(ball.center[i])) / f64::from(ball.radius)
+            }
+            Region::Ellipsoid(set) => {
+                (f64::from(x[i]) - f64::from(set.center[i])) / f64::from(set.half_axes[i])
             }
         };
         self.varying.iter().map(at).collect()

@@ -18,8 +18,8 @@ use crate::race::sweep::{
     Computed, Store, certificate_point, certificate_sha256, certificate_sweep,
 };
 use crate::scenario::bound::CountRule;
-use crate::scenario::check_settings;
 use crate::scenario::settings::Settings;
+use crate::scenario::{Keys, check_settings};
 
 /// Keys that `--count` sets.
 const COUNTS: [&str; 2] = ["deviation.scenarios", "growth.scenarios"];
@@ -143,5 +143,7 @@ fn counted(
         let counts = config.settings(axes)?.scenario_counts(rule)?;
         [config.deviation.scenarios, config.growth.scenarios] = counts;
     }
-    Ok((config.settings(axes)?, config.to_json()?))
+    // Points keep their samples, whatever varies between them.
+    let settings = Settings { keys: Keys::Seed, ..config.settings(axes)? };
+    Ok((settings, config.to_json()?))
 }
