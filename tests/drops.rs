@@ -215,12 +215,14 @@ fn edited_counts_are_noticed(
     sequence.levels[chosen].failures = Some(0);
     let mut lax = record.clone();
     let sequence = lax.sequence.as_mut().expect("a sequence");
-    sequence.chosen = sequence.levels.len() - 1;
+    sequence.chosen = (sequence.chosen + 1) % sequence.levels.len();
     let mut share = record.clone();
-    share.drops.as_mut().expect("drops").share.inside += 1;
-    for edited in [fewer, lax, share] {
+    share.drops.as_mut().expect("drops").share.inside += 100;
+    for (what, edited) in
+        [("fewer failures", fewer), ("another level", lax), ("a larger share", share)]
+    {
         let state = reachcast::rollout::States::one(&settings.state);
-        let refused = query(program, &edited, settings, state).expect_err("an edited record");
+        let refused = query(program, &edited, settings, state).expect_err(what);
         println!("{refused}");
     }
 }
@@ -259,5 +261,6 @@ fn too_few_draws_say_what_the_risk_needs() {
     assert_eq!((sequence.outcome, sequence.levels.len()), (SequenceOutcome::Single, 1));
     let words = record.statements.join("\n");
     assert!(words.contains("was not tested") && words.contains("global.draws"), "{words}");
-    assert!(record.global.claim.epsilon.is_none() && record.global.accepted > 0);
+    let (claim, accepted) = (&record.global.claim, record.global.accepted);
+    assert!(claim.epsilon == Some(0.03) && accepted > 0 && !record.holds, "{claim:?} {accepted}");
 }

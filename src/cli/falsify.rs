@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::files::{Existing, MANIFEST, Staged, is_free, json, make_way};
 use crate::model::Plant;
 use crate::rollout::Region;
+use crate::rounding::number;
 use crate::scenario::counterexamples::{COUNTEREXAMPLES, REPLAYED, replayed_csv, starts_csv};
 use crate::scenario::falsify::{Against, FalsifyRecord, FalsifySettings, Target, falsify};
 use crate::system::Axis;
@@ -222,7 +223,7 @@ fn text(plant: &Plant, answer: &Answer<'_>, files: &[PathBuf]) -> String {
     if let Some(best) = &record.best {
         let names = plant.model.states.iter().map(|axis| axis.name.as_str());
         let at: Vec<String> = names.zip(&best.x).map(|(name, x)| format!("{name} {x}")).collect();
-        let _ = writeln!(text, "smallest measure: {:.9} at {}", best.measure, at.join(", "));
+        let _ = writeln!(text, "smallest measure: {} at {}", number(best.measure), at.join(", "));
     }
     if record.unconfirmed > 0 {
         let _ = writeln!(text, "{} fail in f32 alone, and do not count", record.unconfirmed);

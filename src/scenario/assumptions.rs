@@ -103,7 +103,7 @@ fn refuted(name: &str, constant: &ConstantRecord) -> Option<String> {
 
 /// That a constant was given below the bound that was computed, where no sample refutes it.
 fn below(name: &str, constant: &ConstantRecord) -> Option<String> {
-    let under = constant.source == GIVEN && constant.used < constant.computed;
+    let under = constant.source == GIVEN && constant.used * (1.0 + ROUNDING) < constant.computed;
     (under && !constant.is_refuted()).then(|| {
         let computed = match constant.computed {
             computed if computed.is_finite() => format!("the computed bound {}", upper(computed)),

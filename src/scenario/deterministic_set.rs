@@ -15,6 +15,7 @@ use crate::real::bound::Interval;
 use crate::rollout::{
     PairControl, Pairs, Query, Region, Starts, StateList, Stream, Tightening, replay,
 };
+use crate::rounding::{lower, upper};
 
 /// Starts between two looks at whether to stop.
 const CHUNK: usize = 32;
@@ -180,15 +181,15 @@ fn statement(record: &DeterministicRecord) -> String {
         PairControl::ClosedLoop => "under the policy in feedback",
     };
     let [low, high] = record.share_interval;
-    let (low, high) = ((1e5 * low).floor() / 1e3, (1e5 * high).ceil() / 1e3);
     format!(
         "Every start within {radius} of a start that is certified by {} reaches the target safely {driven}: \
          no risk and no confidence, in real arithmetic with the f32 parameters of model and policy. With \
-         confidence 1 - {beta}, this certifies between {low:.3} % and {high:.3} % of the box \
-         ({certified} of {starts} starts). f32 rollouts were at most {:.1e} away from the enclosure.",
+         confidence 1 - {beta}, this certifies between {} % and {} % of the box \
+         ({certified} of {starts} starts). f32 rollouts were at most {} away from the enclosure.",
         record.kind.name(),
-        // A unit more in the last digit shown is at least as much.
-        1.05 * record.f32_distance,
+        lower(100.0 * low),
+        upper(100.0 * high),
+        upper(record.f32_distance),
     )
 }
 

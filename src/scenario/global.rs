@@ -4,7 +4,7 @@ use super::Context;
 use super::bound::{certified_risk, interval};
 use super::coordinates::{Coordinates, coordinates};
 use super::drops::pairs;
-use super::drops_record::{SequenceOutcome, SequenceRecord, ShareRecord};
+use super::drops_record::{SequenceRecord, ShareRecord};
 use super::pairs_f64;
 use super::probe::{PROBES, Probe, probe};
 use super::purpose;
@@ -230,7 +230,8 @@ pub(super) fn of_sequence(
     let band = band_of(probe.error);
     let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
     let mut global = conclude(model, settings, &count, probe.error)?;
-    if sequence.outcome != SequenceOutcome::Single {
+    // A risk that was asked for and not tested is not obtained.
+    if sequence.risk.is_some() {
         (global.claim.epsilon, global.claim.required_exact) = (sequence.risk, sequence.required);
     }
     global.share_interval = share.interval;

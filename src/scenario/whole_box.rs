@@ -10,12 +10,13 @@ use super::finding::{Figure, Finding};
 use super::purpose;
 use super::record::{Claim, GlobalRecord, Record};
 use super::settings::Settings;
-use super::verdict::{risk_above, risk_below, verdict};
+use super::verdict::verdict;
 use crate::error::Result;
 use crate::model::Model;
 use crate::rollout::{
     NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
 };
+use crate::rounding::{lower, upper};
 
 /// The first version of the record that says something of the whole box.
 const FIRST_SCHEMA: u32 = 3;
@@ -192,8 +193,8 @@ fn claim(
         statement: format!(
             "With confidence 1 - {beta}, a start drawn from the whole box fails under the policy with \
              probability at least {} and at most {} ({failures} of {draws} starts failed).",
-            risk_below(low),
-            risk_above(high)
+            lower(low),
+            upper(high)
         ),
         measure: format!(
             "start uniform in the box, {dimension} of {states} coordinates varying, under the policy in \

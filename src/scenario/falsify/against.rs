@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::pairs::PairSettings;
 use super::record::FalsifyRecord;
 use crate::rollout::{Region, RolloutSpec};
+use crate::rounding::lower;
 use crate::scenario::bound::lower_bound;
 use crate::scenario::record::{Claim, Record};
 use crate::scenario::sets::tightening;
@@ -117,7 +118,8 @@ impl Against {
         let words = format!(
             "the claim `{name}` is that such a start, drawn at random, fails with probability at most \
              {risk}: {single}. Of the {uniform} uniform draws {uniform_failures} fail: a probability of \
-             at least {at_least:.3e} with confidence 1 - {FALSE_ALARM:e}, {verdict}"
+             at least {} with confidence 1 - {FALSE_ALARM:e}, {verdict}",
+            lower(at_least)
         );
         Self { claim: name.clone(), risk, at_least, refuted, words }
     }

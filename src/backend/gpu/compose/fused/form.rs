@@ -1,7 +1,7 @@
 //! How the threads of a workgroup share the layers of its trajectories.
 
 use super::shape::{BLOCK, FusedLayer};
-use super::{WORKGROUP, whole};
+use crate::backend::gpu::compose::kernels::WORKGROUP;
 
 /// Most numbers of weights that a thread keeps: 255 are all that a thread of a GPU has, and sums,
 /// activations and addresses need the rest.
@@ -106,4 +106,9 @@ impl Form {
             Self::Rows { .. } => 2 * activations,
         }
     }
+}
+
+/// The least number of threads: one for each trajectory, and no less than the other kernels have.
+fn whole(lanes: u32) -> u32 {
+    lanes.max(1).next_multiple_of(WORKGROUP / 2)
 }

@@ -1,6 +1,8 @@
 //! The last layer: each trajectory's own thread, since it has few neurons.
 
-use super::{Form, Fused};
+use super::form::Form;
+use super::network::Fused;
+use super::rows;
 
 /// Lines that compute the outputs `v0`, `v1`, ... of the trajectory of `lane`, in vectors of 4.
 pub(super) fn text(fused: &Fused) -> String {
@@ -31,9 +33,9 @@ pub(super) fn text(fused: &Fused) -> String {
 
 /// The vector of the inputs from `k` on.
 fn inputs(fused: &Fused) -> String {
-    match fused.form {
+    match fused.form() {
         Form::Rows { .. } => {
-            let name = super::rows::buffer(fused.hidden().len());
+            let name = rows::buffer(fused.hidden().len());
             format!("{name}[lane * INPUT_QUADS + k / 4u]")
         }
         _ => {

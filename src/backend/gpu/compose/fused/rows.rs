@@ -3,7 +3,8 @@
 //! Activations are `[trajectories, inputs / 4]` vectors of 4 inputs, in two buffers that take turns.
 //! Twin: backend/cpu/mlp.rs.
 
-use super::{Fused, masked};
+use super::network::Fused;
+use super::shape::masked;
 
 /// The parts of a vector.
 const PARTS: [&str; 4] = ["x", "y", "z", "w"];

@@ -59,6 +59,17 @@ pub(in crate::backend::gpu) fn packed(mlp: &Mlp) -> Vec<[f32; 4]> {
     packed
 }
 
+/// `0 <= neuron < neurons`, or 0: weights of 0 do not keep a padded neuron at 0 where an input is
+/// infinite.
+pub(super) fn masked(value: &str, neuron: &str, neurons: &str, padded: bool) -> String {
+    if padded { format!("select(0.0, {value}, {neuron} < {neurons})") } else { value.to_owned() }
+}
+
+/// Whether a hidden layer has neurons that pad it.
+pub(super) fn pads(hidden: &[FusedLayer]) -> bool {
+    hidden.iter().any(|layer| layer.neurons != 4 * layer.quads)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

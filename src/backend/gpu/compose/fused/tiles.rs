@@ -3,16 +3,17 @@
 //! Activations are `[rows, trajectories / 4]` vectors of 4 trajectories, so that a tile of 8 by 8 needs
 //! four loads for 64 products. Twin: backend/cpu/mlp.rs.
 
-use super::shape::{BLOCK, FusedLayer};
-use super::{Form, Fused, masked, pads};
+use super::form::Form;
+use super::network::Fused;
+use super::shape::{BLOCK, FusedLayer, masked, pads};
 
 /// The parts of a vector.
 const PARTS: [&str; 4] = ["x", "y", "z", "w"];
 
 /// `put_inputs`, `begin_drive` and `run_hidden`.
 pub(super) fn text(fused: &Fused) -> String {
-    let tile = Tile { form: fused.form, loads: loads(fused) };
-    let staged = matches!(fused.form, Form::Slices { .. });
+    let tile = Tile { form: fused.form(), loads: loads(fused) };
+    let staged = matches!(fused.form(), Form::Slices { .. });
     let mut text = sizes(fused) + &inputs(fused) + &layer_table(fused.hidden());
     if staged {
         text += &slice_memory(fused);
@@ -47,7 +48,7 @@ fn sizes(fused: &Fused) -> String {
          struct Layer {{\n    // Of the biases, which [depth, quads] vectors of weights follow.\n    \
          offset: u32,\n    depth: u32,\n    quads: u32,\n    neurons: u32,\n}}\n",
         trajectories / 4,
-        trajectories / fused.form.tile_columns(),
+        trajectories / fused.form().tile_columns(),
         rows * trajectories / 4,
     )
 }
