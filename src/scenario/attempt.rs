@@ -51,7 +51,7 @@ impl Settings {
         self.sequential.iter_mut().for_each(|asked| asked.beta *= share);
         self.whole_box.iter_mut().for_each(|asked| asked.beta *= share);
         self.deterministic.iter_mut().for_each(|asked| asked.beta *= share);
-        for drops in &mut self.drops {
+        if let Some(drops) = &mut self.drops {
             drops.sample.beta *= share;
             drops.calibration.iter_mut().for_each(|asked| asked.beta *= share);
         }
