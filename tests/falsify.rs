@@ -11,6 +11,7 @@ use std::path::Path;
 use command::{Folder, document, done, reachcast, refused};
 use common::{backends, cpu};
 use reachcast::backend::Backend;
+use reachcast::config::{Config, Overrides};
 use reachcast::model::Plant;
 use reachcast::model::text::{Description, read};
 use reachcast::rollout::{
@@ -326,7 +327,7 @@ fn the_whole_box_stands_beside_the_certified_set() {
         }
         assert!(measures.is_sorted() && measures[0] < 0.0, "{measures:?}");
         if backend == "cpu" {
-            let (failed, worst) = box_by_hand();
+            let (failed, worst) = box_by_hand(config, &["state.position=0.6"]);
             assert_eq!(count("failures"), failed as f64);
             assert!(worst.iter().zip(&measures).all(|(a, b)| *a == *b as f32), "{worst:?}");
         }
@@ -335,9 +336,13 @@ fn the_whole_box_stands_beside_the_certified_set() {
 }
 
 /// How many of the 4000 nominal starts fail, and their smallest measures, counted here.
-fn box_by_hand() -> (usize, Vec<f32>) {
-    let (plant, region, spec) = plant("configs/models/double_integrator.toml", AS_IT_IS);
-    let stream = Stream::new(1, purpose::CONDITIONAL_NOMINAL, 0);
+fn box_by_hand(config: &str, set: &[&str]) -> (usize, Vec<f32>) {
+    let (plant, region, spec) = plant(config, AS_IT_IS);
+    let set = set.iter().chain(&SMALL).map(|set| (*set).to_owned()).collect();
+    let overrides = Overrides { set, ..Overrides::default() };
+    let config = Config::load(Path::new(config), &overrides).unwrap();
+    let settings = config.settings(&plant.model.states).unwrap().keyed(&plant);
+    let stream = settings.stream(purpose::CONDITIONAL_NOMINAL, 0);
     let starts: Vec<Vec<f32>> = (0..4000).map(|index| region.point(stream, index)).collect();
     let list = StateList::new(2).with(&starts);
     let backend = cpu(1);

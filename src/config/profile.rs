@@ -130,7 +130,7 @@ pub(crate) fn common(
                 BoundarySearch::Rays
             },
             heading: Vec::new(),
-            method: if rigorous { GrowthMethod::Upward } else { GrowthMethod::Shrinking },
+            method: GrowthMethod::Shrinking,
             shape: GrowthShape::Ball,
             factor: GrowthPlan::UPWARD.factor,
             pilot: GrowthPlan::UPWARD.pilot,

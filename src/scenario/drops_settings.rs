@@ -80,7 +80,7 @@ impl DropSettings {
     /// None of these numbers has one.
     pub fn rigorous() -> Result<Self> {
         let sample = SampleSettings::new(0.1, 1e-3, 0)?;
-        let calibration = Some(sample);
+        let calibration = Some(SampleSettings::new(0.1, 1e-3, 5)?);
         Ok(Self { pilot: 1000, sample, calibration, risk: Some(0.005), share_draws: 100_000 })
     }
 

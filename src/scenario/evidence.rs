@@ -81,10 +81,11 @@ mod tests {
         let Evidence { epsilon, a, b } = evidence;
         let (k, n) = (failures as f64, starts as f64);
         let nodes = 400_000;
+        // The logarithm, since bets leave the range of numbers.
         let integral = |bet: &dyn Fn(f64) -> f64| {
             let value = |i: usize| {
                 let q = epsilon * (i as f64 / nodes as f64).powf(1.0 / a);
-                (1.0 - q).powf(b - 1.0) * bet(q)
+                (b - 1.0) * (-q).ln_1p() + bet(q)
             };
             let weight = |i: usize| match i {
                 0 => 1.0,
@@ -92,10 +93,14 @@ mod tests {
                 odd if odd % 2 == 1 => 4.0,
                 _ => 2.0,
             };
-            (0..=nodes).map(|i| weight(i) * value(i)).sum::<f64>()
+            let values: Vec<f64> = (0..=nodes).map(value).collect();
+            let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let scaled = values.iter().enumerate().map(|(i, x)| weight(i) * (x - largest).exp());
+            largest + scaled.sum::<f64>().ln()
         };
-        let bet = |q: f64| (q / epsilon).powf(k) * ((1.0 - q) / (1.0 - epsilon)).powf(n - k);
-        (integral(&bet) / integral(&|_| 1.0)).ln()
+        let failed = |q: f64| if failures == 0 { 0.0 } else { k * (q / epsilon).ln() };
+        let bet = |q: f64| failed(q) + (n - k) * ((1.0 - q) / (1.0 - epsilon)).ln();
+        integral(&bet) - integral(&|_| 0.0)
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub fn grow_each(
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let open = |(request, center): (usize, Vec<f32>)| Open {
-        ball: Ball { center, radius: first_radius(asked), varies: asked.varies.clone() },
+        ball: Ball { center, radius: asked.first_radius(), varies: asked.varies.clone() },
         request,
         rounds: 0,
         f64_reruns: 0,
@@ -100,14 +100,6 @@ pub fn grow_each(
             });
     }
     Ok(grown.into_iter().flatten().collect())
-}
-
-/// The radius of the first round.
-fn first_radius(asked: &GrowthSettings) -> f32 {
-    match asked.plan.method {
-        GrowthMethod::Shrinking => asked.radius,
-        GrowthMethod::Upward => asked.radii().first().copied().unwrap_or(asked.radius),
-    }
 }
 
 /// The ball of the round after `number`, which showed `seen`; none where it was the last. Notes the

@@ -22,6 +22,14 @@ impl GrowthSettings {
         (0..self.rounds).rev().map(|down| radius(down) as f32).collect()
     }
 
+    /// The radius of the first round: the smallest one upward, when shrinking the largest.
+    pub(super) fn first_radius(&self) -> f32 {
+        match self.plan.method {
+            GrowthMethod::Shrinking => self.radius,
+            GrowthMethod::Upward => self.radii().first().copied().unwrap_or(self.radius),
+        }
+    }
+
     /// Failures that a round of growth upward may have: the most of N with which Clopper and Pearson's
     /// bound at the whole beta is at most the risk asked for; none where even a clean round is too small.
     pub fn allowed_failures(&self) -> Option<u64> {

@@ -18,9 +18,13 @@ pub enum Keys {
 }
 
 impl Keys {
-    /// Those of a record that names its generator so.
-    pub(super) fn of(generator: &str) -> Self {
-        if generator == OF_CLAIM { Self::Claim } else { Self::Seed }
+    /// Those of a record that names its generator so; none of one that is not known.
+    pub(super) fn of(generator: &str) -> Option<Self> {
+        match generator {
+            OF_CLAIM => Some(Self::Claim),
+            GENERATOR => Some(Self::Seed),
+            _ => None,
+        }
     }
 
     /// The generator as a record names it.

@@ -13,8 +13,8 @@ use crate::model::Plant;
 use crate::rollout::{Purpose, Stream};
 
 impl Settings {
-    /// The stream number `number` of a purpose that a claim rests on.
-    pub(super) fn stream(&self, purpose: Purpose, number: u32) -> Stream {
+    /// The stream number `number` of a purpose that a claim rests on, of settings that are [`Self::keyed`].
+    pub fn stream(&self, purpose: Purpose, number: u32) -> Stream {
         let seed = match self.keys {
             Keys::Derived(key) => key,
             Keys::Seed | Keys::Claim => self.seed,
@@ -23,7 +23,8 @@ impl Settings {
     }
 
     /// The same settings with the key derived from `plant` and claims, where that is asked for.
-    pub(super) fn keyed(&self, plant: &Plant) -> Self {
+    #[must_use]
+    pub fn keyed(&self, plant: &Plant) -> Self {
         let keys = match self.keys {
             Keys::Claim => Keys::Derived(key(plant, self)),
             other => other,
@@ -88,12 +89,12 @@ fn claimed(plant: &Plant, settings: &Settings) -> String {
     text
 }
 
-/// The lines of growth.
+/// The lines of growth; which cells its centre is looked for in first is not claimed.
 fn growth(text: &mut String, asked: &GrowthSettings) {
     let plan = asked.plan;
     let _ = writeln!(
         text,
-        "growth {} {} {} {} {} {} {:?} {:?} {:?}\nplan {:?} {:?} {} {}",
+        "growth {} {} {} {} {} {} {:?} {:?}\nplan {:?} {:?} {} {}",
         asked.radius,
         asked.rounds,
         asked.scenarios,
@@ -102,7 +103,6 @@ fn growth(text: &mut String, asked: &GrowthSettings) {
         asked.split_beta,
         asked.varies,
         asked.boundary,
-        asked.heading,
         plan.method,
         plan.shape,
         plan.factor,
@@ -151,7 +151,8 @@ mod tests {
         assert_eq!(of(&unsliced), of(&plain));
         let old = Settings { keys: Keys::Seed, ..plain.clone() };
         assert_eq!(old.keyed(&plant_of_all), old);
-        assert_eq!(Keys::of(Keys::Claim.generator()), Keys::Claim);
-        assert_eq!(Keys::of("Philox4x32-10"), Keys::Seed);
+        assert_eq!(Keys::of(Keys::Claim.generator()), Some(Keys::Claim));
+        assert_eq!(Keys::of("Philox4x32-10"), Some(Keys::Seed));
+        assert_eq!(Keys::of("another"), None);
     }
 }

@@ -41,7 +41,7 @@ fn check_radius(key: &str, radius: f32, settings: &Settings, varies: &[bool]) ->
 pub(super) fn check(settings: &Settings) -> Result<()> {
     let all = vec![true; settings.low.len()];
     check_radius("deviation.radius", settings.deviation.radius, settings, &all)?;
-    check_radius("growth.radius", settings.growth.radius, settings, &settings.growth.varies)
+    check_radius("growth.radius", settings.growth.first_radius(), settings, &settings.growth.varies)
 }
 
 #[cfg(test)]

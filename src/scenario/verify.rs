@@ -112,7 +112,7 @@ pub fn query(
     states: States<'_>,
 ) -> Result<Vec<QueryRow>> {
     let plant = program.plant();
-    let settings = &with_keys_of(record, settings);
+    let settings = &with_keys_of(record, settings)?;
     check_identity(plant, record)?;
     check_sizes(settings, &plant.model)?;
     let settings = &whole_box::as_recorded(settings, record);
@@ -152,7 +152,7 @@ pub fn check(
     watch: &dyn Watch,
 ) -> Result<CheckReport> {
     check_identity(program.plant(), record)?;
-    let settings = &whole_box::as_recorded(&with_keys_of(record, settings), record);
+    let settings = &whole_box::as_recorded(&with_keys_of(record, settings)?, record);
     let again = certify(program, settings, record.provenance.config.clone(), watch)?;
     let context = Context { program, watch };
     let mut findings = recomputed(record, &again);
@@ -163,8 +163,17 @@ pub fn check(
 }
 
 /// `settings` with the keys that `record` was made with.
-fn with_keys_of(record: &Record, settings: &Settings) -> Settings {
-    Settings { keys: Keys::of(&record.provenance.generator), ..settings.clone() }
+///
+/// # Errors
+/// [`Error::Refused`] for a generator that this program does not have.
+fn with_keys_of(record: &Record, settings: &Settings) -> Result<Settings> {
+    let generator = &record.provenance.generator;
+    match Keys::of(generator) {
+        Some(keys) => Ok(Settings { keys, ..settings.clone() }),
+        None => Err(Error::Refused(format!(
+            "provenance.generator is `{generator}`, which this version does not have; certify again"
+        ))),
+    }
 }
 
 /// Compares the stored record with the one computed again from its seed.
