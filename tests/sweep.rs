@@ -11,10 +11,13 @@ use std::time::{Duration, Instant};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
+use reachcast::config::{Config, Overrides};
 use reachcast::race::record::RaceRecord;
 use reachcast::race::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
 use reachcast::scenario::bound::{required_scenarios, simple_scenarios};
 use reachcast::scenario::record::{GrowthOutcome, Record};
+use reachcast::scenario::settings::Settings;
+use reachcast::scenario::{Keys, Unwatched, certify};
 use sweep_run::{CONFIG, Folder, command, done, message_of, record, sweep};
 
 /// Columns that are measured anew.
@@ -249,6 +252,19 @@ fn damaged_points_are_not_counted() {
     assert_eq!(rates(&again), rates(&whole));
 }
 
+/// The certificate of `config` under `set`, on the samples of the seed: those of a sweep's points.
+fn certificate(config: &str, set: Vec<String>) -> Record {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(config);
+    let config = Config::load(&path, &Overrides { set, ..Overrides::default() }).unwrap();
+    let policy = config.policy_source(path.parent().unwrap()).unwrap();
+    let plant = config.plant(&policy).unwrap();
+    let settings = config.settings(&plant.model.states).unwrap();
+    let settings = Settings { keys: Keys::Seed, ..settings };
+    let backend = common::cpu(2);
+    let program = backend.prepare(&plant).unwrap();
+    certify(&program, &settings, serde_json::Value::Null, &Unwatched).unwrap()
+}
+
 #[test]
 fn certificates_are_what_certify_makes() {
     let folder = Folder::new();
@@ -273,16 +289,13 @@ fn certificates_are_what_certify_makes() {
         let point = all[i];
         assert_eq!((point.deviation_scenarios, point.growth_scenarios), (pairs, growth));
         let keys = [
-            format!("--set=deviation.epsilon={epsilon}"),
-            format!("--set=growth.epsilon={epsilon}"),
-            format!("--set=deviation.scenarios={pairs}"),
-            format!("--set=growth.scenarios={growth}"),
+            format!("deviation.epsilon={epsilon}"),
+            format!("growth.epsilon={epsilon}"),
+            format!("deviation.scenarios={pairs}"),
+            format!("growth.scenarios={growth}"),
+            draws[1].to_owned(),
         ];
-        let mut arguments = vec!["certify", config];
-        arguments.extend(keys.iter().map(String::as_str));
-        arguments.extend(draws);
-        let text = printed(&arguments, &folder.path(&format!("certificate{i}")));
-        let one: Record = serde_json::from_str(&text).unwrap();
+        let one = certificate(config, keys.to_vec());
         assert_eq!(point.share_interval, one.global.share_interval);
         assert_eq!(point.volume_interval, one.global.volume_interval);
         assert_eq!(point.conditional_risk, one.global.claim.certified_risk);
