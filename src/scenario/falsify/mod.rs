@@ -42,8 +42,8 @@ const CLOUD: f64 = 0.1;
 /// the backend and in f64.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a budget or region that nothing can be searched with; those of the backend;
-/// [`Error::Interrupted`] if `watch` says so.
+/// [`crate::Error::Invalid`] for a budget or region that nothing can be searched with; those of the backend;
+/// [`crate::Error::Interrupted`] if `watch` says so.
 pub fn falsify(
     program: &Program<'_>,
     settings: &FalsifySettings,
