@@ -168,7 +168,9 @@ fn scenario_counts_follow_from_what_is_asked_for() {
     assert_eq!(counts(RACE, &["profile=study"]), [158, 158]);
     // The simple bound: ceil(2 / epsilon (ln(1 / beta) + d)).
     assert_eq!(counts(RACE, &["deviation.epsilon=0.01"]), [1582, 159]);
-    assert_eq!(counts(RACE, &["growth.epsilon=0.05"]), [159, 409]);
+    assert_eq!(counts(RACE, &["growth.epsilon=0.05"]), [159, 317]);
+    // Shrinking, beta over the rounds: ceil(20 (ln 20,000 + 1)).
+    assert_eq!(counts(RACE, &["growth.method=shrinking"]), [159, 219]);
     assert_eq!(counts(RACE, &["deviation.joint=variables"]), [739, 159]);
     assert_eq!(counts(RACE, &["deviation.joint=variables", "rollout.horizon=10"]), [339, 159]);
     assert_eq!(counts(RACE, &["growth.rounds=1"]), [159, 159]);

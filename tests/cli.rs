@@ -208,9 +208,11 @@ fn configurations_that_do_not_hold_together() {
 
 #[test]
 fn too_few_scenarios_for_the_claim() {
-    // Exact counts at risk 0.1 and beta 1e-3: 66 for one variable; 88 with beta over 10 rounds.
+    // Exact counts at risk 0.1 and beta 1e-3: 66 for one variable; 94 with beta over 20 rounds.
     certify_refused(&["deviation.scenarios=65"], &["65 scenarios", "at least 66"]);
-    certify_refused(&["growth.scenarios=80"], &["80 scenarios", "at least 88"]);
+    certify_refused(&["growth.scenarios=65"], &["65 scenarios", "at least 66"]);
+    let shrinking = ["growth.method=shrinking", "growth.scenarios=80"];
+    certify_refused(&shrinking, &["80 scenarios", "at least 94"]);
     // One decision variable per step, 30 steps.
     let joint = ["deviation.joint=variables", "deviation.scenarios=300"];
     certify_refused(&joint, &["300 scenarios", "30 decision variable"]);

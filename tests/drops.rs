@@ -13,7 +13,8 @@ use reachcast::rollout::{
     Stream,
 };
 use reachcast::scenario::drops_record::SequenceOutcome;
-use reachcast::scenario::drops_settings::DropSettings;
+use reachcast::scenario::drops_settings::{ConditionalRisk, DropSettings};
+use reachcast::scenario::growth_plan::{Around, GrowthPlan};
 use reachcast::scenario::record::Record;
 use reachcast::scenario::settings::Settings;
 use reachcast::scenario::{Unwatched, certify, check, query};
@@ -166,8 +167,8 @@ fn small() -> (Plant, Settings) {
     settings.global.draws = 4000;
     let rigorous = DropSettings::rigorous().expect("settings");
     // Two thirds of the draws are not certifiable: a risk that the others can support.
-    settings.drops =
-        Some(DropSettings { risk: Some(0.03), pilot: 200, share_draws: 5000, ..rigorous });
+    let risk = Some(ConditionalRisk::Asked(0.03));
+    settings.drops = Some(DropSettings { risk, pilot: 200, share_draws: 5000, ..rigorous });
     (Plant::of(system, race_policy()), settings)
 }
 
@@ -263,4 +264,40 @@ fn too_few_draws_say_what_the_risk_needs() {
     assert!(words.contains("was not tested") && words.contains("global.draws"), "{words}");
     let (claim, accepted) = (&record.global.claim, record.global.accepted);
     assert!(claim.epsilon == Some(0.03) && accepted > 0 && !record.holds, "{claim:?} {accepted}");
+}
+
+/// What is only looked for, and not shown, is told and is no claim that was missed.
+#[test]
+fn a_risk_that_is_looked_for_is_no_claim() {
+    let (plant, mut settings) = small();
+    let asked = settings.drops.as_mut().expect("drops");
+    asked.risk = Some(ConditionalRisk::LookedFor(0.03));
+    let shown = record(&cpu(2), &plant, &settings);
+    assert_eq!(shown.global.claim.epsilon, Some(0.03), "the draws show it");
+    settings.global.draws = 300;
+    let few = record(&cpu(2), &plant, &settings);
+    let claim = &few.global.claim;
+    assert!(few.statements.join("\n").contains("was not tested"));
+    assert!(claim.epsilon == Some(settings.deviation.epsilon) && claim.is_obtained(), "{claim:?}");
+}
+
+/// The strict bound holds its own centre, and the centre of the larger set that the sequence chose lies outside.
+#[test]
+fn growth_starts_on_the_boundary_that_is_asked_for() {
+    let (plant, mut settings) = small();
+    for around in [Around::Set, Around::Bound] {
+        settings.growth.plan = GrowthPlan { around, ..GrowthPlan::UPWARD };
+        let record = record(&cpu(2), &plant, &settings);
+        let (drops, sequence) = (record.drops.as_ref(), record.sequence.as_ref());
+        let (drops, sequence) = (drops.expect("drops"), sequence.expect("a sequence"));
+        let chosen = sequence.level().expect("a level");
+        assert!(chosen < drops.level, "{chosen} {}", drops.level);
+        let center = record.growth.center.as_ref().expect("a boundary");
+        let held = [drops.level, chosen].map(|level| {
+            let tightening = drops.shapes().tightening(level);
+            replay::measure(&plant, center, &settings.spec, &tightening) > 0.0
+        });
+        assert_eq!(record.growth.around, around);
+        assert_eq!(held, [around == Around::Bound, true], "{around:?}");
+    }
 }

@@ -37,7 +37,20 @@ fn certificate(config: &str, backend: &str, set: &[&str], out: &str) -> Value {
 
 /// The numbers that rollouts and formulas of two certificates come to.
 fn assert_same_numbers(text: &Value, rust: &Value) {
-    for field in ["deviation", "global", "growth", "slice", "constants", "state", "picture"] {
+    let numbers = [
+        "deviation",
+        "drops",
+        "sequence",
+        "calibration",
+        "global",
+        "growth",
+        "slice",
+        "constants",
+        "state",
+        "picture",
+    ];
+    for field in numbers {
+        assert!(!text[field].is_null(), "{field}");
         assert_eq!(text[field], rust[field], "{field}");
     }
     let hash = |record: &Value| record["provenance"]["physics_sha256"].clone();

@@ -138,7 +138,7 @@ fn values_out_of_range_name_their_key() {
     let noise = ["race.mppi.noise_cost=true", "race.mppi.noise={kind='colored',time=2}"];
     keys_refused("mppi", &noise, &["race.mppi.noise_cost", "independent"]);
     // Each step and round of growth takes a random stream.
-    let streams = ["race.steps=10000", "growth.rounds=9999"];
+    let streams = ["race.steps=10000", "growth.rounds=9999", "growth.method=shrinking"];
     keys_refused("mppi", &streams, &["growth.rounds", "race.steps", "16777216"]);
 }
 

@@ -105,7 +105,7 @@ fn growth(record: &Record) -> String {
     let rounds = growth.rounds.len();
     match growth.outcome {
         GrowthOutcome::Verified if growth.upward.is_some() => {
-            format!("verified radius {} in {rounds} rounds upward", growth.radius)
+            format!("verified radius {} in {rounds} rounds upward", lower(growth.radius))
         }
         GrowthOutcome::Exhausted if growth.upward.is_some() => {
             "exhausted: the first radius was refused".to_owned()

@@ -1,9 +1,12 @@
 //! From keys to numbers: margin drops as a configuration asks for them.
 
-use super::drops::{CalibrationSection, Count, DropsSection, TighteningSource, no_risk};
-use super::section::Config;
+use super::drops::{CalibrationSection, Count, DropsSection, TighteningSource};
+use super::section::{Config, Profile};
 use crate::error::Result;
-use crate::scenario::drops_settings::{DropSettings, SampleSettings};
+use crate::scenario::drops_settings::{ConditionalRisk, DropSettings, SampleSettings};
+
+/// The conditional risk that asks for none.
+const NO_RISK: f64 = 1.0;
 
 impl Config {
     /// Margin drops, where these tighten the margins.
@@ -21,10 +24,20 @@ impl Config {
             pilot,
             sample: sample(epsilon, beta, scenarios, discards),
             calibration: calibrated,
-            risk: (self.global.risk < no_risk()).then_some(self.global.risk),
+            risk: self.conditional_risk(),
             share_draws: self.global.share_draws,
         };
         settings.check().map(|()| Some(settings))
+    }
+
+    /// The conditional risk of the certified set: asked for, or what the profile looks for.
+    fn conditional_risk(&self) -> Option<ConditionalRisk> {
+        match (self.global.risk, self.profile) {
+            (Some(NO_RISK), _) => None,
+            (Some(risk), _) => Some(ConditionalRisk::Asked(risk)),
+            (None, Profile::Rigorous) => Some(ConditionalRisk::RIGOROUS),
+            (None, Profile::Paper | Profile::Study) => None,
+        }
     }
 }
 

@@ -106,8 +106,3 @@ impl Default for CalibrationSection {
 pub(super) fn share_draws() -> u64 {
     100_000
 }
-
-/// The conditional risk that asks for none.
-pub(super) fn no_risk() -> f64 {
-    1.0
-}

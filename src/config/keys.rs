@@ -80,7 +80,9 @@ pub(super) fn with_optional(defaults: &Table) -> Table {
         valid.insert("policy".to_owned(), Value::Table(Table::from_iter(policy)));
     }
     if let Some(Value::Table(global)) = valid.get_mut("global") {
-        global.insert("box_risk".to_owned(), Value::Float(0.0));
+        for key in ["box_risk", "risk"] {
+            global.insert(key.to_owned(), Value::Float(0.0));
+        }
     }
     with_tagged(&mut valid);
     valid

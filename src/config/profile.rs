@@ -11,7 +11,7 @@ use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
 use crate::rollout::PairControl;
-use crate::scenario::growth_plan::{GrowthMethod, GrowthPlan, GrowthShape};
+use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::SystemSection;
@@ -105,8 +105,12 @@ pub(crate) fn common(
             draws: 20_000,
             beta,
             box_risk: None,
-            tightening: TighteningSource::Lipschitz,
-            risk: conditional_risk(profile),
+            tightening: if rigorous {
+                TighteningSource::Drops
+            } else {
+                TighteningSource::Lipschitz
+            },
+            risk: None,
             share_draws: drops::share_draws(),
         },
         drops: DropsSection::default(),
@@ -116,9 +120,8 @@ pub(crate) fn common(
         state: by_name(states, |_, i| state[i]),
         growth: GrowthSection {
             radius: 0.55,
-            // In twelve dimensions the nearest failure lies near the rim, so that balls shrink slowly
-            // and five rounds seldom see a clean one. Beta is split over the rounds.
-            rounds: if rigorous { 10 } else { 5 },
+            // Radii from a hundredth of the largest up: where balls of a tenth of it fail, smaller ones pass.
+            rounds: if rigorous { 20 } else { 5 },
             scenarios,
             epsilon,
             beta,
@@ -130,7 +133,8 @@ pub(crate) fn common(
                 BoundarySearch::Rays
             },
             heading: Vec::new(),
-            method: GrowthMethod::Shrinking,
+            around: if rigorous { Around::Bound } else { Around::Set },
+            method: if rigorous { GrowthMethod::Upward } else { GrowthMethod::Shrinking },
             shape: GrowthShape::Ball,
             factor: GrowthPlan::UPWARD.factor,
             pilot: GrowthPlan::UPWARD.pilot,
@@ -156,12 +160,4 @@ fn by_name<T>(states: &[Axis], value: impl Fn(&Axis, usize) -> T) -> Named<T> {
 /// Owned names.
 pub(crate) fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
     names.map(str::to_owned).to_vec()
-}
-
-/// The conditional risk that a set by margin drops is to have, where these are asked for.
-fn conditional_risk(profile: Profile) -> f64 {
-    match profile {
-        Profile::Rigorous => 0.005,
-        Profile::Paper | Profile::Study => drops::no_risk(),
-    }
 }

@@ -3,14 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::deterministic::DeterministicSection;
-use super::drops::{CalibrationSection, DropsSection, TighteningSource, no_risk, share_draws};
+use super::drops::{CalibrationSection, DropsSection, TighteningSource, share_draws};
 use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::model::text::NetworkFile;
 use crate::rollout::PairControl;
-use crate::scenario::growth_plan::{GrowthMethod, GrowthPlan, GrowthShape};
+use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::Assumption;
 use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::{StudySettings, SystemSection};
@@ -218,9 +218,11 @@ pub struct GlobalSection {
     /// What tightens the margins.
     #[serde(default)]
     pub tightening: TighteningSource,
-    /// Conditional risk that the certified set is to have, by margin drops; 1 asks for none.
-    #[serde(default = "no_risk")]
-    pub risk: f64,
+    /// Conditional risk that the certified set is to have, by margin drops: a claim. 1 asks for none, and
+    /// without the key the profile looks for the set of a risk, and reports that of the bound by itself
+    /// where the draws are too few to show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub risk: Option<f64>,
     /// Fresh starts that estimate the share of sets by margin drops.
     #[serde(default = "share_draws")]
     pub share_draws: u64,
@@ -256,7 +258,7 @@ pub struct SliceAxisSection {
 pub struct GrowthSection {
     /// The largest radius: the first when shrinking, the last upward.
     pub radius: f64,
-    /// Rounds M.
+    /// Rounds M when shrinking, radii upward.
     pub rounds: u32,
     /// Starts N of each round.
     pub scenarios: u64,
@@ -272,6 +274,9 @@ pub struct GrowthSection {
     pub boundary: BoundarySearch,
     /// States `[x, vx, y, vy]` of the slice search that prefers cells ahead; empty for none.
     pub heading: Vec<String>,
+    /// Whose boundary the centre lies on; what an older version stored, on that of the certified set.
+    #[serde(default)]
+    pub around: Around,
     /// Which way radii go; what an older version stored shrinks.
     #[serde(default)]
     pub method: GrowthMethod,

@@ -132,6 +132,7 @@ impl Config {
             boundary: asked.boundary,
             heading: self.heading(axes)?,
             plan: GrowthPlan {
+                around: asked.around,
                 method: asked.method,
                 shape: asked.shape,
                 factor: asked.factor,

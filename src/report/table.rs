@@ -191,6 +191,7 @@ fn growth(record: &Record) -> String {
     pairs(
         "Local growth",
         &[
+            ("centre on the boundary of", growth.around.words().to_owned()),
             ("centre from", words::boundary(growth.boundary).to_owned()),
             ("distance of the centre from the state", or_dash(growth.distance.map(number))),
             ("radius of the verified ball", lower(growth.radius)),

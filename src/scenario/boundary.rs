@@ -1,8 +1,8 @@
 //! Boundary search: the point of the certified set's boundary that is closest to a state.
 
 use super::global::{check_margins, slice_through};
+use super::growth_plan::Around;
 use super::purpose;
-use super::record::SliceRecord;
 use super::settings::Settings;
 use super::{Context, settings::BoundarySearch};
 use crate::error::Result;
@@ -32,16 +32,50 @@ pub struct Boundary {
     pub distance: f64,
 }
 
-/// The closest boundary point by the method that `settings` ask for; none if there is none.
-pub fn search(
+/// The closest boundary point of the set that the bound certifies by itself, where `bound` is its
+/// tightening and there is one; else of the set that `certified` leaves. `band` as in [`check_margins`].
+///
+/// # Errors
+/// Those of the backend.
+pub fn center(
+    context: Context<'_>,
+    settings: &Settings,
+    bound: Option<&Tightening>,
+    certified: &Tightening,
+    band: f64,
+) -> Result<Option<Center>> {
+    let sets = bound.map(|bound| (Around::Bound, bound));
+    for (around, tightening) in sets.into_iter().chain([(Around::Set, certified)]) {
+        if let Some(boundary) = search(context, settings, tightening, band)? {
+            return Ok(Some(Center { around, boundary }));
+        }
+    }
+    Ok(None)
+}
+
+/// The centre of a growth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Center {
+    /// Whose boundary it lies on.
+    pub around: Around,
+    /// The boundary point.
+    pub boundary: Boundary,
+}
+
+/// The closest boundary point of the set that `tightening` leaves, by the method that `settings` ask for;
+/// none if there is none. `band` as in [`check_margins`].
+fn search(
     context: Context<'_>,
     settings: &Settings,
     tightening: &Tightening,
-    slice: &SliceRecord,
+    band: f64,
 ) -> Result<Option<Boundary>> {
     match settings.growth.boundary {
         BoundarySearch::Slice => {
-            let certified: Vec<bool> = slice.check_margin.iter().map(|v| *v > 0.0).collect();
+            let cells = slice_through(settings, &settings.state);
+            let (spec, cells, query) = (&settings.spec, cells.view(), Query::Measure);
+            let margins = check_margins(context, spec, tightening, cells, query, band)?;
+            let certified: Vec<bool> = margins.iter().map(|margin| *margin > 0.0).collect();
             Ok(on_slice(settings, &settings.state, &certified))
         }
         BoundarySearch::Rays => along_rays(context, settings, tightening),

@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use super::budget::{ledger, spendings};
 use super::fit::check_sizes;
+use super::growth_plan::Around;
 use super::origin::{provenance, system_record};
 use super::purpose;
 use super::record::{
     GrowthRecord, PictureRecord, Provenance, Record, RolloutRecord, SCHEMA, StateRecord, Timing,
     decimal, finite_margin,
 };
-use super::sets::{self, Sets};
+use super::sets;
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
@@ -48,11 +49,14 @@ pub fn certify(
     let ledger = ledger(settings)?;
     let mut tightened = tightened(context, settings)?;
     let mut drops = tightened.drops.take();
+    let around_bound = drops.is_some() && settings.growth.plan.around == Around::Bound;
+    let alone = around_bound.then(|| tightened.tightening.clone());
+    let mut share_rollouts = 0;
     let (global, sequence, calibration) = match (&settings.drops, &mut drops) {
         (Some(asked), Some(drops)) => {
-            let Sets { global, sequence, calibration } =
-                sets::sets(context, settings, asked, &mut tightened, drops)?;
-            (global, Some(sequence), calibration)
+            let found = sets::sets(context, settings, asked, &mut tightened, drops)?;
+            share_rollouts = found.share_rollouts;
+            (found.global, Some(found.sequence), found.calibration)
         }
         _ => {
             let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
@@ -63,8 +67,8 @@ pub fn certify(
     let Tightened { constants, deviation, tightening, .. } = tightened;
     let whole_box = whole_box::record(context, settings, &tightening, &global)?;
     let slice = global::slice(context, settings, &tightening, global.band)?;
-    let boundary = boundary::search(context, settings, &tightening, &slice)?;
-    let growth = growth::record(context, settings, boundary, global.band)?;
+    let center = boundary::center(context, settings, alone.as_ref(), &tightening, global.band)?;
+    let growth = growth::record(context, settings, center, global.band)?;
     let sequential = sequential::record(context, settings, &tightening, global.band)?;
     let state = state(context, settings, &tightening, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
@@ -108,7 +112,7 @@ pub fn certify(
     };
     record.statements = claims::statements(plant, settings, &record);
     record.holds = claims::holds(&record);
-    record.timing.rollouts += sets::rollouts(&record);
+    record.timing.rollouts += sets::rollouts(&record) + share_rollouts;
     record.timing.wall_seconds = begun.elapsed().as_secs_f64();
     Ok(record)
 }

@@ -17,9 +17,38 @@ pub struct DropSettings {
     pub calibration: Option<SampleSettings>,
     /// Conditional risk e that the sequence of levels is to obtain; none where one set is reported with
     /// the risk obtained.
-    pub risk: Option<f64>,
+    pub risk: Option<ConditionalRisk>,
     /// Fresh starts that estimate the share of each set.
     pub share_draws: u64,
+}
+
+/// The conditional risk e of the certified set, strictly between 0 and 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConditionalRisk {
+    /// A claim that is asked for: where it is not obtained, not all claims are.
+    Asked(f64),
+    /// The set of this risk where the draws show it; else one set with the risk obtained.
+    LookedFor(f64),
+}
+
+impl ConditionalRisk {
+    /// What the rigorous profile looks for.
+    pub const RIGOROUS: Self = Self::LookedFor(0.005);
+
+    /// The risk.
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Asked(risk) | Self::LookedFor(risk) => risk,
+        }
+    }
+
+    /// The risk that is asked for.
+    pub(super) fn asked(self) -> Option<f64> {
+        match self {
+            Self::Asked(risk) => Some(risk),
+            Self::LookedFor(_) => None,
+        }
+    }
 }
 
 /// Pairs of a claim on the largest of a number each.
@@ -81,7 +110,13 @@ impl DropSettings {
     pub fn rigorous() -> Result<Self> {
         let sample = SampleSettings::new(0.1, 1e-3, 0)?;
         let calibration = Some(SampleSettings::new(0.1, 1e-3, 5)?);
-        Ok(Self { pilot: 1000, sample, calibration, risk: Some(0.005), share_draws: 100_000 })
+        let risk = Some(ConditionalRisk::RIGOROUS);
+        Ok(Self { pilot: 1000, sample, calibration, risk, share_draws: 100_000 })
+    }
+
+    /// The conditional risk, asked for or looked for.
+    pub(super) fn risk_value(&self) -> Option<f64> {
+        self.risk.map(ConditionalRisk::value)
     }
 
     /// Refuses numbers out of range.
@@ -98,7 +133,7 @@ impl DropSettings {
                 return Err(Error::invalid(key, problem));
             }
         }
-        match self.risk {
+        match self.risk_value() {
             Some(risk) if !(risk > 0.0 && risk < 1.0) => {
                 let problem = format!("{risk} is not strictly between 0 and 1");
                 Err(Error::invalid("global.risk", problem))

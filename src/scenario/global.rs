@@ -4,7 +4,8 @@ use super::Context;
 use super::bound::{certified_risk, interval};
 use super::coordinates::{Coordinates, coordinates};
 use super::drops::pairs;
-use super::drops_record::{SequenceRecord, ShareRecord};
+use super::drops_record::{SequenceOutcome, SequenceRecord, ShareRecord};
+use super::drops_settings::ConditionalRisk;
 use super::pairs_f64;
 use super::probe::{PROBES, Probe, probe};
 use super::purpose;
@@ -224,15 +225,17 @@ pub(super) fn of_sequence(
     chosen: &ChosenSet<'_>,
 ) -> Result<GlobalRecord> {
     let &ChosenSet { sequence, share, reached, non_finite, probe, f64_reruns } = chosen;
+    let asked = settings.drops.and_then(|drops| drops.risk);
     let level = sequence.levels.get(sequence.chosen);
     let accepted = level.and_then(|level| level.accepted).unwrap_or_default();
     let failures = level.and_then(|level| level.failures).unwrap_or_default();
     let band = band_of(probe.error);
     let count = Count { band, accepted, failures, reached, non_finite, f64_reruns };
     let mut global = conclude(model, settings, &count, probe.error)?;
-    // A risk that was asked for and not tested is not obtained.
-    if sequence.risk.is_some() {
-        (global.claim.epsilon, global.claim.required_exact) = (sequence.risk, sequence.required);
+    // A risk that is asked for and not tested is not obtained; one that is looked for is told where shown.
+    let shown = sequence.risk.filter(|_| sequence.outcome == SequenceOutcome::Accepted);
+    if let Some(risk) = shown.or(asked.and_then(ConditionalRisk::asked)) {
+        (global.claim.epsilon, global.claim.required_exact) = (Some(risk), sequence.required);
     }
     global.share_interval = share.interval;
     global.volume_interval = share.interval.map(|end| end * global.box_volume);

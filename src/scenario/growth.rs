@@ -3,9 +3,9 @@
 
 use super::Context;
 use super::bound::{certified_risk, required_scenarios, simple_scenarios};
-use super::boundary::{self, Boundary};
+use super::boundary::{self, Boundary, Center};
 use super::coordinates::{Coordinates, coordinates};
-use super::growth_plan::{GrowthMethod, GrowthShape, UpwardRecord};
+use super::growth_plan::{Around, GrowthMethod, GrowthShape, UpwardRecord};
 use super::growth_set::{Drawn, Family, round};
 use super::growth_upward::{climb, fixed, verified_by};
 use super::purpose;
@@ -143,6 +143,7 @@ pub(super) fn derived(
 ) -> Result<GrowthRecord> {
     let asked = &settings.growth;
     let mut record = GrowthRecord {
+        around: stored.around,
         center: stored.center.clone(),
         rounds: stored.rounds.clone(),
         samples: stored.samples.clone(),
@@ -218,6 +219,7 @@ fn nothing(asked: &GrowthSettings) -> GrowthRecord {
     GrowthRecord {
         outcome: GrowthOutcome::NoBoundary,
         boundary: asked.boundary,
+        around: Around::Set,
         center: None,
         distance: None,
         radius: 0.0,
@@ -249,15 +251,16 @@ fn verified(
 pub(super) fn record(
     context: Context<'_>,
     settings: &Settings,
-    boundary: Option<Boundary>,
+    center: Option<Center>,
     band: f64,
 ) -> Result<GrowthRecord> {
     let asked = &settings.growth;
     check_scenarios(asked)?;
     let mut record = nothing(asked);
-    let Some(boundary) = boundary else {
+    let Some(Center { around, boundary }) = center else {
         return Ok(record);
     };
+    record.around = around;
     record.center = Some(boundary.point.clone());
     record.distance = Some(boundary.distance);
     record.outcome = GrowthOutcome::Exhausted;

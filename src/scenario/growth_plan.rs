@@ -39,9 +39,39 @@ impl GrowthShape {
     }
 }
 
+/// Whose boundary the centre lies on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Around {
+    /// The certified set.
+    #[default]
+    Set,
+    /// The set that the bound on margin drops certifies by itself, before a sequence goes on from it: the
+    /// boundary of a set that a sequence chose is nearly that of the starts from which the policy
+    /// succeeds, and around it few radii pass. The certified set where that one has no boundary.
+    Bound,
+}
+
+impl Around {
+    /// Whether it is the certified set, as records say that name none.
+    pub(super) fn is_set(&self) -> bool {
+        *self == Self::Set
+    }
+
+    /// The set in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Set => "the certified set",
+            Self::Bound => "the set that margin drops certify by themselves",
+        }
+    }
+}
+
 /// How a set is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrowthPlan {
+    /// Whose boundary the centre lies on.
+    pub around: Around,
     /// Which way radii go.
     pub method: GrowthMethod,
     /// What grows; Algorithm 1 knows balls alone.
@@ -55,6 +85,7 @@ pub struct GrowthPlan {
 impl GrowthPlan {
     /// Algorithm 1.
     pub const SHRINKING: Self = Self {
+        around: Around::Set,
         method: GrowthMethod::Shrinking,
         shape: GrowthShape::Ball,
         factor: 1.25,

@@ -5,6 +5,8 @@
 
 use std::fmt::Write;
 
+use super::drops_settings::DropSettings;
+use super::growth_plan::Around;
 use super::key_source::Keys;
 use super::origin::{Hashes, hashes};
 use super::settings::{GrowthSettings, Settings};
@@ -71,7 +73,7 @@ fn claimed(plant: &Plant, settings: &Settings) -> String {
         let _ = writeln!(text, "box {asked:?}");
     }
     if let Some(asked) = &settings.drops {
-        let _ = writeln!(text, "drops {asked:?}");
+        drops(&mut text, asked);
     }
     if let Some(asked) = &settings.deterministic {
         let _ = writeln!(text, "deterministic {asked:?}");
@@ -87,6 +89,17 @@ fn claimed(plant: &Plant, settings: &Settings) -> String {
         let _ = writeln!(text, "attempt {attempt}");
     }
     text
+}
+
+/// The line of margin drops; whether its risk is a claim or what is looked for changes no sample.
+fn drops(text: &mut String, asked: &DropSettings) {
+    let DropSettings { pilot, sample, calibration, share_draws, .. } = asked;
+    let risk = asked.risk_value();
+    let _ = writeln!(
+        text,
+        "drops DropSettings {{ pilot: {pilot}, sample: {sample:?}, calibration: {calibration:?}, \
+         risk: {risk:?}, share_draws: {share_draws} }}"
+    );
 }
 
 /// The lines of growth; which cells its centre is looked for in first is not claimed.
@@ -108,6 +121,9 @@ fn growth(text: &mut String, asked: &GrowthSettings) {
         plan.factor,
         plan.pilot,
     );
+    if plan.around == Around::Bound {
+        let _ = writeln!(text, "around the bound");
+    }
 }
 
 #[cfg(test)]

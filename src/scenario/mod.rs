@@ -55,6 +55,7 @@ mod sequential;
 pub mod sequential_record;
 pub(crate) mod sets;
 pub mod settings;
+mod shares;
 mod side;
 mod spacing;
 mod stored;

@@ -10,7 +10,7 @@ pub use super::claim::Claim;
 pub use super::constant_record::{Assumption, ConstantRecord, ConstantsRecord, VisitedRecord};
 pub use super::deterministic_record::{DeterministicRecord, RadiiRecord};
 use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
-pub use super::growth_plan::UpwardRecord;
+pub use super::growth_plan::{Around, UpwardRecord};
 pub use super::sequential_record::SequentialRecord;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
@@ -302,6 +302,9 @@ pub struct GrowthRecord {
     pub outcome: GrowthOutcome,
     /// Where the centre was looked for.
     pub boundary: BoundarySearch,
+    /// Whose boundary the centre lies on.
+    #[serde(default, skip_serializing_if = "Around::is_set")]
+    pub around: Around,
     /// The boundary point closest to the state.
     #[serde(with = "crate::files::number", default)]
     pub center: Option<Vec<f32>>,

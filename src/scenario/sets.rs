@@ -2,7 +2,7 @@
 
 use super::drops::pairs;
 use super::drops_record::{
-    CalibrationRecord, DropsRecord, SeenRecord, SequenceOutcome, SequenceRecord, ShareRecord,
+    CalibrationRecord, DropsRecord, SequenceOutcome, SequenceRecord, ShareRecord,
 };
 use super::drops_settings::DropSettings;
 use super::membership::{InF64, Judge, Outcome};
@@ -10,14 +10,15 @@ use super::probe::{Probe, probe};
 use super::record::{GlobalRecord, Record};
 use super::sequence::{Counts, Failed, Levels, derived, test};
 use super::settings::Settings;
+use super::shares::{self, Scored, undiscounted};
 use super::tightened::Tightened;
 use super::{Context, calibration, drops, global, purpose, tightened};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::Model;
 use crate::rollout::drops::Shapes;
 use crate::rollout::{
-    DeviationTask, Keep, NON_FINITE, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec,
-    Starts, Tightening,
+    DeviationTask, NON_FINITE, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec, Starts,
+    Tightening,
 };
 
 /// Starts of the pilot that fixes the levels.
@@ -31,6 +32,8 @@ pub(super) struct Sets {
     pub(super) sequence: SequenceRecord,
     /// The calibration, where it is asked for.
     pub(super) calibration: Option<CalibrationRecord>,
+    /// Rollouts that the shares took.
+    pub(super) share_rollouts: u64,
 }
 
 /// Chooses the level of the certified set, and draws the shares: `tightened` has the tightening of the
@@ -53,18 +56,19 @@ pub(super) fn sets(
     let calibration =
         calibration.map(|asked| calibration::calibrate(context, settings, asked)).transpose()?;
     let draws = asked.share_draws;
-    bound.by_constants = by_constants(context, settings, tightened, draws)?;
-    let inside_both = inside(context, settings, &shapes, [bound.level, level], draws, tally.band)?;
-    bound.share = ShareRecord::new(inside_both[0], draws, asked.sample.beta);
-    let share = ShareRecord::new(inside_both[1], draws, settings.global.beta);
-    let calibration = calibration
-        .map(|record| {
-            let (levels, units) = ([record.level], Shapes::of_discount(&settings.spec));
-            let [inside] = inside(context, settings, &units, levels, draws, tally.band)?;
-            let share = ShareRecord::new(inside, draws, record.claim.beta);
-            Ok::<_, Error>(CalibrationRecord { share, ..record })
-        })
-        .transpose()?;
+    bound.by_constants = shares::by_constants(context, settings, tightened, draws)?;
+    let units = Shapes::of_discount(&settings.spec);
+    let by_drops = Scored { shapes: &shapes, levels: vec![bound.level, level] };
+    let by_measure =
+        Scored { shapes: &units, levels: calibration.iter().map(|record| record.level).collect() };
+    let scored = [by_drops, by_measure];
+    let inside = shares::inside(context, settings, &scored, draws, tally.band)?;
+    bound.share = ShareRecord::new(inside.counts[0][0], draws, asked.sample.beta);
+    let share = ShareRecord::new(inside.counts[0][1], draws, settings.global.beta);
+    let calibration = calibration.map(|record| {
+        let share = ShareRecord::new(inside.counts[1][0], draws, record.claim.beta);
+        CalibrationRecord { share, ..record }
+    });
     let probe = global::probed(context, settings, &tightened.tightening)?;
     let chosen = global::ChosenSet {
         sequence: &sequence,
@@ -75,7 +79,7 @@ pub(super) fn sets(
         f64_reruns: tally.f64_reruns,
     };
     let global = global::of_sequence(context.model(), settings, &chosen)?;
-    Ok(Sets { global, sequence, calibration })
+    Ok(Sets { global, sequence, calibration, share_rollouts: inside.rollouts })
 }
 
 /// The tightening of the level that the sequence chooses, and the sequence.
@@ -117,7 +121,7 @@ pub(super) fn rederived(
         record.drops = Some(drops::derived(model, settings, asked, stored)?);
     }
     if let Some(stored) = &record.sequence {
-        record.sequence = Some(derived(stored, asked.risk, beta)?);
+        record.sequence = Some(derived(stored, asked.risk_value(), beta)?);
     }
     if let (Some(stored), Some(sample)) = (&record.calibration, &asked.calibration) {
         let draws = asked.share_draws;
@@ -149,15 +153,13 @@ pub(super) fn statements(record: &Record, draws: u64) -> Vec<String> {
     statements
 }
 
-/// Rollouts that these sets took, beside the draws.
+/// Rollouts that these sets took, beside the draws and the shares.
 pub(super) fn rollouts(record: &Record) -> u64 {
     let drops = record.drops.as_ref();
     let bound = drops.map_or(0, |drops| 2 * (drops.pilot + drops.claim.scenarios));
     let calibration = record.calibration.as_ref();
     let calibration = calibration.map_or(0, |calibration| 2 * calibration.claim.scenarios);
-    let sets = if record.calibration.is_some() { 2 } else { 1 };
-    let share = record.global.share.map_or(0, |share| sets * share.draws);
-    bound + calibration + share + record.sequence.as_ref().map_or(0, |sequence| sequence.pilot)
+    bound + calibration + record.sequence.as_ref().map_or(0, |sequence| sequence.pilot)
 }
 
 /// Why the risk asked for is not the one claimed.
@@ -194,15 +196,10 @@ fn choose(
 ) -> Result<Chosen> {
     let (draws, beta) = (settings.global.draws, settings.global.beta);
     let scores = pilot_scores(context, settings, shapes)?;
-    let levels = Levels::new(scores, draws, asked.risk, beta, single);
+    let levels = Levels::new(scores, draws, asked.risk_value(), beta, single);
     let tally = Tally::draw(context, settings, shapes, &levels)?;
-    let sequence = test(&levels, &tally.counts, asked.risk, beta, PILOT)?;
+    let sequence = test(&levels, &tally.counts, asked.risk_value(), beta, PILOT)?;
     Ok(Chosen { sequence, tally })
-}
-
-/// A measure without discount, as a score has it.
-fn undiscounted(settings: &Settings) -> RolloutSpec {
-    RolloutSpec { gamma: 1.0, ..settings.spec }
 }
 
 /// Scores of starts of the pilot, in f32: they only fix levels.
@@ -278,64 +275,4 @@ impl Tally {
         self.non_finite += u64::from(perturbed == f64::from(NON_FINITE));
         self.counts.add(strictest, if perturbed > 0.0 { Failed::No } else { Failed::Yes });
     }
-}
-
-/// How many of `draws` fresh starts lie in the set of each of `levels`.
-fn inside<const SETS: usize>(
-    context: Context<'_>,
-    settings: &Settings,
-    shapes: &Shapes,
-    levels: [f64; SETS],
-    draws: u64,
-    band: f64,
-) -> Result<[u64; SETS]> {
-    context.watch.begin("share of the sets", draws);
-    let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let stream = settings.stream(purpose::FRESH_SHARE, 0);
-    let task = ReachAvoidTask {
-        starts: Starts::Drawn { region, stream },
-        range: 0..draws,
-        spec: undiscounted(settings),
-        tightening: &shapes.units(),
-        query: Query::Measure,
-    };
-    let judges = levels.each_ref().map(|level| {
-        Judge::new(context.plant(), settings, shapes, std::slice::from_ref(level), band)
-    });
-    let mut inside = [0; SETS];
-    context.program.reach_avoid(&task, &mut |first, values| {
-        for (index, value) in (first..).zip(values) {
-            for (inside, judge) in inside.iter_mut().zip(&judges) {
-                *inside += u64::from(judge.holds(&task.starts, index, f64::from(*value)));
-            }
-        }
-        context.watch.advance(values.len() as u64)
-    })?;
-    Ok(inside)
-}
-
-/// How many of the first fresh starts constants times the deviation bound would certify: as many starts
-/// as the conditional sample has draws, and no more than `draws`.
-fn by_constants(
-    context: Context<'_>,
-    settings: &Settings,
-    tightened: &Tightened,
-    draws: u64,
-) -> Result<Option<SeenRecord>> {
-    let Tightened { constants, deviation, .. } = tightened;
-    if ![&constants.target, &constants.constraint].iter().all(|one| one.used.is_finite()) {
-        return Ok(None);
-    }
-    let lost = tightened::tightening(&deviation.bound, constants, &settings.spec);
-    let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let stream = settings.stream(purpose::FRESH_SHARE, 0);
-    let task = ReachAvoidTask {
-        starts: Starts::Drawn { region, stream },
-        range: 0..draws.min(settings.global.draws),
-        spec: settings.spec,
-        tightening: &lost,
-        query: Query::Sign,
-    };
-    let tally = context.program.tally(&task, Keep::Counts)?;
-    Ok(Some(SeenRecord { draws: task.range.end, inside: tally.counts().successes }))
 }

@@ -7,6 +7,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{PairControl, reach_avoid};
+use reachcast::scenario::growth_plan::Around;
 use reachcast::scenario::record::{
     Claim, ConstantRecord, ConstantsRecord, DeviationRecord, GlobalRecord, GrowthOutcome,
     GrowthRecord, PictureRecord, Provenance, Record, RolloutRecord, RoundRecord, SCHEMA,
@@ -161,6 +162,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             },
             slice: self.slice(),
             growth: GrowthRecord {
+                around: Around::Set,
                 outcome: GrowthOutcome::Verified,
                 boundary: BoundarySearch::Rays,
                 center: Some(short(&self.center)),
