@@ -107,9 +107,13 @@ Example:
     },
     /// Tell the tier and the tightened measure V_check of states against a stored certificate
     #[command(after_help = "\
-Tiers: 0 in the target set, 1 in the certified set, 2 in the locally verified ball, 3 otherwise.
+Tiers: 0 in the target set, 1 in the certified set, 2 in the set that local growth verified, 3 otherwise.
 Prints a line per state (index, tier, check_margin, target_margin); with --out DIR these go to
-DIR/query.csv instead and a summary is printed.
+DIR/query.csv instead and a summary is printed. More columns where the certificate has what they are of:
+  score       the largest lambda at which the state is certified by margin drops
+  measure     its reach-avoid measure, and in
+  calibrated  whether that is above alpha: in the calibrated set
+  radius      of a ball around it that is certified without samples, up to 8 times the one asked for
 
 Example:
   reachcast query reachcast-out --states configs/race_starts_500.csv")]

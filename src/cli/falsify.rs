@@ -56,7 +56,7 @@ pub(super) struct FalsifyArguments {
 /// What of a certificate is tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Within {
-    /// The ball that local growth verified
+    /// The set that local growth verified: a ball, an ellipsoid or a box
     Ball,
     /// The whole box
     Box,

@@ -17,6 +17,7 @@ use crate::model::Model;
 use crate::rollout::{
     Ball, DeviationTask, Pairs, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
 };
+use crate::rounding::confidence;
 
 /// Draws of the first batch; each next one has twice as many.
 const FIRST_BATCH: u64 = 256;
@@ -247,8 +248,9 @@ fn claim(
     let seen = format!("{failures} of {starts} starts failed");
     let statement = match outcome {
         SequentialOutcome::Certified => format!(
-            "With confidence 1 - {beta}, {whose} fails with probability at most {epsilon}: shown after \
-             {starts} starts, looked at one after the other ({seen})."
+            "With confidence {}, {whose} fails with probability at most {epsilon}: shown after \
+             {starts} starts, looked at one after the other ({seen}).",
+            confidence(beta)
         ),
         SequentialOutcome::Hopeless => format!(
             "It is not shown that {whose} fails with probability at most {epsilon}, and it is hopeless: {seen}."

@@ -16,8 +16,8 @@ use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::drops::Shapes;
 use crate::rollout::{
-    DeviationTask, Keep, NON_FINITE, PairMeasure, Query, ReachAvoidTask, Region, RolloutSpec,
-    Starts, Tightening,
+    DeviationTask, Keep, NON_FINITE, PairMeasure, Purpose, Query, ReachAvoidTask, Region,
+    RolloutSpec, Starts, Tightening,
 };
 
 /// Starts of the pilot that fixes the levels.
@@ -54,13 +54,14 @@ pub(super) fn sets(
         calibration.map(|asked| calibration::calibrate(context, settings, asked)).transpose()?;
     let draws = asked.share_draws;
     bound.by_constants = by_constants(context, settings, tightened, draws)?;
-    let inside_both = inside(context, settings, &shapes, [bound.level, level], draws, tally.band)?;
+    let starts = Fresh { purpose: purpose::FRESH_SHARE, draws, band: tally.band };
+    let inside_both = inside(context, settings, &shapes, [bound.level, level], starts)?;
     bound.share = ShareRecord::new(inside_both[0], draws, asked.sample.beta);
     let share = ShareRecord::new(inside_both[1], draws, settings.global.beta);
     let calibration = calibration
         .map(|record| {
             let (levels, units) = ([record.level], Shapes::of_discount(&settings.spec));
-            let [inside] = inside(context, settings, &units, levels, draws, tally.band)?;
+            let [inside] = inside(context, settings, &units, levels, starts)?;
             let share = ShareRecord::new(inside, draws, record.claim.beta);
             Ok::<_, Error>(CalibrationRecord { share, ..record })
         })
@@ -280,18 +281,29 @@ impl Tally {
     }
 }
 
-/// How many of `draws` fresh starts lie in the set of each of `levels`.
-fn inside<const SETS: usize>(
+/// Fresh starts that estimate shares.
+#[derive(Clone, Copy)]
+pub(super) struct Fresh {
+    /// What they are drawn for.
+    pub(super) purpose: Purpose,
+    /// How many.
+    pub(super) draws: u64,
+    /// Scores this close to a level are decided in f64.
+    pub(super) band: f64,
+}
+
+/// How many fresh starts lie in the set of each of `levels`.
+pub(super) fn inside<const SETS: usize>(
     context: Context<'_>,
     settings: &Settings,
     shapes: &Shapes,
     levels: [f64; SETS],
-    draws: u64,
-    band: f64,
+    starts: Fresh,
 ) -> Result<[u64; SETS]> {
+    let Fresh { purpose, draws, band } = starts;
     context.watch.begin("share of the sets", draws);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    let stream = settings.stream(purpose::FRESH_SHARE, 0);
+    let stream = settings.stream(purpose, 0);
     let task = ReachAvoidTask {
         starts: Starts::Drawn { region, stream },
         range: 0..draws,

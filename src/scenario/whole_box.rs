@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::rollout::{
     NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
 };
-use crate::rounding::{lower, upper};
+use crate::rounding::{confidence, lower, upper};
 
 /// The first version of the record that says something of the whole box.
 const FIRST_SCHEMA: u32 = 3;
@@ -191,8 +191,9 @@ fn claim(
     Ok(Claim {
         name: "box".to_owned(),
         statement: format!(
-            "With confidence 1 - {beta}, a start drawn from the whole box fails under the policy with \
+            "With confidence {}, a start drawn from the whole box fails under the policy with \
              probability at least {} and at most {} ({failures} of {draws} starts failed).",
+            confidence(beta),
             lower(low),
             upper(high)
         ),
