@@ -67,6 +67,7 @@ mod tightened;
 mod verdict;
 mod verify;
 mod visited;
+mod walk;
 mod whole_box;
 
 pub use answer::Beside;

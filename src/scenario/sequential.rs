@@ -12,11 +12,10 @@ use super::sequential_record::{
     EvidencePoint, SequentialOf, SequentialOutcome, SequentialRecord, SequentialSettings,
 };
 use super::settings::Settings;
+use super::walk::Walk;
 use crate::error::Result;
 use crate::model::Model;
-use crate::rollout::{
-    Ball, DeviationTask, Pairs, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
-};
+use crate::rollout::{Ball, DeviationTask, Pairs, Region, Starts, Tightening, replay};
 use crate::rounding::confidence;
 
 /// Draws of the first batch; each next one has twice as many.
@@ -174,26 +173,10 @@ fn of_region(
     band: f64,
 ) -> Result<Vec<Option<bool>>> {
     let stream = settings.stream(purpose::SEQUENTIAL, 1);
-    let none = Tightening::none(&settings.spec);
-    let task = ReachAvoidTask {
-        starts: Starts::Drawn { region: region(settings, asked)?, stream },
-        range,
-        spec: settings.spec,
-        tightening: &none,
-        query: Query::Measure,
-    };
+    let starts = Starts::Drawn { region: region(settings, asked)?, stream };
     let mut outcomes = Vec::new();
-    context.program.reach_avoid(&task, &mut |first, values| {
-        for (index, value) in (first..).zip(values) {
-            let mut value = f64::from(*value);
-            if value.abs() <= band {
-                let start = task.starts.start(index);
-                value = replay::measure(context.plant(), &start, &settings.spec, &none);
-            }
-            outcomes.push(Some(value.is_nan() || value <= 0.0));
-        }
-        context.watch.advance(values.len() as u64)
-    })?;
+    Walk { starts, range, spec: settings.spec, band }
+        .each(context, |rolled| outcomes.push(Some(rolled.failed())))?;
     Ok(outcomes)
 }
 
