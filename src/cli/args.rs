@@ -145,16 +145,19 @@ Example:
     /// Look for a start that fails: within the box, or where a certificate claims something
     ///
     /// Uniform draws first, then from the best of them cross-entropy and descent along differences of
-    /// the measure, again and again until a start fails or the budget is spent. Writes falsify.json and,
-    /// where something fails, counterexamples.csv (for `rollout --starts`) to the folder of --out. Exit
-    /// code 3: a failing start was found.
+    /// the measure, again and again until a start fails or the budget is spent. Writes falsify.json,
+    /// report.html and, where something fails, counterexamples.csv (for `rollout --starts`) to the folder
+    /// of --out. Exit code 3: a failing start was found, by the search or in the file of --starts.
     #[command(after_help = "\
 It finds what the measure slopes to. Where it finds nothing it says what it tried, which proves nothing.
 A certificate allows for failures: one that is found is compared with the risk that is claimed.
+Starts are varied, of a certificate's pairs perturbations too. Parameters keep their values, which the
+words list; models have no disturbances that could be searched.
 
 Examples:
   reachcast falsify configs/models/dubins.toml
   reachcast falsify configs/race.toml --budget 1000000 --seed 2 --out search
+  reachcast falsify configs/race.toml --radius 0.1 --starts configs/race_starts_500.csv
   reachcast falsify --around reachcast-out --within ball")]
     Falsify(FalsifyArguments),
     #[command(flatten)]
