@@ -15,6 +15,7 @@ use reachcast::rollout::{
 use reachcast::scenario::drops_record::SequenceOutcome;
 use reachcast::scenario::drops_settings::{DropSettings, SampleSettings};
 use reachcast::scenario::record::Record;
+use reachcast::scenario::sequential_record::{SequentialOf, SequentialSettings};
 use reachcast::scenario::settings::Settings;
 use reachcast::scenario::{CheckReport, Unwatched, certify, check, query};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
@@ -282,11 +283,12 @@ fn stands(report: &CheckReport, name: &str) -> bool {
 }
 
 /// What a check says of the claims on fresh pairs and starts.
-const ON_FRESH: [&str; 4] = [
+const ON_FRESH: [&str; 5] = [
     "fresh pairs beyond lambda",
     "fresh pairs that fail above alpha",
     "share of margin drops on fresh starts",
     "share of the calibration on fresh starts",
+    "failures of the sequential claim on fresh starts",
 ];
 
 #[test]
@@ -296,6 +298,14 @@ fn fresh_pairs_refute_a_level_that_is_too_small_and_no_true_one() {
     // Risk enough for a pair of a few thousand to fail above alpha.
     let calibration = SampleSettings::new(0.003, 1e-3, 0).expect("a sample");
     settings.drops.as_mut().expect("drops").calibration = Some(calibration);
+    settings.sequential = Some(SequentialSettings {
+        of: SequentialOf::Set,
+        epsilon: 0.2,
+        beta: 1e-3,
+        most: 5000,
+        radius: 0.1,
+        carried: 0.0,
+    });
     let backend = cpu(2);
     let program = backend.prepare(&plant).expect("a program");
     let record = record(&backend, &plant, &settings);
@@ -313,6 +323,7 @@ fn fresh_pairs_refute_a_level_that_is_too_small_and_no_true_one() {
     let calibration = forged.calibration.as_mut().expect("a calibration");
     assert!(calibration.level > 0.0, "nothing to make smaller");
     (calibration.level, calibration.share.interval) = (0.0, [0.5, 0.6]);
+    forged.sequential.as_mut().expect("a claim").claim.certified_risk = 1e-5;
     let report = checked(forged, 5);
     assert!(ON_FRESH.iter().all(|name| !stands(&report, name)), "{report:?}");
 }

@@ -5,7 +5,10 @@ use super::record::{DeviationRecord, Record};
 use super::refuted::{FALSE_ALARM, refuted, refuted_at, share};
 use super::settings::{Joint, Settings};
 use super::tier::verified_set;
-use super::{Context, deterministic_set, fresh_drops, global, pairs_f64, purpose, sets, whole_box};
+use super::{
+    Context, deterministic_set, fresh_drops, global, pairs_f64, purpose, sequential, sets,
+    whole_box,
+};
 use crate::error::Result;
 use crate::rollout::side_by_side::PairGroup;
 use crate::rollout::{Keep, Pairs, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
@@ -41,6 +44,9 @@ pub(super) fn findings(
         let band = record.global.band;
         findings.push(whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?);
     }
+    let (sequential, band) = (record.sequential.as_ref(), record.global.band);
+    let found = sequential::on_fresh_starts(context, settings, sequential, &tightening, band)?;
+    findings.extend(found);
     findings.extend(deterministic_set::adversaries(context, settings)?);
     if let Some(set) = verified_set(&record.growth, settings.state.len()) {
         let failures = in_set(context, settings, set)?;

@@ -6,8 +6,10 @@ use super::Context;
 use super::bound::{required_scenarios, simple_scenarios};
 use super::coordinates::{Coordinates, coordinates};
 use super::evidence::Evidence;
+use super::finding::Finding;
 use super::purpose;
 use super::record::{Claim, decimal};
+use super::refuted::refuted;
 use super::sequential_record::{
     EvidencePoint, SequentialOf, SequentialOutcome, SequentialRecord, SequentialSettings,
 };
@@ -83,6 +85,29 @@ pub(super) fn derived(
     let Claim { scenarios: starts, failures, .. } = stored.claim;
     let counts = Counts { draws: stored.draws, starts, failures };
     conclude(model, settings, asked, counts, process).map(Some)
+}
+
+/// Whether fresh draws of the seed of `settings` refute what `stored` claims; nothing of a claim that was not
+/// obtained.
+///
+/// # Errors
+/// Those of the backend and of the watch.
+pub(super) fn on_fresh_starts(
+    context: Context<'_>,
+    settings: &Settings,
+    stored: Option<&SequentialRecord>,
+    tightening: &Tightening,
+    band: f64,
+) -> Result<Option<Finding>> {
+    let obtained = stored.filter(|one| one.outcome == SequentialOutcome::Certified);
+    let (Some(asked), Some(stored)) = (&settings.sequential, obtained) else { return Ok(None) };
+    let draws = settings.global.draws;
+    context.watch.begin("fresh starts of the sequential claim", draws);
+    let outcomes = outcomes(context, settings, asked, 0..draws, tightening, band)?;
+    let of_claim = outcomes.iter().flatten();
+    let (starts, failures) = (of_claim.clone().count(), of_claim.filter(|failed| **failed).count());
+    let name = "failures of the sequential claim on fresh starts";
+    Ok(Some(refuted(name, stored.claim.certified_risk, failures as u64, starts as u64)))
 }
 
 /// Whether the process is kept after that many starts.
