@@ -299,8 +299,8 @@ fn fresh_pairs_refute_a_level_that_is_too_small_and_no_true_one() {
     let calibration = SampleSettings::new(0.003, 1e-3, 0).expect("a sample");
     settings.drops.as_mut().expect("drops").calibration = Some(calibration);
     settings.sequential = Some(SequentialSettings {
-        of: SequentialOf::Set,
-        epsilon: 0.2,
+        of: SequentialOf::Box,
+        epsilon: 0.9,
         beta: 1e-3,
         most: 5000,
         radius: 0.1,
@@ -323,7 +323,7 @@ fn fresh_pairs_refute_a_level_that_is_too_small_and_no_true_one() {
     let calibration = forged.calibration.as_mut().expect("a calibration");
     assert!(calibration.level > 0.0, "nothing to make smaller");
     (calibration.level, calibration.share.interval) = (0.0, [0.5, 0.6]);
-    forged.sequential.as_mut().expect("a claim").claim.certified_risk = 1e-5;
+    forged.sequential.as_mut().expect("a claim").claim.certified_risk = 0.4;
     let report = checked(forged, 5);
     assert!(ON_FRESH.iter().all(|name| !stands(&report, name)), "{report:?}");
 }

@@ -18,7 +18,7 @@ use reachcast::rollout::{
     Ball, Keep, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Stream,
     Tightening, replay,
 };
-use reachcast::scenario::falsify::{FalsifyRecord, FalsifySettings, falsify};
+use reachcast::scenario::falsify::{FalsifyRecord, FalsifySettings, falsify, roll_out};
 use reachcast::scenario::{Unwatched, purpose};
 use serde_json::Value;
 
@@ -164,6 +164,23 @@ fn a_failure_in_f32_alone_does_not_count() {
     let tried = search(&cpu(2), &plant(TRAP, [wall, lost]), 2000, 1);
     assert!(!tried.found && tried.unconfirmed > 100 && tried.starts.is_empty(), "{tried:?}");
     assert!(tried.best.unwrap().measure > 0.0 && tried.rollouts == 2000);
+}
+
+/// Nor among the starts of a file: a measure near zero is that of f64.
+#[test]
+fn starts_of_a_file_near_zero_are_decided_in_f64() {
+    let wall = "min(1 - abs(position), apart - trap)";
+    // In f32 the last term is off by up to 0.004; the margins stay within the band by the factor.
+    let lost = "0.000001 * (0.001 + (position + 100000 - 100000 - position))";
+    let (plant, region, spec) = plant(TRAP, [wall, lost]);
+    let stream = Stream::new(1, Purpose::USER, 0);
+    let list = StateList::new(4).with((0..500).map(|index| region.point(stream, index)));
+    let backend = cpu(2);
+    let program = backend.prepare(&plant).unwrap();
+    let single = program.measures(&list, &spec).unwrap();
+    let found = roll_out(&program, spec, list.view(), &Unwatched).unwrap();
+    assert!(single.iter().filter(|measure| **measure <= 0.0).count() > 100);
+    assert_eq!((found.starts, found.failures, found.worst.len()), (500, 0, 0));
 }
 
 /// The worst start of a ball lies at its rim, where rounding may put it outside.

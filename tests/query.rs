@@ -91,7 +91,7 @@ fn attempts_and_shapes_are_told_in_short_and_true_words() {
     let out = folder.path("out");
     let words = "--set growth.method=upward --set growth.shape=ellipsoid --set growth.pilot=500 \
                  --set global.draws=2000 --set slice.x.step=0.5 --set slice.y.step=0.5 --backend cpu";
-    let mut arguments = vec!["certify", LINE, "--out", &out, "--attempt", "2", "-q"];
+    let mut arguments = vec!["certify", LINE, "--out", &out, "--attempt", "2"];
     arguments.extend(words.split_whitespace());
     let (_, text, _) = reachcast(&arguments);
     // 6 / (2 pi)^2 of a thousandth is 0.00015198...

@@ -102,7 +102,7 @@ impl Config {
         // What is about to be trained is not there yet.
         let checked = config.policy.check(layers.trains());
         config.sources = layers.sources();
-        let profile = ProfileOf::of(overrides);
+        let profile = ProfileOf::of(overrides.profile, &overrides.set);
         let checked = checked.and_then(|()| unused::check(&config, &config.sources, profile));
         checked.map_err(|error| config.placed(error))?;
         Ok(config)

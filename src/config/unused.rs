@@ -1,9 +1,8 @@
 //! Keys that somebody wrote and that nothing reads, since the claim that they are of is not asked for.
 
-use super::Overrides;
 use super::deterministic::Enclosing;
 use super::drops::{TighteningSource, no_risk};
-use super::section::Config;
+use super::section::{Config, Profile};
 use super::sources::Sources;
 use crate::error::{Error, Result};
 use crate::scenario::growth_plan::{GrowthMethod, GrowthShape};
@@ -23,13 +22,19 @@ struct Rule {
 
 const RULES: [Rule; 12] = [
     Rule { keys: "drops", switch: "global.tightening", reader: DROPS, read: by_drops },
-    Rule { keys: "calibration", switch: "global.tightening", reader: DROPS, read: by_drops },
+    Rule {
+        keys: "calibration",
+        switch: "global.tightening",
+        reader: DROPS,
+        // Of a calibration that is none, the rule below says what is not read.
+        read: |config| by_drops(config) || config.calibration.epsilon >= 1.0,
+    },
     Rule { keys: "global.share_draws", switch: "global.tightening", reader: DROPS, read: by_drops },
     Rule {
         keys: "global.risk",
         switch: "global.tightening",
         reader: DROPS,
-        // A risk that is none is asked of nobody.
+        // A risk of 1 asks for none.
         read: |config| by_drops(config) || config.global.risk >= no_risk(),
     },
     Rule {
@@ -95,10 +100,10 @@ pub(super) enum ProfileOf {
 }
 
 impl ProfileOf {
-    /// What `overrides` say.
-    pub(super) fn of(overrides: &Overrides) -> Self {
+    /// What an option for the profile and the settings of other keys say.
+    pub(super) fn of(profile: Option<Profile>, sets: &[String]) -> Self {
         let key = |set: &String| set.split('=').next().is_some_and(|key| key.trim() == "profile");
-        match overrides.profile.is_some() || overrides.set.iter().any(key) {
+        match profile.is_some() || sets.iter().any(key) {
             true => Self::CommandLine,
             false => Self::File,
         }

@@ -34,7 +34,10 @@ pub(super) fn findings(
     }
     let sets = [
         ("share of margin drops on fresh starts", drops.map(of_drops)),
-        ("share of the calibration on fresh starts", calibration.map(|one| of(one, settings))),
+        (
+            "share of the calibration on fresh starts",
+            calibration.map(|one| of_calibration(one, settings)),
+        ),
     ];
     for (name, set) in sets {
         let set = set.map(|set| on_starts(context, settings, record.global.band, name, &set));
@@ -90,7 +93,7 @@ fn of_drops(drops: &DropsRecord) -> ScoredSet {
     ScoredSet { shapes: drops.shapes(), level: drops.level, share: drops.share }
 }
 
-fn of(calibration: &CalibrationRecord, settings: &Settings) -> ScoredSet {
+fn of_calibration(calibration: &CalibrationRecord, settings: &Settings) -> ScoredSet {
     let CalibrationRecord { level, share, .. } = *calibration;
     ScoredSet { shapes: Shapes::of_discount(&settings.spec), level, share }
 }
