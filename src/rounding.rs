@@ -44,6 +44,11 @@ pub(crate) fn interval([low, high]: [f64; 2]) -> String {
     format!("{} to {}", lower(low), upper(high))
 }
 
+/// `1 - beta` in words, never above the confidence that `beta` leaves.
+pub(crate) fn confidence(beta: f64) -> String {
+    format!("1 - {}", upper(beta))
+}
+
 /// `1 - share` in the decimals that `share` has, so that 0.9 stands for one less 0.1: exact, and
 /// where that takes more decimals than an f64 has, the difference as it is.
 pub(crate) fn complement(share: f64) -> String {
@@ -110,7 +115,7 @@ fn trimmed(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{complement, interval, lower, number, upper};
+    use super::{complement, confidence, interval, lower, number, upper};
 
     #[test]
     fn numbers_are_short_and_rounded_the_safe_way() {
@@ -151,6 +156,13 @@ mod tests {
         }
         assert_eq!([upper(0.004_842_6), lower(0.138_36)], ["0.004843", "0.1383"]);
         assert_eq!([lower(6.530_6), lower(1e-7)], ["6.53", "1e-7"]);
+    }
+
+    /// Of an attempt, beta is a share with sixteen digits.
+    #[test]
+    fn confidences_are_short_and_go_down() {
+        let said = [1e-3, 6.0 / (2.0 * std::f64::consts::PI).powi(2) * 1e-3, 1e-9].map(confidence);
+        assert_eq!(said, ["1 - 0.001", "1 - 0.000152", "1 - 1e-9"]);
     }
 
     #[test]

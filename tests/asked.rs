@@ -6,7 +6,7 @@
 mod command;
 
 use command::{Folder, document, done, reachcast, refused};
-use reachcast::config::Config;
+use reachcast::config::{Config, Overrides, Profile};
 use reachcast::policy::Mlp;
 use reachcast::race::DroneRace;
 use reachcast::rollout::{MppiSettings, MppiSpec, Sigma};
@@ -354,4 +354,80 @@ fn plans_whose_weights_say_little_are_told() {
     assert!(drowned.contains("apart in f32"), "{drowned}");
     let page = std::fs::read_to_string(format!("{out}/report.html")).unwrap();
     assert!(page.contains("To be kept in mind") && page.contains("apart in f32"));
+}
+
+/// A configuration of the double integrator with these lines and settings; the refusal in words.
+fn configured(lines: &str, sets: &[&str], profile: Option<Profile>) -> Result<Config, String> {
+    let text = format!("system.name = 'double-integrator'\npolicy.formula = 'bang-bang'\n{lines}");
+    let set = sets.iter().map(|set| (*set).to_owned()).collect();
+    let overrides = Overrides { profile, seed: None, set };
+    let table = toml::from_str(&text).unwrap();
+    Config::from_table(table, "mine.toml", &overrides).map_err(|error| error.to_string())
+}
+
+/// Keys of claims that are not asked for, and what would ask for them.
+const UNREAD: [(&str, &str); 12] = [
+    ("drops.pilot=50", "global.tightening=drops"),
+    ("drops.epsilon=0.2", "global.tightening=drops"),
+    ("calibration.discards=2", "global.tightening=drops"),
+    ("global.risk=0.01", "global.tightening=drops"),
+    ("global.share_draws=500", "global.tightening=drops"),
+    ("deterministic.starts=50", "deterministic.kind=tube"),
+    ("sequential.epsilon=0.2", "sequential.of=box"),
+    ("sequential.radius=0.2", "sequential.of=ball"),
+    ("growth.factor=1.5", "growth.method=upward"),
+    ("growth.pilot=500", "growth.shape=box"),
+    ("growth.split_beta=true", "growth.method=shrinking"),
+    ("calibration.beta=0.01", "calibration.epsilon=0.2"),
+];
+/// None of these claims.
+const NONE: [&str; 3] =
+    ["global.tightening=lipschitz", "growth.method=shrinking", "growth.shape=ball"];
+
+#[test]
+fn keys_that_nothing_reads_are_refused() {
+    for (key, switch) in UNREAD {
+        let name = key.split('=').next().unwrap();
+        let mut none = NONE.to_vec();
+        match name {
+            "growth.split_beta" => none[1] = "growth.method=upward",
+            "growth.pilot" => none[1] = "growth.method=upward",
+            "calibration.beta" => {
+                none[0] = "global.tightening=drops";
+                none.push("calibration.epsilon=1");
+            }
+            _ => {}
+        }
+        let refused = configured("", &[&none[..], &[key]].concat(), None).unwrap_err();
+        let words =
+            [&format!("--set {key}"), "nothing reads it", switch.split('=').next().unwrap()];
+        assert!(words.iter().all(|word| refused.contains(word)), "{key}: {refused}");
+        let read = configured("", &[&none[..], &[key, switch]].concat(), None);
+        let config = read.unwrap_or_else(|error| panic!("{key}, {switch}: {error}"));
+        // What is stored has every key, read or not.
+        Config::from_json(&config.to_json().unwrap()).unwrap();
+    }
+    // What switches nothing on asks for no more than it says.
+    for none in ["calibration.epsilon=1", "global.risk=1", "sequential.of=none"] {
+        configured("", &[&NONE[..], &[none]].concat(), None).unwrap();
+    }
+}
+
+#[test]
+fn what_a_file_has_is_turned_off_by_name_alone() {
+    let sequential = "sequential.epsilon = 0.2\n";
+    let refused = configured(sequential, &[], None).unwrap_err();
+    assert!(refused.contains("mine.toml: sequential.epsilon"), "{refused}");
+    configured(sequential, &["sequential.of=set"], None).unwrap();
+    configured(sequential, &["sequential.of=none"], None).unwrap();
+    let drops = "profile = 'rigorous'\ndrops.pilot = 50\nglobal.tightening = 'drops'\n";
+    configured(drops, &[], None).unwrap();
+    configured(drops, &["global.tightening=lipschitz"], None).unwrap();
+    let of_profile = "profile = 'study'\ndrops.pilot = 50\n";
+    assert!(configured(of_profile, &[], None).is_err());
+    configured(of_profile, &[], Some(Profile::Paper)).unwrap();
+    let folder = Folder::new();
+    let out = folder.path("out");
+    let certify = ["certify", LINE, "--out", &out, "--set", "sequential.most=500"];
+    command::refused(&certify, &["--set sequential.most=500", "nothing reads it", "--sequential"]);
 }

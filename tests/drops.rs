@@ -13,11 +13,12 @@ use reachcast::rollout::{
     Stream,
 };
 use reachcast::scenario::drops_record::SequenceOutcome;
-use reachcast::scenario::drops_settings::{ConditionalRisk, DropSettings};
+use reachcast::scenario::drops_settings::{ConditionalRisk, DropSettings, SampleSettings};
 use reachcast::scenario::growth_plan::{Around, GrowthPlan};
 use reachcast::scenario::record::Record;
+use reachcast::scenario::sequential_record::{SequentialOf, SequentialSettings};
 use reachcast::scenario::settings::Settings;
-use reachcast::scenario::{Unwatched, certify, check, query};
+use reachcast::scenario::{CheckReport, Unwatched, certify, check, query};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 
 /// How far a backend's f32 score may lie from f64, relative to the larger of it and 1.
@@ -243,8 +244,18 @@ fn membership_follows_the_score() {
     let states: Vec<[f32; 12]> = (0..400).map(|index| starts.start_array(index)).collect();
     let rows = query(&program, &record, &settings, states.as_slice().into()).expect("tiers");
     let mut inside = 0;
+    let alpha = record.calibration.as_ref().expect("a calibration").level;
+    let units = Shapes::of_discount(&settings.spec);
     for (x, row) in states.iter().zip(rows) {
-        let score = shapes.score(&replay::states_margins(&plant, x, &settings.spec));
+        let margins = replay::states_margins(&plant, x, &settings.spec);
+        let [score, measure] = [&shapes, &units].map(|shapes| shapes.score(&margins));
+        let said = [row.beside.score, row.beside.measure].map(|one| one.expect("a number"));
+        for (said, truth) in said.into_iter().zip([score, measure]) {
+            assert!((said - truth).abs() <= BAND * truth.abs().max(1.0), "{said}, {truth} in f64");
+        }
+        if (measure - alpha).abs() > BAND {
+            assert_eq!(row.beside.calibrated, Some(measure > alpha), "{measure}, {alpha}");
+        }
         if (score - level).abs() > 1e-6 * level.max(1.0) {
             assert_eq!(row.check_margin > 0.0, score > level, "{score}, {level}");
         }
@@ -300,4 +311,56 @@ fn growth_starts_on_the_boundary_that_is_asked_for() {
         assert_eq!(record.growth.around, around);
         assert_eq!(held, [around == Around::Bound, true], "{around:?}");
     }
+}
+
+/// Whether the finding of this name stands.
+fn stands(report: &CheckReport, name: &str) -> bool {
+    let found = report.findings.iter().find(|finding| finding.name == name);
+    found.unwrap_or_else(|| panic!("no `{name}` in {report:?}")).holds
+}
+
+/// What a check says of the claims on fresh pairs and starts.
+const ON_FRESH: [&str; 5] = [
+    "fresh pairs beyond lambda",
+    "fresh pairs that fail above alpha",
+    "share of margin drops on fresh starts",
+    "share of the calibration on fresh starts",
+    "failures of the sequential claim on fresh starts",
+];
+
+#[test]
+fn fresh_pairs_refute_a_level_that_is_too_small_and_no_true_one() {
+    let (plant, mut settings) = small();
+    settings.global.draws = 2000;
+    // Risk enough for a pair of a few thousand to fail above alpha.
+    let calibration = SampleSettings::new(0.003, 1e-3, 0).expect("a sample");
+    settings.drops.as_mut().expect("drops").calibration = Some(calibration);
+    settings.sequential = Some(SequentialSettings {
+        of: SequentialOf::Box,
+        epsilon: 0.9,
+        beta: 1e-3,
+        most: 5000,
+        radius: 0.1,
+        carried: 0.0,
+    });
+    let backend = cpu(2);
+    let program = backend.prepare(&plant).expect("a program");
+    let record = record(&backend, &plant, &settings);
+    let checked = |record: Record, seed| {
+        let sealed = record.sealed().expect("sealed");
+        check(&program, &sealed, &settings, seed, &Unwatched).expect("a check")
+    };
+    for seed in 1..=4 {
+        let report = checked(record.clone(), seed);
+        assert!(report.holds && ON_FRESH.iter().all(|name| stands(&report, name)), "{report:?}");
+    }
+    let mut forged = record.clone();
+    let drops = forged.drops.as_mut().expect("drops");
+    (drops.level, drops.share.interval) = (0.5 * drops.level, [0.5, 0.6]);
+    let calibration = forged.calibration.as_mut().expect("a calibration");
+    assert!(calibration.level > 0.0, "nothing to make smaller");
+    (calibration.level, calibration.share.interval) = (0.0, [0.5, 0.6]);
+    forged.sequential.as_mut().expect("a claim").claim.certified_risk = 0.4;
+    let report = checked(forged, 5);
+    assert!(ON_FRESH.iter().all(|name| !stands(&report, name)), "{report:?}");
 }

@@ -18,7 +18,7 @@ use reachcast::rollout::{
     Ball, Keep, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Stream,
     Tightening, replay,
 };
-use reachcast::scenario::falsify::{FalsifyRecord, FalsifySettings, falsify};
+use reachcast::scenario::falsify::{FalsifyRecord, FalsifySettings, falsify, roll_out};
 use reachcast::scenario::{Unwatched, purpose};
 use serde_json::Value;
 
@@ -164,6 +164,23 @@ fn a_failure_in_f32_alone_does_not_count() {
     let tried = search(&cpu(2), &plant(TRAP, [wall, lost]), 2000, 1);
     assert!(!tried.found && tried.unconfirmed > 100 && tried.starts.is_empty(), "{tried:?}");
     assert!(tried.best.unwrap().measure > 0.0 && tried.rollouts == 2000);
+}
+
+/// Nor among the starts of a file: a measure near zero is that of f64.
+#[test]
+fn starts_of_a_file_near_zero_are_decided_in_f64() {
+    let wall = "min(1 - abs(position), apart - trap)";
+    // In f32 the last term is off by up to 0.004; the margins stay within the band by the factor.
+    let lost = "0.000001 * (0.001 + (position + 100000 - 100000 - position))";
+    let (plant, region, spec) = plant(TRAP, [wall, lost]);
+    let stream = Stream::new(1, Purpose::USER, 0);
+    let list = StateList::new(4).with((0..500).map(|index| region.point(stream, index)));
+    let backend = cpu(2);
+    let program = backend.prepare(&plant).unwrap();
+    let single = program.measures(&list, &spec).unwrap();
+    let found = roll_out(&program, spec, list.view(), &Unwatched).unwrap();
+    assert!(single.iter().filter(|measure| **measure <= 0.0).count() > 100);
+    assert_eq!((found.starts, found.failures, found.worst.len()), (500, 0, 0));
 }
 
 /// The worst start of a ball lies at its rim, where rounding may put it outside.
@@ -438,4 +455,75 @@ fn failing_pairs_are_replayed_under_their_controls() {
     let measures = folder.path("none.csv");
     let asked = ["rollout", config, "--starts", &path, "--measures", &measures];
     refused(&asked, &["control:59:turn_rate", "which a replay needs"]);
+}
+
+/// Everywhere that the search looks is the ball or the box around the state that was asked for.
+#[test]
+fn a_search_around_a_state_stays_there() {
+    let folder = Folder::new();
+    let set =
+        ["--set", "state.front=0.5", "--set", "growth.coordinates=[\"position\", \"velocity\"]"];
+    for (option, words, most) in [
+        ("--radius", "the ball of radius 0.1 around the state", 0.1),
+        ("--half-width", "the box of half-width 0.1 around the state", 0.1 * 2.0_f64.sqrt()),
+    ] {
+        let out = folder.path(&option[2..]);
+        let asked = ["falsify", TRAP, "--budget", "3000", "--backend", "cpu", option, "0.1"];
+        let said = document(&[&asked[..], &set, &["--out", &out]].concat());
+        assert_eq!((&said["within"], &said["found"]), (&words.into(), &false.into()));
+        assert_eq!(said["fixed"][0], "parameters trap = 0.01");
+        assert_eq!(said["fixed"][1], "coordinates front, rear");
+        let x = said["best"]["x"].as_array().unwrap();
+        let x: Vec<f64> = x.iter().map(|x| x.as_f64().unwrap()).collect();
+        assert!(x[0].hypot(x[1]) <= most + 1e-6 && x[0].hypot(x[1]) > 0.0, "{x:?}");
+        assert_eq!(x[2..], [0.5, 0.0]);
+        let best = said["improvements"].as_array().unwrap();
+        let measures: Vec<f64> = best.iter().map(|one| one["measure"].as_f64().unwrap()).collect();
+        assert!(measures.windows(2).all(|pair| pair[1] < pair[0]) && measures.len() > 1);
+        assert_eq!(measures.last().copied(), said["best"]["measure"].as_f64());
+    }
+    let bad = ["falsify", TRAP, "--radius", "0", "--out", &folder.path("none"), "--backend", "cpu"];
+    refused(&bad, &["--radius", "0"]);
+    refused(&["falsify", TRAP, "--radius", "1", "--half-width", "1"], &["cannot be used with"]);
+}
+
+/// A file of starts is a count: each of its starts is rolled out.
+#[test]
+fn a_file_of_starts_is_counted() {
+    let folder = Folder::new();
+    let (starts, out) = (folder.path("starts.csv"), folder.path("out"));
+    let safe = "0,0,0,0\n0.2,0,0,0\n-0.2,0,0,0\n";
+    // In the trap.
+    fs::write(&starts, format!("{safe}0.31,-0.2,0.55,-0.4\n")).unwrap();
+    let asked = ["falsify", TRAP, "--radius", "0.05", "--budget", "500", "--backend", "cpu"];
+    let asked = [&asked[..], &["--starts", &starts, "--out", &out]].concat();
+    let (code, text, message) = reachcast(&asked);
+    assert_eq!(code, Some(3), "{text}{message}");
+    for words in [
+        "no failing start of the ball",
+        "all 4 starts",
+        "1 fail",
+        "N = 4, k = 1",
+        "0.006309 to 0.8",
+    ] {
+        assert!(text.contains(words), "no `{words}` in {text}");
+    }
+    let text = fs::read_to_string(format!("{out}/falsify.json")).unwrap();
+    let said: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&said["file"]["starts"], &said["file"]["failures"]), (&4.into(), &1.into()));
+    assert_eq!(said["file"]["worst"][0]["index"], 3);
+    let page = fs::read_to_string(format!("{out}/report.html")).unwrap();
+    for words in
+        ["1 of 4 fail", "none was found", "no proof", "Smallest measure so far", "trap = 0.01"]
+    {
+        assert!(page.contains(words), "no `{words}` on the page");
+    }
+    assert!(!page.contains("NaN") && !page.contains("://"));
+    // Another file is another search.
+    fs::write(&starts, safe).unwrap();
+    refused(&asked, &["another --out"]);
+    let other = folder.path("other");
+    let asked = [&asked[..asked.len() - 1], &[&*other]].concat();
+    let (code, text, _) = reachcast(&asked);
+    assert!(code == Some(0) && text.contains("all 3 starts") && text.contains("0 fail"), "{text}");
 }

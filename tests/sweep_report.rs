@@ -422,7 +422,7 @@ fn certificates_have_their_own_figures_and_findings() {
     assert!(!page.contains("figure-front") && !page.contains("Pareto"));
     assert!(page.contains("at epsilon 0.05, bound exact: 20 % (19 to 21 %)."));
     assert!(
-        page.contains("The largest verified ball has radius 0.5, at epsilon 0.02, bound scenario.")
+        page.contains("The largest verified set has radius 0.5, at epsilon 0.02, bound scenario.")
     );
     assert!(page.contains("At 9 of 10 points every claim that was asked for was obtained."));
     assert!(page.contains("All 10 hold together with confidence at least 1 − 0.04;"));
@@ -432,7 +432,7 @@ fn certificates_have_their_own_figures_and_findings() {
     }
     let page = sound(&record, "no ball");
     assert!(page.contains("The betas of all 10 certificates sum to 2:"));
-    assert!(page.contains("Local growth verified no ball at any point."));
+    assert!(page.contains("Local growth verified no set at any point."));
     assert_eq!(cell(&page, 0, "local growth").0, "no boundary");
 }
 

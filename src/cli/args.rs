@@ -107,9 +107,13 @@ Example:
     },
     /// Tell the tier and the tightened measure V_check of states against a stored certificate
     #[command(after_help = "\
-Tiers: 0 in the target set, 1 in the certified set, 2 in the locally verified ball, 3 otherwise.
+Tiers: 0 in the target set, 1 in the certified set, 2 in the set that local growth verified, 3 otherwise.
 Prints a line per state (index, tier, check_margin, target_margin); with --out DIR these go to
-DIR/query.csv instead and a summary is printed.
+DIR/query.csv instead and a summary is printed. More columns where the certificate has what they are of:
+  score       the largest lambda at which the state is certified by margin drops
+  measure     its reach-avoid measure, and in
+  calibrated  whether that is above alpha: in the calibrated set
+  radius      of a ball around it that is certified without samples, up to 8 times the one asked for
 
 Example:
   reachcast query reachcast-out --states configs/race_starts_500.csv")]
@@ -141,16 +145,19 @@ Example:
     /// Look for a start that fails: within the box, or where a certificate claims something
     ///
     /// Uniform draws first, then from the best of them cross-entropy and descent along differences of
-    /// the measure, again and again until a start fails or the budget is spent. Writes falsify.json and,
-    /// where something fails, counterexamples.csv (for `rollout --starts`) to the folder of --out. Exit
-    /// code 3: a failing start was found.
+    /// the measure, again and again until a start fails or the budget is spent. Writes falsify.json,
+    /// report.html and, where something fails, counterexamples.csv (for `rollout --starts`) to the folder
+    /// of --out. Exit code 3: a failing start was found, by the search or in the file of --starts.
     #[command(after_help = "\
 It finds what the measure slopes to. Where it finds nothing it says what it tried, which proves nothing.
 A certificate allows for failures: one that is found is compared with the risk that is claimed.
+Starts are varied, of a certificate's pairs perturbations too. Parameters keep their values, which the
+words list; models have no disturbances that could be searched.
 
 Examples:
   reachcast falsify configs/models/dubins.toml
   reachcast falsify configs/race.toml --budget 1000000 --seed 2 --out search
+  reachcast falsify configs/race.toml --radius 0.1 --starts configs/race_starts_500.csv
   reachcast falsify --around reachcast-out --within ball")]
     Falsify(FalsifyArguments),
     #[command(flatten)]

@@ -1,33 +1,31 @@
 //! The command `falsify`: a search for a start that fails.
 
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use serde::Serialize;
 
+use super::falsified::{answer, fixed, stage, text};
 use super::inputs::{inputs, networks};
 use super::options::{Changes, Global, Replace};
 use super::progress::Progress;
 use super::stored::Stored;
 use super::{Outcome, devices, document, folder_of, report};
-use crate::backend::Event;
 use crate::config::{Config, PolicySource};
+use crate::digest::sha256;
 use crate::error::{Error, Result};
-use crate::files::{Existing, MANIFEST, Staged, is_free, json, make_way};
+use crate::files::{Existing, MANIFEST, Staged, StateReader, is_free, json, make_way};
 use crate::model::Plant;
-use crate::rollout::Region;
-use crate::rounding::number;
-use crate::scenario::counterexamples::{COUNTEREXAMPLES, REPLAYED, replayed_csv, starts_csv};
-use crate::scenario::falsify::{Against, FalsifyRecord, FalsifySettings, Target, falsify};
-use crate::system::Axis;
+use crate::report::Search;
+use crate::rollout::{Ball, Region, StateList};
+use crate::scenario::falsify::{Against, FalsifySettings, Target, falsify, roll_out};
+use crate::scenario::limits::positive_f32;
+use crate::scenario::provenance;
+use crate::scenario::settings::Settings;
 
 /// Where the results go unless `--out` says otherwise.
 const DEFAULT_OUT: &str = "reachcast-falsify";
 /// Rollouts unless `--budget` says otherwise.
 const DEFAULT_BUDGET: u64 = 200_000;
-/// Name of the record of a search.
-const RECORD: &str = "falsify.json";
 
 /// What `falsify` is asked for.
 #[derive(Args, Clone, Debug)]
@@ -41,6 +39,16 @@ pub(super) struct FalsifyArguments {
     /// What of that certificate is tried
     #[arg(long, value_enum, default_value_t = Within::Ball, requires = "around")]
     pub(super) within: Within,
+    /// Look in a ball of this radius around the configuration's state, in the coordinates that growth varies,
+    /// and not in the box
+    #[arg(long, value_name = "R", conflicts_with_all = ["around", "half_width"])]
+    pub(super) radius: Option<f64>,
+    /// Look in the box of this half-width around that state, in the same coordinates
+    #[arg(long, value_name = "H", conflicts_with = "around")]
+    pub(super) half_width: Option<f64>,
+    /// Starts (.npy or .csv) that are all rolled out and counted, beside the budget
+    #[arg(long, value_name = "FILE")]
+    pub(super) starts: Option<PathBuf>,
     /// Rollouts, at most
     #[arg(long, value_name = "N", default_value_t = DEFAULT_BUDGET)]
     pub(super) budget: u64,
@@ -56,27 +64,12 @@ pub(super) struct FalsifyArguments {
 /// What of a certificate is tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Within {
-    /// The ball that local growth verified
+    /// The set that local growth verified: a ball, an ellipsoid or a box
     Ball,
     /// The whole box
     Box,
     /// The perturbed starts whose nominal one is certified
     Certified,
-}
-
-/// What `falsify --json` prints, and [`RECORD`] holds.
-#[derive(Serialize)]
-struct Answer<'a> {
-    #[serde(flatten)]
-    record: &'a FalsifyRecord,
-    /// Where was looked, in words.
-    within: &'a str,
-    /// The certificate's claim about the same starts, beside the uniform draws of this search.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    against: Option<&'a Against>,
-    backend: String,
-    device: String,
-    events: Vec<Event>,
 }
 
 /// Looks for a failing start.
@@ -102,14 +95,36 @@ pub(super) fn run(global: &Global, asked: &FalsifyArguments) -> Result<Outcome> 
             let policy = config.policy_source(folder_of(path))?;
             let plant = config.plant(&policy)?;
             let settings = config.settings(&plant.model.states)?;
-            let region = Region::new_box(settings.low, settings.high)?;
-            let target = Target { region, words: "the box".to_owned(), pairs: None, claim: None };
+            let target = place(asked, &settings)?;
             Work { global, asked, config: &config, policy: &policy, target }.run(&plant, path)
         }
         (None, None) => {
             Err(Error::invalid("falsify", "give a configuration, or --around a folder"))
         }
     }
+}
+
+/// Where starts are looked for that no certificate is about.
+fn place(asked: &FalsifyArguments, settings: &Settings) -> Result<Target> {
+    let (center, varies) = (settings.state.clone(), settings.growth.varies.clone());
+    let (region, words) = match (asked.radius, asked.half_width) {
+        (Some(radius), _) => {
+            let words = format!("the ball of radius {radius} around the state");
+            let radius = positive_f32("--radius", radius)?;
+            (Region::Ball(Ball { center, radius, varies }), words)
+        }
+        (None, Some(half)) => {
+            let words = format!("the box of half-width {half} around the state");
+            let half = positive_f32("--half-width", half)?;
+            let side = |sign: f32| -> Vec<f32> {
+                let moved = |(x, varies): (&f32, &bool)| if *varies { x + sign * half } else { *x };
+                center.iter().zip(&varies).map(moved).collect()
+            };
+            (Region::new_box(side(-1.0), side(1.0))?, words)
+        }
+        (None, None) => (Region::new_box(&*settings.low, &*settings.high)?, "the box".to_owned()),
+    };
+    Ok(Target { region, words, pairs: None, claim: None })
 }
 
 /// A search for a plant.
@@ -125,15 +140,22 @@ impl Work<'_> {
     fn run(self, plant: &Plant, read: &Path) -> Result<Outcome> {
         let Self { global, asked, config, policy, target } = &self;
         let out = global.folder(DEFAULT_OUT);
-        inputs(read, policy, networks(config)).spare_folder(&out)?;
-        let manifest = self.manifest()?;
+        let listed = asked.starts.iter().cloned();
+        inputs(read, policy, networks(config).chain(listed)).spare_folder(&out)?;
+        let starts = asked.starts.as_ref().map(|path| {
+            let names = plant.model.states.iter().map(|axis| axis.name.clone()).collect();
+            StateReader::open(path, names)?.rest()
+        });
+        let starts = starts.transpose()?;
+        let manifest = self.manifest(starts.as_ref())?;
         if global.existing == Existing::Kept {
             is_free(&out, &manifest)?;
         }
+        let spec = config.spec()?;
         let settings = FalsifySettings {
             region: target.region.clone(),
             pairs: target.pairs.clone(),
-            spec: config.spec()?,
+            spec,
             budget: asked.budget,
             seed: config.seed,
         };
@@ -141,98 +163,47 @@ impl Work<'_> {
         let progress = Progress::new(global);
         let mut staged = Staged::new(&out)?;
         let program = backend.prepare(plant)?;
+        let file = starts.map(|starts| roll_out(&program, spec, starts.view(), &progress));
+        let file = file.transpose()?;
         let record = falsify(&program, &settings, &progress)?;
         devices::note_events(global, &backend);
         progress.check()?;
         let against = target.claim.as_ref().map(|claim| Against::new(claim, &record));
-        let answer = Answer {
+        let found = Search {
             record: &record,
+            file: file.as_ref(),
             within: &target.words,
             against: against.as_ref(),
-            backend: backend.name().to_owned(),
-            device: backend.device(),
+            fixed: fixed(&plant.model, &target.region),
+            provenance: provenance(&program, config.seed, config.to_json()?),
             events: backend.events(),
         };
-        let answer_document = document(&answer);
-        let files = stage(&mut staged, plant, &record, &manifest, &json(RECORD, &answer_document)?);
-        files?;
+        stage(&mut staged, plant, &found, &target.region, &manifest)?;
         if global.existing == Existing::Replaced {
             make_way(&out, &manifest)?;
         }
         let files = staged.publish()?;
-        report(global, &answer_document, || text(plant, &answer, &files))?;
-        Ok(if record.found { Outcome::NotObtained } else { Outcome::Done })
+        report(global, &document(&answer(&found)), || text(plant, &found, &files))?;
+        let failed = record.found || file.is_some_and(|file| file.failures > 0);
+        Ok(if failed { Outcome::NotObtained } else { Outcome::Done })
     }
 
     /// What the folder of a search says that it holds.
-    fn manifest(&self) -> Result<String> {
+    fn manifest(&self, starts: Option<&StateList>) -> Result<String> {
         let digest = match self.policy {
             PolicySource::Network { network, .. } => Some(network.digest()),
             PolicySource::Formula(_) => None,
         };
-        let work = serde_json::json!({
+        let mut work = serde_json::json!({
             "config": self.config.to_json()?,
             "policy_sha256": digest,
             "within": self.target.words,
             "budget": self.asked.budget,
         });
+        if let Some(starts) = starts {
+            let bytes: Vec<u8> = starts.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+            work["starts_sha256"] = sha256([bytes.as_slice()]).into();
+        }
         json(MANIFEST, &serde_json::json!({ "falsify": work }))
     }
-}
-
-/// Writes the files of the folder, the record last.
-fn stage(
-    staged: &mut Staged,
-    plant: &Plant,
-    record: &FalsifyRecord,
-    manifest: &str,
-    answer: &str,
-) -> Result<()> {
-    let model = &plant.model;
-    staged.add(MANIFEST, manifest.as_bytes())?;
-    if !record.starts.is_empty() {
-        let table = starts_csv(&model.states, &model.parameters, &record.starts);
-        staged.add(COUNTEREXAMPLES, table.as_bytes())?;
-    }
-    if !record.pairs.is_empty() {
-        let axes: [&[Axis]; 2] = [&model.states, &model.controls];
-        let table = replayed_csv(axes, &model.parameters, &record.pairs);
-        staged.add(REPLAYED, table.as_bytes())?;
-    }
-    staged.add(RECORD, answer.as_bytes())
-}
-
-/// What was found, or what was tried.
-fn text(plant: &Plant, answer: &Answer<'_>, files: &[PathBuf]) -> String {
-    let Answer { record, within, .. } = answer;
-    let mut text = match record.found {
-        true => format!("a start of {within} fails, on {} and in f64\n", answer.device),
-        false => {
-            format!("no failing start of {within} was found; that is no proof that there is none\n")
-        }
-    };
-    let FalsifyRecord { rollouts, budget, uniform, uniform_failures, restarts, rounds, .. } =
-        record;
-    // A String takes whatever is written to it.
-    let _ = writeln!(
-        text,
-        "tried: {rollouts} of {budget} rollouts in {rounds} batches; {uniform} uniform draws, of which \
-         {uniform_failures} fail, and {restarts} clouds by cross-entropy and descent; seed {}",
-        record.seed
-    );
-    if let Some(best) = &record.best {
-        let names = plant.model.states.iter().map(|axis| axis.name.as_str());
-        let at: Vec<String> = names.zip(&best.x).map(|(name, x)| format!("{name} {x}")).collect();
-        let _ = writeln!(text, "smallest measure: {} at {}", number(best.measure), at.join(", "));
-    }
-    if record.unconfirmed > 0 {
-        let _ = writeln!(text, "{} fail in f32 alone, and do not count", record.unconfirmed);
-    }
-    if let Some(against) = &answer.against {
-        let _ = writeln!(text, "{}", against.words);
-    }
-    for file in files {
-        let _ = writeln!(text, "file: {}", file.display());
-    }
-    text
 }

@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod certify;
 pub(crate) mod devices;
+mod falsified;
 mod falsify;
 pub(crate) mod inputs;
 pub(crate) mod options;

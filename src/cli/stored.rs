@@ -1,5 +1,6 @@
 //! The commands `query` and `check`: a stored certificate used and verified again.
 
+use std::fmt::Write;
 use std::hash::BuildHasher;
 use std::path::{Path, PathBuf};
 
@@ -13,8 +14,10 @@ use super::{Outcome, devices, document, report};
 use crate::config::{Config, PolicySource};
 use crate::error::{Error, Result};
 use crate::files::{Existing, Inputs, RECORD_BYTES, Staged, StateReader, read, read_text};
+use crate::rounding::upper;
+use crate::scenario::drops_record::SequenceRecord;
 use crate::scenario::record::{Record, SCHEMA};
-use crate::scenario::{self, CheckReport, Figure, Finding, QueryRow};
+use crate::scenario::{self, Beside, CheckReport, Figure, Finding, QueryRow};
 
 /// Name of the file with a line per state.
 const ANSWERS: &str = "query.csv";
@@ -66,10 +69,11 @@ pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Out
     let staged = global.out.as_deref().map(Staged::new).transpose()?;
     let rows = ask(global, &stored, states)?;
     match staged {
-        None => report(global, &document(&answers(&rows)), || csv(&rows))?,
+        None => report(global, &document(&answers(&stored.record, &rows)), || csv(&rows))?,
         Some(staged) => {
             let path = write(staged, &rows, global.existing)?;
-            report(global, &document(&answers(&rows)), || counts(&rows, &path))?;
+            let words = || counts(&stored.record, &rows, &path);
+            report(global, &document(&answers(&stored.record, &rows)), words)?;
         }
     }
     Ok(Outcome::Done)
@@ -106,28 +110,61 @@ struct Numbered<'a> {
 /// What `query --json` prints.
 #[derive(Serialize)]
 struct Answers<'a> {
+    /// What the score of a certified state is above.
+    #[serde(with = "crate::files::number", skip_serializing_if = "Option::is_none")]
+    level: Option<f64>,
+    /// What the measure of a state of the calibrated set is above.
+    #[serde(with = "crate::files::number", skip_serializing_if = "Option::is_none")]
+    alpha: Option<f64>,
     rows: Vec<Numbered<'a>>,
 }
 
-fn answers(rows: &[QueryRow]) -> Answers<'_> {
+fn answers<'a>(record: &Record, rows: &'a [QueryRow]) -> Answers<'a> {
     let numbered = rows.iter().enumerate().map(|(index, row)| Numbered { index, row });
-    Answers { rows: numbered.collect() }
+    Answers { level: level(record), alpha: alpha(record), rows: numbered.collect() }
+}
+
+/// The level of the certified set, where a sequence chose it.
+fn level(record: &Record) -> Option<f64> {
+    record.sequence.as_ref().and_then(SequenceRecord::level)
+}
+
+/// The level of the calibrated set.
+fn alpha(record: &Record) -> Option<f64> {
+    record.calibration.as_ref().map(|calibration| calibration.level)
 }
 
 /// A line per state.
 fn csv(rows: &[QueryRow]) -> String {
     let line = |(index, row): (usize, &QueryRow)| {
-        let QueryRow { tier, check_margin, target_margin } = row;
-        let tier = tier.number();
-        format!("{index},{tier},{check_margin},{target_margin}\n")
+        let QueryRow { tier, check_margin, target_margin, beside } = row;
+        let more: String = columns(beside).map(|(_, cell)| format!(",{cell}")).collect();
+        format!("{index},{},{check_margin},{target_margin}{more}\n", tier.number())
     };
     let lines: String = rows.iter().enumerate().map(line).collect();
-    format!("index,tier,check_margin,target_margin\n{lines}")
+    let more = rows.iter().take(1).flat_map(|row| columns(&row.beside));
+    let more: String = more.map(|(name, _)| format!(",{name}")).collect();
+    format!("index,tier,check_margin,target_margin{more}\n{lines}")
 }
 
-/// How many states are of each tier.
-fn counts(rows: &[QueryRow], path: &Path) -> String {
-    let names = ["in the target", "certified", "in the verified ball", "none of these"];
+/// The columns of what the certificate has beside the tier.
+fn columns(beside: &Beside) -> impl Iterator<Item = (&'static str, String)> + use<> {
+    let Beside { score, measure, calibrated, radius } = *beside;
+    let number = |name, value: Option<f64>| value.map(|value| (name, value.to_string()));
+    [
+        number("score", score),
+        number("measure", measure),
+        calibrated.map(|inside| ("calibrated", inside.to_string())),
+        number("radius", radius),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// How many states are of each tier, and in the other sets.
+fn counts(record: &Record, rows: &[QueryRow], path: &Path) -> String {
+    let verified = format!("in the verified {}", record.growth.shape().name());
+    let names = ["in the target", "certified", &verified, "none of these"];
     let line = |(tier, name): (usize, &str)| {
         let count = rows.iter().filter(|row| usize::from(row.tier.number()) == tier).count();
         format!("tier {tier} ({name}): {count}\n")
@@ -135,7 +172,28 @@ fn counts(rows: &[QueryRow], path: &Path) -> String {
     let lines: String = names.into_iter().enumerate().map(line).collect();
     let words =
         "V_check: the reach-avoid measure with its margins tightened, certified where positive";
-    format!("{lines}{words}\nrows: {}\n", path.display())
+    let others = others(record, rows);
+    format!("{lines}{words}\n{others}rows: {}\n", path.display())
+}
+
+/// How many states the other parts of the certificate hold.
+fn others(record: &Record, rows: &[QueryRow]) -> String {
+    let mut lines = String::new();
+    // A String takes whatever is written to it, here and below.
+    if let Some(level) = level(record) {
+        let _ = writeln!(lines, "score: the largest lambda; certified above {}", upper(level));
+    }
+    if let Some(alpha) = alpha(record) {
+        let inside = rows.iter().filter(|row| row.beside.calibrated == Some(true)).count();
+        let _ = writeln!(lines, "calibrated (measure above {}): {inside}", upper(alpha));
+    }
+    if let Some(found) = &record.deterministic {
+        let certified = |row: &&QueryRow| row.beside.radius.is_some_and(|r| r >= found.radius);
+        let inside = rows.iter().filter(certified).count();
+        let radius = found.radius;
+        let _ = writeln!(lines, "certified without samples (radius at least {radius}): {inside}");
+    }
+    lines
 }
 
 /// Verifies the certificate in the folder again.

@@ -12,7 +12,7 @@ epsilon: the risk asked for; beta: chance that the sample misleads; simple, exac
 bound asks for; risk: the one obtained, which N and the failures certify";
 /// What the words below the table mean.
 const WORDS: &str = "\
-tier 0: in the target, 1: certified, 2: in the verified ball, 3: none of these; V_check: the reach-avoid
+tier 0: in the target, 1: certified, 2: in the set that growth verified, 3: none of these; V_check: the reach-avoid
 measure with its margins tightened, certified where positive; a pair: a start with a perturbed one beside
 it, fresh where it is drawn anew; fixed shape: one number scales bounds that a pilot sample fixed";
 
@@ -102,16 +102,16 @@ fn conditional(global: &GlobalRecord) -> String {
 /// What came of local growth.
 fn growth(record: &Record) -> String {
     let growth = &record.growth;
-    let rounds = growth.rounds.len();
+    let (rounds, set) = (growth.rounds.len(), growth.shape().with_article());
     match growth.outcome {
         GrowthOutcome::Verified if growth.upward.is_some() => {
-            format!("verified radius {} in {rounds} rounds upward", lower(growth.radius))
+            format!("verified {set} of radius {} in {rounds} rounds upward", lower(growth.radius))
         }
         GrowthOutcome::Exhausted if growth.upward.is_some() => {
             "exhausted: the first radius was refused".to_owned()
         }
         GrowthOutcome::Verified => {
-            format!("verified a ball of radius {} in round {rounds}", lower(growth.radius))
+            format!("verified {set} of radius {} in round {rounds}", lower(growth.radius))
         }
         GrowthOutcome::Exhausted => format!("exhausted: each of {rounds} rounds had a failure"),
         GrowthOutcome::NoBoundary => "no boundary of the certified set to grow from".to_owned(),

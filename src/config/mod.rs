@@ -18,6 +18,7 @@ mod sources;
 #[cfg(test)]
 mod tests;
 pub(crate) mod train;
+mod unused;
 mod value;
 
 pub use crate::studies::SystemSection;
@@ -45,6 +46,7 @@ use crate::files::{CONFIG_BYTES, read_text};
 use crate::model::text::Origin;
 use crate::studies::SYSTEMS;
 use layers::Layers;
+use unused::ProfileOf;
 
 /// What the command line lays over a configuration file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,8 +64,8 @@ impl Config {
     ///
     /// # Errors
     /// [`Error::File`] if the file is missing or no TOML, [`Error::Invalid`] naming the key that
-    /// is unknown, with the nearest valid one, or that has a value of the wrong kind, or in the
-    /// sections `race` and `train` a number that is not finite.
+    /// is unknown, with the nearest valid one, or that has a value of the wrong kind, in the
+    /// sections `race` and `train` a number that is not finite, or a key that nothing reads.
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self> {
         let text = read_text(path, CONFIG_BYTES).map_err(|e| Error::file(path, e))?;
         let table = toml::from_str(&text).map_err(|e| Error::file(path, e))?;
@@ -100,6 +102,8 @@ impl Config {
         // What is about to be trained is not there yet.
         let checked = config.policy.check(layers.trains());
         config.sources = layers.sources();
+        let profile = ProfileOf::of(overrides.profile, &overrides.set);
+        let checked = checked.and_then(|()| unused::check(&config, &config.sources, profile));
         checked.map_err(|error| config.placed(error))?;
         Ok(config)
     }

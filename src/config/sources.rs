@@ -11,9 +11,10 @@ pub(super) type Layer = (String, Table);
 /// What errors about a described plant call the configuration where its text is not at hand.
 pub(super) const UNNAMED: &str = "configuration";
 /// Sections and keys that a configuration begins with.
-const SECTIONS: [&str; 17] = [
+const SECTIONS: [&str; 20] = [
     "profile",
     "seed",
+    "attempt",
     "system",
     "model",
     "policy",
@@ -24,9 +25,11 @@ const SECTIONS: [&str; 17] = [
     "global",
     "drops",
     "calibration",
+    "deterministic",
     "slice",
     "state",
     "growth",
+    "sequential",
     "race",
     "train",
 ];
@@ -53,6 +56,16 @@ impl Sources {
     /// Whether the file or a setting has the dotted key `path`.
     pub(super) fn give(&self, path: &str) -> bool {
         has(&self.given, path) || self.sets.iter().any(|(_, set)| has(set, path))
+    }
+
+    /// The first key of the file that is `path` or in that section, `but` one.
+    pub(super) fn given_within(&self, path: &str, but: &str) -> Option<String> {
+        within(&self.given, path, but)
+    }
+
+    /// The first such key among the settings over the file.
+    pub(super) fn set_within(&self, path: &str, but: &str) -> Option<String> {
+        self.sets.iter().find_map(|(_, set)| within(set, path, but))
     }
 
     /// `error` with the setting or the line of the file that its key comes from.
@@ -88,4 +101,13 @@ fn has(table: &Table, path: &str) -> bool {
         (Some(_), None) => true,
         (Some(value), Some(rest)) => value.as_table().is_some_and(|inner| has(inner, rest)),
     }
+}
+
+/// The first key of `table` that is the dotted `path`, or in the section of this name, `but` one.
+fn within(table: &Table, path: &str, but: &str) -> Option<String> {
+    let (first, rest) =
+        path.split_once('.').map_or((path, None), |(first, rest)| (first, Some(rest)));
+    let section = table.get(first)?.as_table()?;
+    let keys = section.keys().filter(|key| rest.is_none_or(|rest| rest == key.as_str()));
+    keys.map(|key| format!("{first}.{key}")).find(|key| key != but)
 }

@@ -146,12 +146,16 @@ fn limits(record: &Record) -> Vec<String> {
     }
     match (record.growth.outcome, &record.growth.claim) {
         (GrowthOutcome::Verified, Some(claim)) => {
-            limits.push(format!("The verified ball is about {}.", claim.measure));
+            limits.push(format!(
+                "The verified {} is about {}.",
+                words::grown(record),
+                claim.measure
+            ));
         }
-        (GrowthOutcome::Exhausted, _) => limits.push(
-            "Local growth was exhausted: the last ball tried is drawn, and is not certified."
-                .to_owned(),
-        ),
+        (GrowthOutcome::Exhausted, _) => limits.push(format!(
+            "Local growth was exhausted: the last {} tried is drawn, and is not certified.",
+            words::grown(record)
+        )),
         _ => {}
     }
     limits

@@ -1,5 +1,5 @@
 //! The reports: one self-contained HTML page made from the record of a certificate, a race study, a
-//! sweep or a run of training.
+//! sweep, a run of training or a search for failures.
 //!
 //! Figures are written as SVG here rather than with a plot library: `plotters` writes each colour
 //! and text size as a fixed value and its legend into the plot, so that the page could follow
@@ -7,6 +7,8 @@
 
 mod contour;
 mod deterministic;
+mod falsify;
+mod falsify_figures;
 pub(crate) mod figure;
 mod figures;
 mod growth;
@@ -26,5 +28,6 @@ pub(crate) mod text;
 mod train;
 mod words;
 
+pub use falsify::{Search, falsify_html};
 pub use html::html;
 pub use train::train_html;

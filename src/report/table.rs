@@ -178,7 +178,7 @@ fn state(record: &Record) -> String {
     pairs(
         "The state of slice and growth",
         &[
-            ("tier", words::tier(state.tier).to_owned()),
+            ("tier", words::tier(record)),
             ("V_check", lower(state.check_margin)),
             ("target margin", number(state.target_margin)),
             ("constraint margin", number(state.constraint_margin)),
@@ -188,14 +188,16 @@ fn state(record: &Record) -> String {
 
 fn growth(record: &Record) -> String {
     let growth = &record.growth;
+    let [radius, volume] =
+        ["radius", "volume"].map(|what| format!("{what} of the verified {}", words::grown(record)));
     pairs(
         "Local growth",
         &[
             ("centre on the boundary of", growth.around.words().to_owned()),
             ("centre from", words::boundary(growth.boundary).to_owned()),
             ("distance of the centre from the state", or_dash(growth.distance.map(number))),
-            ("radius of the verified ball", lower(growth.radius)),
-            ("volume of the verified ball", lower(growth.volume)),
+            (&radius, lower(growth.radius)),
+            (&volume, lower(growth.volume)),
             ("coordinates that vary", {
                 growth.varies.iter().filter(|&&varies| varies).count().to_string()
             }),
@@ -247,8 +249,9 @@ fn provenance(record: &Record) -> String {
 }
 
 fn system(record: &Record) -> String {
-    let head =
-        ["state", "unit", "box low", "box high", "at the state", "ball centre", "in the ball"];
+    let set = words::grown(record);
+    let (centre, within) = (format!("{set} centre"), format!("in the {set}"));
+    let head = ["state", "unit", "box low", "box high", "at the state", &centre, &within];
     let region = record.constants.region.as_ref();
     let extra = region.map_or(&[][..], |_| &["constants from", "constants to"]);
     let side = |ends: &[f32], index: usize, outwards: fn(f64) -> String| {

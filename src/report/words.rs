@@ -32,8 +32,8 @@ pub(crate) fn norm_unit(record: &Record, counts: impl Fn(usize) -> bool) -> Stri
     units.join(", ")
 }
 
-/// Unit of the ball of local growth.
-pub(crate) fn ball_unit(record: &Record) -> String {
+/// Unit of the radii of local growth.
+pub(crate) fn radius_unit(record: &Record) -> String {
     let varies = &record.growth.varies;
     norm_unit(record, |state| varies.get(state).copied().unwrap_or(true))
 }
@@ -150,7 +150,7 @@ fn growth(record: &Record) -> Verdict<'_> {
 
 /// What local growth grew.
 pub(crate) fn grown(record: &Record) -> &'static str {
-    record.growth.upward.as_ref().map_or("ball", |upward| upward.shape.name())
+    record.growth.shape().name()
 }
 
 /// How the steps of the deviation bound hold together.
@@ -179,7 +179,7 @@ pub(crate) fn source(source: DeviationSource) -> &'static str {
     }
 }
 
-/// Where the centre of the ball was looked for.
+/// Where the centre of growth was looked for.
 pub(crate) fn boundary(boundary: BoundarySearch) -> &'static str {
     match boundary {
         BoundarySearch::Slice => "a boundary cell of the slice",
@@ -187,12 +187,13 @@ pub(crate) fn boundary(boundary: BoundarySearch) -> &'static str {
     }
 }
 
-/// Where a state stands in the hierarchy.
-pub(crate) fn tier(tier: u8) -> &'static str {
-    match tier {
-        0 => "0, in the target set",
-        1 => "1, V_check is positive there",
-        2 => "2, in the verified ball",
-        _ => "3, none of target set, certified set and verified ball",
+/// Where the state stands in the hierarchy.
+pub(crate) fn tier(record: &Record) -> String {
+    let set = grown(record);
+    match record.state.tier {
+        0 => "0, in the target set".to_owned(),
+        1 => "1, V_check is positive there".to_owned(),
+        2 => format!("2, in the verified {set}"),
+        _ => format!("3, none of target set, certified set and verified {set}"),
     }
 }

@@ -12,6 +12,7 @@ use crate::model::Model;
 use crate::rollout::drops::Shapes;
 use crate::rollout::replay::{PairMargins, measure_of};
 use crate::rollout::{RolloutSpec, Tightening};
+use crate::rounding::confidence;
 
 /// Draws the pairs and finds the level alpha: the largest measure of the nominal rollout of a failing pair
 /// that is not discarded, and never below 0 (Lin and Bansal 2023).
@@ -53,7 +54,7 @@ pub(super) fn derived(
 }
 
 /// The measure of the nominal rollout where the perturbed one fails; minus infinity where it does not.
-fn failing_score(shapes: &Shapes, pair: &PairMargins, spec: &RolloutSpec) -> f64 {
+pub(super) fn failing_score(shapes: &Shapes, pair: &PairMargins, spec: &RolloutSpec) -> f64 {
     let reached = measure_of(&pair.perturbed, spec, &Tightening::none(spec)) > 0.0;
     if reached { f64::NEG_INFINITY } else { shapes.score(&pair.nominal) }
 }
@@ -66,8 +67,9 @@ fn claim(model: &Model, settings: &Settings, asked: &SampleSettings) -> Result<C
         _ => format!(" ({discards} of {scenarios} pairs discarded)"),
     };
     let statement = format!(
-        "With confidence 1 - {beta}, the chance that a nominal start of the box has a reach-avoid \
-         measure above alpha and its perturbed rollout fails is at most {epsilon}{discarded}."
+        "With confidence {}, the chance that a nominal start of the box has a reach-avoid measure above \
+         alpha and its perturbed rollout fails is at most {epsilon}{discarded}.",
+        confidence(beta)
     );
     sample_claim(model, settings, asked, "calibration", statement)
 }

@@ -10,7 +10,7 @@ use super::settings::Settings;
 use super::{empty, probe, sampling, sets, side};
 use crate::model::Plant;
 use crate::rollout::StateList;
-use crate::rounding::{lower, upper};
+use crate::rounding::{confidence, lower, upper};
 
 /// Whether every claim that is asked for was obtained.
 pub(super) fn holds(record: &Record) -> bool {
@@ -94,9 +94,9 @@ fn share_statement(global: &GlobalRecord, settings: &Settings) -> String {
     let (inside, draws) =
         global.share.map_or((global.accepted, global.draws), |share| (share.inside, share.draws));
     format!(
-        "With confidence 1 - {}, the certified set holds between {} % and {} % of the box \
+        "With confidence {}, the certified set holds between {} % and {} % of the box \
          ({} of {} starts).",
-        settings.global.beta,
+        confidence(settings.global.beta),
         lower(low),
         upper(high),
         inside,

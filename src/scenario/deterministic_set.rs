@@ -13,9 +13,9 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::real::bound::Interval;
 use crate::rollout::{
-    PairControl, Pairs, Query, Region, Starts, StateList, Stream, Tightening, replay,
+    PairControl, Pairs, Query, Region, Starts, StateList, States, Stream, Tightening, replay,
 };
-use crate::rounding::{lower, upper};
+use crate::rounding::{confidence, lower, upper};
 
 /// Starts between two looks at whether to stop.
 const CHUNK: usize = 32;
@@ -68,6 +68,17 @@ pub(super) fn derived(
     let (asked, stored) = (settings.deterministic.as_ref()?, stored?.clone());
     let DeterministicRecord { reached, certified, radii, f32_distance, .. } = stored;
     Some(conclude(settings, asked, Measured { reached, certified, radii, f32_distance }))
+}
+
+/// Certified radii around `states`; none where `settings` ask for no deterministic certificate.
+pub(super) fn radii_around(
+    context: Context<'_>,
+    settings: &Settings,
+    states: States<'_>,
+) -> Result<Option<Vec<f64>>> {
+    let Some(asked) = &settings.deterministic else { return Ok(None) };
+    let certificate = certificate(context, settings, asked)?;
+    Ok(Some(certificate.radii(states, MOST * f64::from(asked.radius))))
 }
 
 fn certificate<'a>(
@@ -184,9 +195,10 @@ fn statement(record: &DeterministicRecord) -> String {
     format!(
         "Every start within {radius} of a start that is certified by {} reaches the target safely {driven}: \
          no risk and no confidence, in real arithmetic with the f32 parameters of model and policy. With \
-         confidence 1 - {beta}, this certifies between {} % and {} % of the box \
+         confidence {}, this certifies between {} % and {} % of the box \
          ({certified} of {starts} starts). f32 rollouts were at most {} away from the enclosure.",
         record.kind.name(),
+        confidence(*beta),
         lower(100.0 * low),
         upper(100.0 * high),
         upper(record.f32_distance),

@@ -14,7 +14,7 @@ use crate::rollout::{
     DeviationTask, Farthest, HUGE, Keep, PairControl, PairTally, Pairs, Purpose, Region,
     RolloutSpec, Starts, Tightening,
 };
-use crate::rounding::{complement, upper};
+use crate::rounding::{complement, confidence};
 
 /// Draws the pairs and bounds the deviation; method and numbers as `settings` ask.
 pub fn bound(context: Context<'_>, settings: &Settings) -> Result<DeviationRecord> {
@@ -218,23 +218,23 @@ fn claim(model: &Model, settings: &Settings, program: &Program) -> Result<Claim>
         PairControl::Replay => "the same controls replayed",
         PairControl::ClosedLoop => "the policy in feedback on both",
     };
-    let beta = asked.beta;
-    let confidence = match asked.joint {
+    let sure = match asked.joint {
         Joint::Separate => format!(
-            "With confidence 1 - {beta} for each step, and 1 - {} for all {horizon} of them",
-            upper(asked.spent(horizon))
+            "With confidence {} for each step, and {} for all {horizon} of them",
+            confidence(asked.beta),
+            confidence(asked.spent(horizon))
         ),
-        _ => format!("With confidence 1 - {beta}"),
+        _ => format!("With confidence {}", confidence(asked.beta)),
     };
-    let confidence = format!(
-        "{confidence}, a fresh pair stays within the scenario bound {joint} with probability at least {}, \
+    let sure = format!(
+        "{sure}, a fresh pair stays within the scenario bound {joint} with probability at least {}, \
          {driven}.",
         complement(asked.epsilon)
     );
     let statement = match asked.source {
-        DeviationSource::Scenario => confidence,
+        DeviationSource::Scenario => sure,
         DeviationSource::Exact => format!(
-            "The margins are tightened with the exact supremum, which no pair exceeds. {confidence}"
+            "The margins are tightened with the exact supremum, which no pair exceeds. {sure}"
         ),
     };
     let region = Region::new_box(&*settings.low, &*settings.high)?;

@@ -15,6 +15,7 @@ use crate::model::{Model, Plant};
 use crate::rollout::drops::{Shapes, drops};
 use crate::rollout::replay::{Margins, PairMargins, pair_margins};
 use crate::rollout::{Pairs, Purpose, Region, Starts};
+use crate::rounding::{complement, confidence};
 
 /// The least unit of a step, of the largest of its margin: a direction that dies out would leave a unit
 /// near zero, which one pair could exceed many times over.
@@ -244,11 +245,12 @@ fn claim(model: &Model, settings: &Settings, asked: &DropSettings) -> Result<Cla
         _ => format!(" ({discards} of {scenarios} pairs discarded)"),
     };
     let statement = format!(
-        "With confidence 1 - {beta}, the margins of a fresh pair drop by at most lambda times the \
+        "With confidence {}, the margins of a fresh pair drop by at most lambda times the \
          pilot's shapes, at all steps before the nominal rollout violates the constraint, with \
          probability at least {}{discarded}: the chance that a nominal start of the box is certified at \
          lambda and its perturbed rollout fails is at most {epsilon}.",
-        1.0 - epsilon
+        confidence(beta),
+        complement(epsilon)
     );
     sample_claim(model, settings, sample, "drops", statement)
 }

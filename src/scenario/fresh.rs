@@ -1,14 +1,14 @@
 //! The claims of a stored certificate on samples that it has not seen.
-//!
-//! A claim is refuted only where the samples leave less than 1e-6 to chance: a true one is called false
-//! no more often than that, each.
 
-use super::bound::{interval, lower_bound};
-use super::finding::{Figure, Finding};
-use super::record::{DeviationRecord, GlobalRecord, Record};
+use super::finding::Finding;
+use super::record::{DeviationRecord, Record};
+use super::refuted::{FALSE_ALARM, refuted, refuted_at, share};
 use super::settings::{Joint, Settings};
 use super::tier::verified_set;
-use super::{Context, deterministic_set, global, pairs_f64, purpose, sets, whole_box};
+use super::{
+    Context, deterministic_set, fresh_drops, global, pairs_f64, purpose, sequential, sets,
+    whole_box,
+};
 use crate::error::Result;
 use crate::rollout::side_by_side::PairGroup;
 use crate::rollout::{Keep, Pairs, Query, ReachAvoidTask, Region, Starts, Stream, Tightening};
@@ -21,8 +21,6 @@ const PAIRS: u64 = 4_000;
 const AT_ONCE: u64 = 256;
 /// Distance beyond a bound, relative to it, that the bound's own f32 rounding may make.
 const ROUNDING: f64 = 1e-5;
-/// Chance that a check calls a true claim false, each.
-const FALSE_ALARM: f64 = 1e-6;
 
 /// What fresh samples of `seed` say of the claims of `record`.
 pub(super) fn findings(
@@ -39,49 +37,24 @@ pub(super) fn findings(
     let (failures, accepted) = (fresh.claim.failures, fresh.accepted);
     let name = "conditional failure on fresh pairs";
     findings.push(refuted(name, record.global.claim.certified_risk, failures, accepted));
-    findings.push(share(&record.global, &fresh));
+    let name = "certified share on fresh pairs";
+    findings.push(share(name, record.global.share_interval, accepted, fresh.draws));
+    findings.extend(fresh_drops::findings(context, record, settings)?);
     if let Some(stored) = &record.whole_box {
         let band = record.global.band;
         findings.push(whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?);
     }
+    let (sequential, band) = (record.sequential.as_ref(), record.global.band);
+    let found = sequential::on_fresh_starts(context, settings, sequential, &tightening, band)?;
+    findings.extend(found);
     findings.extend(deterministic_set::adversaries(context, settings)?);
     if let Some(set) = verified_set(&record.growth, settings.state.len()) {
         let failures = in_set(context, settings, set)?;
         let risk = record.growth.claim.as_ref().map_or(0.0, |claim| claim.certified_risk);
-        findings.push(refuted("failures in the verified ball", risk, failures, STARTS));
+        let name = format!("failures in the verified {}", record.growth.shape().name());
+        findings.push(refuted(&name, risk, failures, STARTS));
     }
     Ok(findings)
-}
-
-/// Whether `failures` of `trials` refute a risk of at most `risk`.
-fn refuted(name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
-    refuted_at(FALSE_ALARM, name, risk, failures, trials)
-}
-
-/// The same where a true claim is called false with probability at most `chance`.
-fn refuted_at(chance: f64, name: &str, risk: f64, failures: u64, trials: u64) -> Finding {
-    let least = lower_bound(failures, trials, chance);
-    Finding {
-        name: name.to_owned(),
-        stored: Figure::AtMost { at_most: risk },
-        found: Figure::Trials { failures, trials, at_least: least },
-        holds: least <= risk,
-    }
-}
-
-/// Whether the stored interval of the certified share may hold the share that fresh draws show.
-///
-/// Where the share lies in the stored interval, an interval around the fresh draws that misses it with
-/// probability 1e-6 meets the stored one with that confidence, whatever the stored one's own.
-fn share(stored: &GlobalRecord, fresh: &GlobalRecord) -> Finding {
-    let [low, high] = stored.share_interval;
-    let (fresh_low, fresh_high) = interval(fresh.accepted, fresh.draws, FALSE_ALARM);
-    Finding {
-        name: "certified share on fresh pairs".to_owned(),
-        stored: Figure::Interval(stored.share_interval),
-        found: Figure::Interval([fresh_low, fresh_high]),
-        holds: low <= fresh_high && fresh_low <= high,
-    }
 }
 
 /// Whether fresh pairs leave the deviation bound more often than its claim says; nothing of a bound
@@ -150,7 +123,7 @@ fn pairs_beyond(context: Context<'_>, settings: &Settings, bound: &[f64]) -> Res
 
 /// Failures among fresh starts in the verified set.
 fn in_set(context: Context<'_>, settings: &Settings, region: Region) -> Result<u64> {
-    context.watch.begin("fresh starts in the ball", STARTS);
+    context.watch.begin("fresh starts in the verified set", STARTS);
     let stream = Stream::new(settings.seed, purpose::CHECK, 1);
     let tightening = Tightening::none(&settings.spec);
     let task = ReachAvoidTask {

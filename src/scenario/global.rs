@@ -17,7 +17,7 @@ use crate::rollout::{
     DeviationTask, Keep, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
     RolloutSpec, Starts, StateList, States, Tightening, replay,
 };
-use crate::rounding::upper;
+use crate::rounding::{confidence, upper};
 
 /// The band around zero that is run again in f64, in measured errors.
 const BAND_FACTOR: f64 = 8.0;
@@ -253,8 +253,9 @@ fn statement(count: &Count, draws: u64, beta: f64, risk: f64) -> String {
         );
     }
     format!(
-        "With confidence 1 - {beta}, a perturbed rollout whose nominal start is drawn from the box and \
-         certified fails with probability at most {} ({} of {} such rollouts failed).",
+        "With confidence {}, a perturbed rollout whose nominal start is drawn from the box and certified \
+         fails with probability at most {} ({} of {} such rollouts failed).",
+        confidence(beta),
         upper(risk),
         count.failures,
         count.accepted

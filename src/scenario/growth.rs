@@ -15,7 +15,7 @@ use super::spacing::is_fine;
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::Ball;
-use crate::rounding::{complement, lower};
+use crate::rounding::{complement, confidence, lower};
 
 /// Outcome of the growth.
 ///
@@ -291,13 +291,13 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
     // The failures that were allowed, not those that were seen: which round is the last depends on these.
     let allowed = record.upward.as_ref().map_or(0, |upward| upward.allowed);
     let set = set_words(record);
-    let norm = if set.starts_with("ball") { "Euclidean " } else { "" };
+    let norm = if record.shape() == GrowthShape::Ball { "Euclidean " } else { "" };
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(
-            "With confidence 1 - {}, a start drawn from the verified {set} reaches the target safely \
+            "With confidence {}, a start drawn from the verified {set} reaches the target safely \
              within {} steps with probability at least {}{}.",
-            asked.beta,
+            confidence(asked.beta),
             settings.spec.horizon,
             complement(asked.epsilon),
             spent_words(asked, allowed)
@@ -325,18 +325,19 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
     })
 }
 
+impl GrowthRecord {
+    /// What grew.
+    pub fn shape(&self) -> GrowthShape {
+        self.upward.as_ref().map_or(GrowthShape::Ball, |upward| upward.shape)
+    }
+}
+
 /// The verified set in words.
 fn set_words(record: &GrowthRecord) -> String {
-    match &record.upward {
-        None => format!("ball of radius {}", lower(record.radius)),
-        Some(upward) => match upward.shape {
-            GrowthShape::Ball => format!("ball of radius {}", lower(record.radius)),
-            other => format!(
-                "{} of radius {} (of equal volume or mean side)",
-                other.name(),
-                lower(record.radius)
-            ),
-        },
+    let (name, radius) = (record.shape().name(), lower(record.radius));
+    match record.shape() {
+        GrowthShape::Ball => format!("{name} of radius {radius}"),
+        _ => format!("{name} of radius {radius} (of equal volume or mean side)"),
     }
 }
 

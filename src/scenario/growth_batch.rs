@@ -9,11 +9,10 @@ use super::growth::{Growth, check_scenarios, next_ball};
 use super::growth_plan::GrowthMethod;
 use super::purpose;
 use super::settings::{GrowthSettings, Settings};
+use super::walk::Walk;
 use crate::error::Result;
 use crate::real::Lanes;
-use crate::rollout::{
-    Ball, Query, ReachAvoidTask, Region, Starts, States, Stream, Tightening, replay,
-};
+use crate::rollout::{Ball, Region, Starts, States, Stream};
 
 /// Starts that are drawn side by side.
 const GROUP: usize = 16;
@@ -181,31 +180,16 @@ fn piece(
     let drawn: Vec<Vec<f32>> = balls.par_iter().enumerate().map(draw).collect();
     let (starts, size) = (drawn.concat(), settings.state.len());
     let starts = States::new(&starts, size)?;
-    let tightening = Tightening::none(&settings.spec);
-    let task = ReachAvoidTask {
-        starts: Starts::Listed(starts),
-        range: 0..starts.len() as u64,
-        spec: settings.spec,
-        tightening: &tightening,
-        query: Query::Measure,
-    };
-    context.program.reach_avoid(&task, &mut |first, values| {
-        for (index, value) in (first..).zip(values) {
-            let start = starts.row(index as usize);
-            let place = ((range.start + index) / count) as usize;
-            let mut value = f64::from(*value);
-            if value.abs() <= band {
-                value = replay::measure(context.plant(), start, &settings.spec, &tightening);
-                balls[place].f64_reruns += 1;
-            }
-            if value.is_nan() || value <= 0.0 {
-                let distance = balls[place].ball.distance(start);
-                let Seen { nearest, failures } = &mut seen[place];
-                *nearest = Some(nearest.map_or(distance, |near| near.min(distance)));
-                *failures += 1;
-            }
+    let (all, range_of_all) = (Starts::Listed(starts), 0..starts.len() as u64);
+    Walk { starts: all, range: range_of_all, spec: settings.spec, band }.each(context, |rolled| {
+        let place = ((range.start + rolled.index) / count) as usize;
+        balls[place].f64_reruns += rolled.reruns();
+        if rolled.failed() {
+            let distance = balls[place].ball.distance(starts.row(rolled.index as usize));
+            let Seen { nearest, failures } = &mut seen[place];
+            *nearest = Some(nearest.map_or(distance, |near| near.min(distance)));
+            *failures += 1;
         }
-        context.watch.advance(values.len() as u64)
     })
 }
 

@@ -67,6 +67,14 @@ impl Around {
     }
 }
 
+impl GrowthShape {
+    /// The same with its article.
+    pub fn with_article(self) -> String {
+        let article = if self == Self::Ellipsoid { "an" } else { "a" };
+        format!("{article} {}", self.name())
+    }
+}
+
 /// How a set is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrowthPlan {

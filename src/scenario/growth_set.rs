@@ -4,10 +4,9 @@ use super::Context;
 use super::growth_plan::{GrowthShape, UpwardRecord};
 use super::record::{RoundRecord, SampleRecord, decimal};
 use super::settings::Settings;
+use super::walk::Walk;
 use crate::error::Result;
-use crate::rollout::{
-    Ball, Ellipsoid, NON_FINITE, Query, ReachAvoidTask, Region, Starts, Stream, Tightening, replay,
-};
+use crate::rollout::{Ball, Ellipsoid, NON_FINITE, Region, Starts, Stream};
 
 /// Starts of a round that are kept for the picture.
 const KEPT_SAMPLES: u64 = 400;
@@ -103,14 +102,7 @@ pub(super) fn round(
     band: f64,
 ) -> Result<Round> {
     let starts = Starts::Drawn { region: family.at(radius), stream };
-    let tightening = Tightening::none(&settings.spec);
-    let task = ReachAvoidTask {
-        starts,
-        range: 0..count,
-        spec: settings.spec,
-        tightening: &tightening,
-        query: Query::Measure,
-    };
+    let spec = settings.spec;
     let mut record = RoundRecord {
         radius: decimal(radius),
         scenarios: count,
@@ -120,27 +112,19 @@ pub(super) fn round(
         f64_reruns: 0,
     };
     let mut samples = Vec::new();
-    context.program.reach_avoid(&task, &mut |first, values| {
-        for (index, value) in (first..).zip(values) {
-            let start = task.starts.start(index);
-            let mut value = f64::from(*value);
-            if value.abs() <= band {
-                value = replay::measure(context.plant(), &start, &settings.spec, &tightening);
-                record.f64_reruns += 1;
-            }
-            let success = value > 0.0;
-            if !success {
-                record.failures += 1;
-                record.non_finite += u64::from(value == f64::from(NON_FINITE));
-                let distance = family.radius_of(&start);
-                let nearest = record.nearest_failure.map_or(distance, |n| n.min(distance));
-                record.nearest_failure = Some(nearest);
-            }
-            if index < kept {
-                samples.push(SampleRecord { x: start, success });
-            }
+    Walk { starts: starts.clone(), range: 0..count, spec, band }.each(context, |rolled| {
+        let start = starts.start(rolled.index);
+        record.f64_reruns += rolled.reruns();
+        if rolled.failed() {
+            record.failures += 1;
+            record.non_finite += u64::from(rolled.measure == f64::from(NON_FINITE));
+            let distance = family.radius_of(&start);
+            let nearest = record.nearest_failure.map_or(distance, |n| n.min(distance));
+            record.nearest_failure = Some(nearest);
         }
-        context.watch.advance(values.len() as u64)
+        if rolled.index < kept {
+            samples.push(SampleRecord { x: start, success: !rolled.failed() });
+        }
     })?;
     Ok(Round { record, samples })
 }

@@ -1,5 +1,6 @@
 //! Certificates: what scenarios, drawn and rolled out, allow one to claim.
 
+mod answer;
 mod assumptions;
 mod attempt;
 pub mod bound;
@@ -31,6 +32,7 @@ pub mod falsify;
 mod finding;
 pub(crate) mod fit;
 mod fresh;
+mod fresh_drops;
 pub mod global;
 pub mod growth;
 pub mod growth_batch;
@@ -49,6 +51,7 @@ mod pairs_f64;
 mod probe;
 pub mod purpose;
 pub mod record;
+mod refuted;
 pub mod sampling;
 pub mod sequence;
 mod sequential;
@@ -65,8 +68,10 @@ mod tightened;
 mod verdict;
 mod verify;
 mod visited;
+mod walk;
 mod whole_box;
 
+pub use answer::Beside;
 pub use attempt::{AttemptRecord, attempt_share};
 pub use box_record::BoxRecord;
 pub use box_settings::BoxSettings;

@@ -6,17 +6,19 @@ use super::Context;
 use super::bound::{required_scenarios, simple_scenarios};
 use super::coordinates::{Coordinates, coordinates};
 use super::evidence::Evidence;
+use super::finding::Finding;
 use super::purpose;
 use super::record::{Claim, decimal};
+use super::refuted::refuted;
 use super::sequential_record::{
     EvidencePoint, SequentialOf, SequentialOutcome, SequentialRecord, SequentialSettings,
 };
 use super::settings::Settings;
+use super::walk::Walk;
 use crate::error::Result;
 use crate::model::Model;
-use crate::rollout::{
-    Ball, DeviationTask, Pairs, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
-};
+use crate::rollout::{Ball, DeviationTask, Pairs, Region, Starts, Tightening, replay};
+use crate::rounding::confidence;
 
 /// Draws of the first batch; each next one has twice as many.
 const FIRST_BATCH: u64 = 256;
@@ -83,6 +85,29 @@ pub(super) fn derived(
     let Claim { scenarios: starts, failures, .. } = stored.claim;
     let counts = Counts { draws: stored.draws, starts, failures };
     conclude(model, settings, asked, counts, process).map(Some)
+}
+
+/// Whether fresh draws of the seed of `settings` refute what `stored` claims; nothing of a claim that was not
+/// obtained.
+///
+/// # Errors
+/// Those of the backend and of the watch.
+pub(super) fn on_fresh_starts(
+    context: Context<'_>,
+    settings: &Settings,
+    stored: Option<&SequentialRecord>,
+    tightening: &Tightening,
+    band: f64,
+) -> Result<Option<Finding>> {
+    let obtained = stored.filter(|one| one.outcome == SequentialOutcome::Certified);
+    let (Some(asked), Some(stored)) = (&settings.sequential, obtained) else { return Ok(None) };
+    let draws = settings.global.draws;
+    context.watch.begin("fresh starts of the sequential claim", draws);
+    let outcomes = outcomes(context, settings, asked, 0..draws, tightening, band)?;
+    let of_claim = outcomes.iter().flatten();
+    let (starts, failures) = (of_claim.clone().count(), of_claim.filter(|failed| **failed).count());
+    let name = "failures of the sequential claim on fresh starts";
+    Ok(Some(refuted(name, stored.claim.certified_risk, failures as u64, starts as u64)))
 }
 
 /// Whether the process is kept after that many starts.
@@ -173,26 +198,10 @@ fn of_region(
     band: f64,
 ) -> Result<Vec<Option<bool>>> {
     let stream = settings.stream(purpose::SEQUENTIAL, 1);
-    let none = Tightening::none(&settings.spec);
-    let task = ReachAvoidTask {
-        starts: Starts::Drawn { region: region(settings, asked)?, stream },
-        range,
-        spec: settings.spec,
-        tightening: &none,
-        query: Query::Measure,
-    };
+    let starts = Starts::Drawn { region: region(settings, asked)?, stream };
     let mut outcomes = Vec::new();
-    context.program.reach_avoid(&task, &mut |first, values| {
-        for (index, value) in (first..).zip(values) {
-            let mut value = f64::from(*value);
-            if value.abs() <= band {
-                let start = task.starts.start(index);
-                value = replay::measure(context.plant(), &start, &settings.spec, &none);
-            }
-            outcomes.push(Some(value.is_nan() || value <= 0.0));
-        }
-        context.watch.advance(values.len() as u64)
-    })?;
+    Walk { starts, range, spec: settings.spec, band }
+        .each(context, |rolled| outcomes.push(Some(rolled.failed())))?;
     Ok(outcomes)
 }
 
@@ -247,8 +256,9 @@ fn claim(
     let seen = format!("{failures} of {starts} starts failed");
     let statement = match outcome {
         SequentialOutcome::Certified => format!(
-            "With confidence 1 - {beta}, {whose} fails with probability at most {epsilon}: shown after \
-             {starts} starts, looked at one after the other ({seen})."
+            "With confidence {}, {whose} fails with probability at most {epsilon}: shown after \
+             {starts} starts, looked at one after the other ({seen}).",
+            confidence(beta)
         ),
         SequentialOutcome::Hopeless => format!(
             "It is not shown that {whose} fails with probability at most {epsilon}, and it is hopeless: {seen}."

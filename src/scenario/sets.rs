@@ -10,7 +10,7 @@ use super::probe::{Probe, probe};
 use super::record::{GlobalRecord, Record};
 use super::sequence::{Counts, Failed, Levels, derived, test};
 use super::settings::Settings;
-use super::shares::{self, Scored, undiscounted};
+use super::shares::{self, Fresh, Scored, undiscounted};
 use super::tightened::Tightened;
 use super::{Context, calibration, drops, global, purpose, tightened};
 use crate::error::Result;
@@ -62,7 +62,8 @@ pub(super) fn sets(
     let by_measure =
         Scored { shapes: &units, levels: calibration.iter().map(|record| record.level).collect() };
     let scored = [by_drops, by_measure];
-    let inside = shares::inside(context, settings, &scored, draws, tally.band)?;
+    let fresh = Fresh { purpose: purpose::FRESH_SHARE, draws, band: tally.band };
+    let inside = shares::inside(context, settings, &scored, fresh)?;
     bound.share = ShareRecord::new(inside.counts[0][0], draws, asked.sample.beta);
     let share = ShareRecord::new(inside.counts[0][1], draws, settings.global.beta);
     let calibration = calibration.map(|record| {

@@ -1,5 +1,7 @@
 //! Shares of the box that sets by a score have, from fresh starts.
 
+use std::ops::Range;
+
 use super::drops_record::SeenRecord;
 use super::membership::Judge;
 use super::settings::Settings;
@@ -8,7 +10,7 @@ use super::{Context, global, purpose, tightened};
 use crate::error::Result;
 use crate::rollout::drops::Shapes;
 use crate::rollout::{
-    Keep, Query, ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Tightening,
+    Keep, Purpose, Query, ReachAvoidTask, Region, RolloutSpec, Starts, StateList, Tightening,
 };
 
 /// Starts that are looked at together.
@@ -35,14 +37,25 @@ pub(super) fn undiscounted(settings: &Settings) -> RolloutSpec {
     RolloutSpec { gamma: 1.0, ..settings.spec }
 }
 
-/// The fresh starts of the box.
-fn fresh(settings: &Settings) -> Result<Starts<'static>> {
-    let region = Region::new_box(&*settings.low, &*settings.high)?;
-    Ok(Starts::Drawn { region, stream: settings.stream(purpose::FRESH_SHARE, 0) })
+/// Fresh starts of the box that estimate shares.
+#[derive(Clone, Copy)]
+pub(super) struct Fresh {
+    /// What they are drawn for.
+    pub(super) purpose: Purpose,
+    /// How many.
+    pub(super) draws: u64,
+    /// Scores this close to a level are decided in f64.
+    pub(super) band: f64,
 }
 
-/// How many of `draws` fresh starts lie in each set, by score and level; scores within `band` of a level
-/// are decided in f64.
+impl Fresh {
+    fn starts(&self, settings: &Settings) -> Result<Starts<'static>> {
+        let region = Region::new_box(&*settings.low, &*settings.high)?;
+        Ok(Starts::Drawn { region, stream: settings.stream(self.purpose, 0) })
+    }
+}
+
+/// How many of the fresh starts lie in each set, by score and level.
 ///
 /// No set holds a start whose own rollout fails, since levels are at least 0: signs, of which most are
 /// decided early, leave the starts whose scores are asked for.
@@ -50,9 +63,10 @@ pub(super) fn inside(
     context: Context<'_>,
     settings: &Settings,
     scored: &[Scored<'_>],
-    draws: u64,
-    band: f64,
+    fresh: Fresh,
 ) -> Result<Inside> {
+    let Fresh { draws, band, .. } = fresh;
+    let starts = fresh.starts(settings)?;
     context.watch.begin("share of the sets", draws);
     let plain = Tightening::none(&settings.spec);
     let slack = global::band(context, settings, &plain)? as f32;
@@ -60,7 +74,7 @@ pub(super) fn inside(
     let mut inside = Inside { counts, rollouts: draws };
     for from in (0..draws).step_by(CHUNK as usize) {
         let range = from..draws.min(from + CHUNK);
-        let candidates = candidates(context, settings, range, slack)?;
+        let candidates = candidates(context, settings, &starts, range, slack)?;
         for (one, counts) in scored.iter().zip(&mut inside.counts) {
             if !candidates.is_empty() && !counts.is_empty() {
                 count(context, settings, one, &candidates, band, counts)?;
@@ -75,10 +89,10 @@ pub(super) fn inside(
 fn candidates(
     context: Context<'_>,
     settings: &Settings,
-    range: std::ops::Range<u64>,
+    starts: &Starts<'_>,
+    range: Range<u64>,
     slack: f32,
 ) -> Result<StateList> {
-    let starts = fresh(settings)?;
     let gained = vec![-slack; settings.spec.horizon as usize + 1];
     let task = ReachAvoidTask {
         starts: starts.clone(),
@@ -143,9 +157,11 @@ pub(super) fn by_constants(
         return Ok(None);
     }
     let lost = tightened::tightening(&deviation.bound, constants, &settings.spec);
+    let draws = draws.min(settings.global.draws);
+    let fresh = Fresh { purpose: purpose::FRESH_SHARE, draws, band: 0.0 };
     let task = ReachAvoidTask {
-        starts: fresh(settings)?,
-        range: 0..draws.min(settings.global.draws),
+        starts: fresh.starts(settings)?,
+        range: 0..draws,
         spec: settings.spec,
         tightening: &lost,
         query: Query::Sign,

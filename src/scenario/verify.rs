@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::answer::{Beside, beside};
 use super::certify::certify;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
@@ -34,6 +35,9 @@ pub struct QueryRow {
     /// Target margin.
     #[serde(with = "crate::files::number")]
     pub target_margin: f32,
+    /// What the other parts of the certificate say of it.
+    #[serde(flatten)]
+    pub beside: Beside,
 }
 
 /// Whether the record's hashes are of the text that this program records.
@@ -99,7 +103,7 @@ fn check_derived(program: &Program<'_>, record: &Record, settings: &Settings) ->
     Err(Error::Refused(format!("{}; certify again", finding.found)))
 }
 
-/// Tier and `V_check` of each of `states` against a stored certificate.
+/// Tier and `V_check` of each of `states` against a stored certificate, and what its other parts say of it.
 ///
 /// # Errors
 /// [`Error::Refused`] if the record is of another plant, or if a field does not follow from its
@@ -128,13 +132,14 @@ pub fn query(
         Query::Measure,
         record.global.band,
     )?;
-    let row = |(x, check_margin): (&[f32], f32)| {
+    let beside = beside(context, record, settings, states)?;
+    let row = |(x, (check_margin, beside)): (&[f32], (f32, Beside))| {
         let target_margin = finite_margin(plant.model.target_at(x, 0));
         let check = f64::from(check_margin);
         let tier = tier(f64::from(target_margin), check, &record.growth, x);
-        QueryRow { tier, check_margin, target_margin }
+        QueryRow { tier, check_margin, target_margin, beside }
     };
-    Ok(states.iter().zip(margins).map(row).collect())
+    Ok(states.iter().zip(margins.into_iter().zip(beside)).map(row).collect())
 }
 
 /// Verifies a stored certificate: computes it again from its seed, and tries its claims on scenarios of
@@ -201,6 +206,7 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
         let holds = stored == found;
         Finding { name: name.to_owned(), stored, found, holds }
     };
+    let verified = format!("radius of the verified {}", stored.growth.shape().name());
     let outcome = |record: &Record| Figure::Words(record.growth.outcome.name().to_owned());
     vec![
         number(
@@ -235,7 +241,7 @@ fn recomputed(stored: &Record, again: &Record) -> Vec<Finding> {
             again.global.claim.certified_risk,
         ),
         text("outcome of local growth", outcome(stored), outcome(again)),
-        number(lower, "radius of the verified ball", stored.growth.radius, again.growth.radius),
+        number(lower, &verified, stored.growth.radius, again.growth.radius),
         text("all claims obtained", Figure::Flag(stored.holds), Figure::Flag(again.holds)),
     ]
 }

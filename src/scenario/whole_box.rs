@@ -11,12 +11,11 @@ use super::purpose;
 use super::record::{Claim, GlobalRecord, Record};
 use super::settings::Settings;
 use super::verdict::verdict;
+use super::walk::Walk;
 use crate::error::Result;
 use crate::model::Model;
-use crate::rollout::{
-    NON_FINITE, Purpose, Query, ReachAvoidTask, Region, Starts, Tightening, replay,
-};
-use crate::rounding::{lower, upper};
+use crate::rollout::{NON_FINITE, Purpose, Region, Starts, Tightening};
+use crate::rounding::{confidence, lower, upper};
 
 /// The first version of the record that says something of the whole box.
 const FIRST_SCHEMA: u32 = 3;
@@ -35,9 +34,7 @@ pub(super) fn record(
     let Some(asked) = settings.whole_box else { return Ok(None) };
     let count = count(context, settings, purpose::CONDITIONAL_NOMINAL, global.band)?;
     let mut record = conclude(context.model(), settings, asked, global, &count)?;
-    let untightened = none(settings);
-    let drawn = task(settings, purpose::CONDITIONAL_NOMINAL, &untightened)?;
-    record.starts = count.worst.starts(&drawn.starts);
+    record.starts = count.worst.starts(&starts(settings, purpose::CONDITIONAL_NOMINAL)?);
     if global.claim.failures > 0 {
         record.pairs = failing_pairs(context, settings, tightening)?;
     }
@@ -103,50 +100,25 @@ struct Count {
     worst: Worst,
 }
 
-fn none(settings: &Settings) -> Tightening {
-    Tightening::none(&settings.spec)
-}
-
-/// The starts that `purpose` draws from the box, as many as pairs of the conditional sample.
-fn task<'a>(
-    settings: &Settings,
-    purpose: Purpose,
-    tightening: &'a Tightening,
-) -> Result<ReachAvoidTask<'a>> {
+/// The starts that `purpose` draws from the box.
+fn starts(settings: &Settings, purpose: Purpose) -> Result<Starts<'static>> {
     let region = Region::new_box(&*settings.low, &*settings.high)?;
-    Ok(ReachAvoidTask {
-        starts: Starts::Drawn { region, stream: settings.stream(purpose, 0) },
-        range: 0..settings.global.draws,
-        spec: settings.spec,
-        tightening,
-        query: Query::Measure,
-    })
+    Ok(Starts::Drawn { region, stream: settings.stream(purpose, 0) })
 }
 
-/// Rolls the starts out and counts those that fail.
+/// Rolls out as many starts as the conditional sample has pairs, and counts those that fail.
 fn count(context: Context<'_>, settings: &Settings, purpose: Purpose, band: f64) -> Result<Count> {
-    let tightening = none(settings);
-    let task = task(settings, purpose, &tightening)?;
+    let (starts, range) = (starts(settings, purpose)?, 0..settings.global.draws);
     context.watch.begin("whole box", settings.global.draws);
     let mut count = Count::default();
-    context.program.reach_avoid(&task, &mut |first, measures| {
-        for (index, measure) in (first..).zip(measures) {
-            let mut sign = f64::from(*measure);
-            if sign.abs() <= band {
-                let start = task.starts.start(index);
-                sign = replay::measure(context.plant(), &start, &task.spec, &tightening);
-                count.f64_reruns += 1;
-            }
-            // A measure that is no number is no success.
-            let succeeded = sign > 0.0;
-            let failed = !succeeded;
-            count.failures += u64::from(failed);
-            count.non_finite += u64::from(failed && (measure.is_nan() || *measure <= NON_FINITE));
-            if failed {
-                count.worst.add(*measure, index);
-            }
+    Walk { starts, range, spec: settings.spec, band }.each(context, |rolled| {
+        let (single, failed) = (rolled.single, rolled.failed());
+        count.f64_reruns += rolled.reruns();
+        count.failures += u64::from(failed);
+        count.non_finite += u64::from(failed && (single.is_nan() || single <= NON_FINITE));
+        if failed {
+            count.worst.add(single, rolled.index);
         }
-        context.watch.advance(measures.len() as u64)
     })?;
     Ok(count)
 }
@@ -191,8 +163,9 @@ fn claim(
     Ok(Claim {
         name: "box".to_owned(),
         statement: format!(
-            "With confidence 1 - {beta}, a start drawn from the whole box fails under the policy with \
+            "With confidence {}, a start drawn from the whole box fails under the policy with \
              probability at least {} and at most {} ({failures} of {draws} starts failed).",
+            confidence(beta),
             lower(low),
             upper(high)
         ),

@@ -209,14 +209,14 @@ fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline,
     let balls = all.iter().filter(|one| one.certificate.radius > 0.0);
     let radius = |one: &Certified<'_, '_>| one.certificate.radius;
     let largest = balls.max_by(|a, b| radius(a).total_cmp(&radius(b)));
-    let title = "Largest verified ball".to_owned();
+    let title = "Largest verified set".to_owned();
     let Some(largest) = largest else {
-        let found = "Local growth verified no ball at any point.".to_owned();
+        let found = "Local growth verified no set at any point.".to_owned();
         let headline = Headline { title, value: "none".to_owned(), details: Vec::new() };
         return (!all.is_empty()).then_some((headline, found));
     };
     let (name, radius) = (grid.name(largest.point), lower(radius(largest)));
-    let found = format!("The largest verified ball has radius {radius}, at {name}.");
+    let found = format!("The largest verified set has radius {radius}, at {name}.");
     let mut details = vec![format!("At {name}.")];
     details.extend(picked(all));
     Some((Headline { title, value: format!("radius {radius}"), details }, found))

@@ -119,11 +119,11 @@ pub(super) const DEVIATION: Measure = Measure {
     read: |_, point| reading(certificate(point)?.deviation_bound, &[]),
 };
 
-/// Radius of the verified ball.
+/// Radius of the verified set.
 pub(super) const GROWTH: Measure = Measure {
     id: "figure-growth",
     title: "Local growth",
-    label: "radius of the verified ball",
+    label: "radius of the verified set",
     range: Range::FromZero,
     bands: &[],
     caption: "Radius of the ball that local growth verified; 0 where none was.",

@@ -38,8 +38,7 @@ impl Ball {
         let states = slice_states(record);
         let center = growth.center.as_deref()?;
         let varies = |state: usize| growth.varies.get(state).copied().unwrap_or(true);
-        let upward = growth.upward.as_ref();
-        let shape = upward.map_or(GrowthShape::Ball, |upward| upward.shape);
+        let (upward, shape) = (growth.upward.as_ref(), growth.shape());
         let width = |state: usize| match upward {
             Some(upward) => upward.widths.get(state).map_or(0.0, |width| f64::from(*width)),
             None => f64::from(u8::from(varies(state))),
@@ -102,7 +101,7 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
     let ball = Ball::new(record);
     Figure {
         id: "figure-certified",
-        title: "Certified set, ball and starts".to_owned(),
+        title: format!("Certified set, {} and starts", words::grown(record)),
         drawing: grid.map_or_else(|| no_slice(record), |grid| Ok(drawing(grid, ball.as_ref()))),
         legend: grid.map_or_else(Vec::new, |_| legend(record, ball.as_ref())),
         caption: caption(record, ball.as_ref()),
@@ -111,6 +110,7 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
 
 fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
     let growth = &record.growth;
+    let set = words::grown(record);
     let verified = growth.outcome == GrowthOutcome::Verified;
     let entry = |swatch: Swatch, name: &str| (swatch, name.to_owned());
     let mut legend = vec![
@@ -122,12 +122,12 @@ fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
     if let Some(ball) = ball {
         let mark = CENTER.to_owned();
         legend.push(if verified {
-            (Swatch::Marked("ball", mark), "verified ball, its cut through this plane".to_owned())
+            (Swatch::Marked("ball", mark), format!("verified {set}, its cut through this plane"))
         } else {
-            (Swatch::Marked("ball unverified", mark), "last ball tried: not verified".to_owned())
+            (Swatch::Marked("ball unverified", mark), format!("last {set} tried: not verified"))
         });
         if ball.shadowed() {
-            legend.push(entry(Swatch::Line("shadow"), "shadow of the whole ball"));
+            legend.push((Swatch::Line("shadow"), format!("shadow of the whole {set}")));
         }
     }
     if growth.samples.iter().any(|sample| sample.success) {
@@ -150,7 +150,8 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
     let varied = record.growth.varies.iter().filter(|&&varies| varies).count();
     match (record.growth.outcome, ball) {
         (GrowthOutcome::NoBoundary, _) => {
-            caption += " No boundary of the certified set was found, so there is no ball.";
+            caption +=
+                &format!(" No boundary of the certified set was found, so there is no {set}.");
         }
         (outcome, Some(ball)) => {
             let kind = match outcome {
@@ -169,7 +170,7 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
                             most fall near the centre.";
             }
         }
-        (_, None) => caption += " The centre of the ball cannot be drawn.",
+        (_, None) => caption += &format!(" The centre of the {set} cannot be drawn."),
     }
     caption
 }
@@ -178,11 +179,10 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
 fn without_slice(record: &Record) -> String {
     let global = &record.global;
     let set = format!("{} of {} starts drawn are certified.", global.accepted, global.draws);
+    let (grown, radius) = (words::grown(record), lower(record.growth.radius));
     match record.growth.outcome {
-        GrowthOutcome::Verified => {
-            format!("{set} The verified ball has radius {}.", lower(record.growth.radius))
-        }
-        GrowthOutcome::Exhausted => format!("{set} No ball is verified."),
+        GrowthOutcome::Verified => format!("{set} The verified {grown} has radius {radius}."),
+        GrowthOutcome::Exhausted => format!("{set} No {grown} is verified."),
         GrowthOutcome::NoBoundary => format!("{set} No boundary of the set was found."),
     }
 }

@@ -75,7 +75,7 @@ fn drawing(record: &Record) -> String {
             ),
         );
     }
-    let unit = words::ball_unit(record);
+    let unit = words::radius_unit(record);
     let labels = Labels { x: "round", y: &format!("radius tried ({unit})"), whole: true };
     plot.finish(&labels, &description(record))
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::pairs::PairSettings;
 use super::record::FalsifyRecord;
 use crate::rollout::{Region, RolloutSpec};
-use crate::rounding::lower;
+use crate::rounding::{lower, upper};
 use crate::scenario::bound::lower_bound;
 use crate::scenario::record::{Claim, Record};
 use crate::scenario::sets::tightening;
@@ -35,13 +35,17 @@ impl Target {
     pub fn ball(record: &Record, states: usize) -> Result<Self, String> {
         match verified_set(&record.growth, states) {
             Some(region) => Ok(Self {
-                words: format!("the verified {} of radius {}", region.name(), record.growth.radius),
+                words: format!(
+                    "the verified {} of radius {}",
+                    record.growth.shape().name(),
+                    lower(record.growth.radius)
+                ),
                 region,
                 pairs: None,
                 claim: record.growth.claim.clone(),
             }),
             None => {
-                Err("the certificate verified no ball; look within its box (--within box)"
+                Err("the certificate verified no set by growth; look within its box (--within box)"
                     .to_owned())
             }
         }
@@ -117,8 +121,9 @@ impl Against {
         };
         let words = format!(
             "the claim `{name}` is that such a start, drawn at random, fails with probability at most \
-             {risk}: {single}. Of the {uniform} uniform draws {uniform_failures} fail: a probability of \
+             {}: {single}. Of the {uniform} uniform draws {uniform_failures} fail: a probability of \
              at least {} with confidence 1 - {FALSE_ALARM:e}, {verdict}",
+            upper(risk),
             lower(at_least)
         );
         Self { claim: name.clone(), risk, at_least, refuted, words }

@@ -6,6 +6,7 @@
 mod against;
 mod descent;
 mod domain;
+mod file;
 mod pairs;
 mod record;
 mod rounds;
@@ -13,8 +14,9 @@ mod settings;
 mod trials;
 
 pub use against::{Against, Target};
+pub use file::{FileRecord, roll_out};
 pub use pairs::PairSettings;
-pub use record::{BestStart, FalsifyRecord};
+pub use record::{BestStart, FalsifyRecord, Improvement};
 pub use settings::FalsifySettings;
 
 use self::domain::Domain;

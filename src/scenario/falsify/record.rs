@@ -30,6 +30,8 @@ pub struct FalsifyRecord {
     pub rounds: u64,
     /// The start with the smallest measure.
     pub best: Option<BestStart>,
+    /// The starts that had the smallest measure when they were tried, in their order.
+    pub improvements: Vec<Improvement>,
     /// Starts that fail on the backend and in f64.
     pub failures: u64,
     /// Starts that fail on the backend and not in f64.
@@ -39,6 +41,16 @@ pub struct FalsifyRecord {
     /// The worst of the pairs that fail, where pairs were looked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<FailingPair>,
+}
+
+/// A start with a smaller measure than all before it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Improvement {
+    /// The number of its rollout.
+    pub index: u64,
+    /// Its measure.
+    #[serde(with = "crate::files::number")]
+    pub measure: f64,
 }
 
 /// The start with the smallest measure that a search saw.

@@ -2,7 +2,7 @@
 
 use super::domain::Domain;
 use super::pairs::{self, NOT_CERTIFIED, halves};
-use super::record::{BestStart, FalsifyRecord};
+use super::record::{BestStart, FalsifyRecord, Improvement};
 use super::settings::FalsifySettings;
 use crate::error::Result;
 use crate::rollout::{PairControl, Tightening, replay};
@@ -31,6 +31,7 @@ pub(super) struct Trials<'a> {
     counted: u64,
     rounds: u64,
     best: Option<BestStart>,
+    improvements: Vec<Improvement>,
     found: Vec<FailingStart>,
     /// Starts that fail on the backend and in f64.
     failures: u64,
@@ -53,6 +54,7 @@ impl<'a> Trials<'a> {
             counted: 0,
             rounds: 0,
             best: None,
+            improvements: Vec::new(),
             found: Vec::new(),
             failures: 0,
             unconfirmed: 0,
@@ -174,6 +176,7 @@ impl<'a> Trials<'a> {
         let counts = self.settings.pairs.is_none() || measure < 0.5 * NOT_CERTIFIED;
         self.counted += u64::from(counts);
         if counts && self.best.as_ref().is_none_or(|best| value < best.measure) {
+            self.improvements.push(Improvement { index, measure: value });
             self.best = Some(BestStart { index, x, measure: value });
         }
         Candidate { u, measure: value }
@@ -202,6 +205,7 @@ impl<'a> Trials<'a> {
                 Some(_) => BestStart { x: halves(&best.x)[0].to_vec(), ..best },
                 None => best,
             }),
+            improvements: self.improvements,
             failures: self.failures,
             unconfirmed: self.unconfirmed,
             starts: if failing_pairs.is_some() { Vec::new() } else { self.found },
