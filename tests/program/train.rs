@@ -1,9 +1,7 @@
 //! `train` from outside: its files, what it refuses, and the program that was built without it.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, refused};
+use crate::command::{Folder, refused};
 
 /// A training of a few seconds at most.
 #[cfg(feature = "train")]
