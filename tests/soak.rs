@@ -1,4 +1,4 @@
-//! 10,000 control steps in flat memory: a plan improved and a state measured at each.
+//! 10,000 control steps in flat memory, 4,000 on an adapter: a plan improved and a state measured at each.
 
 mod common;
 
@@ -16,9 +16,8 @@ use reachcast::system::{DoubleIntegrator, System};
 
 /// Steps before the memory counts: pools and caches have their size by then.
 const WARM_UP: u32 = 1_000;
-/// Growth that is no leak: allocators keep a page here and there. 9,000 steps that lose 512 bytes
-/// each lose more.
-const SLACK_BYTES: u64 = 4 << 20;
+/// Growth that is no leak, per step: allocators keep a page here and there.
+const SLACK_BYTES: i64 = 466;
 /// Steps of a plan.
 const HORIZON: usize = 10;
 
@@ -86,10 +85,12 @@ fn memory_is_flat_over_ten_thousand_steps() {
         println!("SKIPPED: the system does not say how much memory a process holds");
         return;
     }
-    let adapters = adapter().map(|gpu| (Backend::Gpu(gpu), 64));
-    for (backend, samples) in std::iter::once((cpu(2), 256)).chain(adapters) {
-        let grown = growth(&backend, samples, 10_000).expect("it said so before");
-        println!("{}: {grown} bytes in 9,000 steps", backend.device());
-        assert!(grown < SLACK_BYTES as i64, "{}: {grown} bytes", backend.device());
+    // A step on a software adapter is almost all waiting.
+    let adapters = adapter().map(|gpu| (Backend::Gpu(gpu), 64, 4_000));
+    for (backend, samples, steps) in std::iter::once((cpu(2), 256, 10_000)).chain(adapters) {
+        let grown = growth(&backend, samples, steps).expect("it said so before");
+        let counted = steps - WARM_UP;
+        println!("{}: {grown} bytes in {counted} steps", backend.device());
+        assert!(grown < SLACK_BYTES * i64::from(counted), "{}: {grown} bytes", backend.device());
     }
 }

@@ -7,7 +7,7 @@ use super::boundary::{self, Boundary, Center};
 use super::coordinates::{Coordinates, coordinates};
 use super::growth_plan::{Around, GrowthMethod, GrowthShape, UpwardRecord};
 use super::growth_set::{Drawn, Family, round};
-use super::growth_upward::{climb, fixed, verified_by};
+use super::growth_upward::{climb, fixed};
 use super::purpose;
 use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecord, decimal};
 use super::settings::{GrowthSettings, Settings};
@@ -185,7 +185,7 @@ fn derived_upward(
     for (round, radius) in record.rounds.iter_mut().zip(asked.radii()) {
         (round.radius, round.scenarios) = (decimal(radius), asked.scenarios);
     }
-    let radius = verified_by(asked, &record.rounds, allowed);
+    let radius = asked.verified_radius(record.rounds.iter().map(|round| round.failures));
     let radii = asked.radii().into_iter().map(decimal).collect();
     let mut upward = UpwardRecord { allowed, radii, shape: asked.plan.shape, ..stored };
     if upward.shape == GrowthShape::Ball {

@@ -45,6 +45,14 @@ impl GrowthSettings {
         Some(low)
     }
 
+    /// The radius that rounds with these failures verify, tried from the smallest radius up: that of the last
+    /// one before the first refusal; none where the first is refused. Rounds after a refusal are not asked for.
+    pub fn verified_radius(&self, failures: impl IntoIterator<Item = u64>) -> Option<f32> {
+        let allowed = self.allowed_failures().unwrap_or(0);
+        let accepted = failures.into_iter().take_while(|failures| *failures <= allowed).count();
+        accepted.checked_sub(1).and_then(|last| self.radii().get(last).copied())
+    }
+
     /// Refuses a factor that does not lead upward, and Algorithm 1 of anything but a ball.
     pub(crate) fn check_plan(&self) -> Result<()> {
         let plan = &self.plan;
@@ -105,19 +113,9 @@ pub(super) fn climb(
         if !accepted {
             break;
         }
-        climb.verified = Some(radius);
     }
+    climb.verified = asked.verified_radius(climb.rounds.iter().map(|round| round.failures));
     Ok(climb)
-}
-
-/// The radius that `rounds` verify by their failures; none where the first was refused.
-pub(super) fn verified_by(
-    asked: &GrowthSettings,
-    rounds: &[RoundRecord],
-    allowed: u64,
-) -> Option<f32> {
-    let accepted = rounds.iter().take_while(|round| round.failures <= allowed).count();
-    accepted.checked_sub(1).and_then(|last| asked.radii().get(last).copied())
 }
 
 /// What is fixed before the first round: radii, failures allowed, and the sets, whose axes come from a

@@ -47,7 +47,7 @@ pub(super) fn record(
     let (evidence, mut counts) = (Evidence::new(asked.epsilon), Counts::default());
     let (mut process, mut batch) = (Vec::new(), FIRST_BATCH);
     context.watch.begin("sequential claim", asked.most);
-    while counts.draws < asked.most && end(asked, &evidence, counts).is_none() {
+    while counts.draws < asked.most && asked.end(counts.failures, counts.starts).is_none() {
         let range = counts.draws..asked.most.min(counts.draws + batch);
         batch = LARGEST_BATCH.min(2 * batch);
         for failed in outcomes(context, settings, asked, range, tightening, band)? {
@@ -58,7 +58,7 @@ pub(super) fn record(
             if is_kept(counts.starts) {
                 process.push(point(asked, &evidence, counts));
             }
-            if end(asked, &evidence, counts).is_some() {
+            if asked.end(counts.failures, counts.starts).is_some() {
                 break;
             }
         }
@@ -121,18 +121,16 @@ fn point(asked: &SequentialSettings, evidence: &Evidence, counts: Counts) -> Evi
     EvidencePoint { starts, failures, log_e: asked.carried + evidence.ln_e(failures, starts) }
 }
 
-/// What ends the work after `counts`; none where it goes on.
-fn end(
-    asked: &SequentialSettings,
-    evidence: &Evidence,
-    counts: Counts,
-) -> Option<SequentialOutcome> {
-    let Counts { starts, failures, .. } = counts;
-    if asked.carried + evidence.ln_e(failures, starts) >= -asked.beta.ln() {
-        return Some(SequentialOutcome::Certified);
+impl SequentialSettings {
+    /// What ends the work after `failures` of `starts`; none where it goes on.
+    pub fn end(&self, failures: u64, starts: u64) -> Option<SequentialOutcome> {
+        let evidence = Evidence::new(self.epsilon);
+        if self.carried + evidence.ln_e(failures, starts) >= -self.beta.ln() {
+            return Some(SequentialOutcome::Certified);
+        }
+        let hopeless = evidence.ln_against(failures, starts) >= HOPELESS.ln();
+        hopeless.then_some(SequentialOutcome::Hopeless)
     }
-    let hopeless = evidence.ln_against(failures, starts) >= HOPELESS.ln();
-    hopeless.then_some(SequentialOutcome::Hopeless)
 }
 
 /// Whether each of the draws `range` fails; none of a draw that is not one of the claim's.
@@ -226,7 +224,7 @@ fn conclude(
     process: Vec<EvidencePoint>,
 ) -> Result<SequentialRecord> {
     let evidence = Evidence::new(asked.epsilon);
-    let outcome = end(asked, &evidence, counts).unwrap_or(SequentialOutcome::Undecided);
+    let outcome = asked.end(counts.failures, counts.starts).unwrap_or(SequentialOutcome::Undecided);
     Ok(SequentialRecord {
         of: asked.of,
         claim: claim(model, settings, asked, counts, outcome)?,

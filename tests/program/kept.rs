@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -11,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use command::{Folder, done, refused};
+use crate::command::{Folder, done, refused};
 
 const RACE: &str = "configs/race.toml";
 const SMOKE: &str = "configs/smoke.toml";

@@ -1,11 +1,11 @@
 //! The race report as text: every number, escaping, self-containment, and records at the edge.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod page;
-mod races;
-
-use page::{assert_sound, attributes, cells, change_strings, drawing, escaped, figure, tags};
-use races::FRAMES;
+use crate::page::{
+    assert_sound, attributes, cells, change_strings, drawing, escaped, figure, tags,
+};
+use crate::races;
+use crate::races::FRAMES;
 use reachcast::race::judge::Judge;
 use reachcast::race::race_html;
 use reachcast::race::record::{FrameRecord, RaceRecord};

@@ -3,15 +3,13 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use command::{Folder, done};
+use crate::command::{Folder, done};
 
 const LINE: &str = "configs/double_integrator.toml";
 const SMOKE: &str = "configs/smoke.toml";

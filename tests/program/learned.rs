@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
 use std::fs;
 use std::path::Path;
 
-use command::{Folder, document, done, reachcast, refused};
+use crate::command::{Folder, document, done, reachcast, refused};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 use serde_json::Value;
 

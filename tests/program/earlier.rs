@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
+use crate::command;
 use std::path::{Path, PathBuf};
 
-use command::{done, reachcast};
+use crate::command::{done, reachcast};
 use reachcast::files::read_npz;
 use reachcast::race::record::RaceRecord;
 use reachcast::race::sweep::record::SweepRecord;

@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, document, done, reachcast, refused};
+use crate::command::{Folder, document, done, reachcast, refused};
 use reachcast::config::{Config, Overrides, Profile};
 use reachcast::policy::Mlp;
 use reachcast::race::DroneRace;

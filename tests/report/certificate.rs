@@ -1,10 +1,9 @@
 //! The report as text: escaping, completeness, self-containment, and records at the edge.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod page;
-mod records;
-
-use page::{attributes, cells, change_strings, drawing, escaped, figure, tags};
+use crate::page;
+use crate::page::{attributes, cells, change_strings, drawing, escaped, figure, tags};
+use crate::records;
 use reachcast::report::html;
 use reachcast::scenario::record::{GrowthOutcome, Record};
 

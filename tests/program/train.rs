@@ -1,9 +1,7 @@
 //! `train` from outside: its files, what it refuses, and the program that was built without it.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, refused};
+use crate::command::{Folder, refused};
 
 /// A training of a few seconds at most.
 #[cfg(feature = "train")]
@@ -38,7 +36,7 @@ fn a_policy_a_value_and_an_action_value_with_their_files() {
         let run = ["train", CONFIG, "--method", method];
         let policy = if scores == 1 { &[][..] } else { &policy[..] };
         let arguments = [&run[..], &few[..], policy, &["--seed", "7"]].concat();
-        let record = command::document(&arguments);
+        let record = crate::command::document(&arguments);
         assert_eq!(record["networks"][0]["widths"].to_string(), widths, "{method}");
         assert_eq!(record["scores"].as_array().unwrap().len(), scores);
         assert_eq!(record["curve"].as_array().unwrap().len(), 4);
@@ -48,10 +46,10 @@ fn a_policy_a_value_and_an_action_value_with_their_files() {
         assert_eq!(read("curve.csv").lines().count(), 5);
         assert!(read("report.html").contains("Learning curves"));
         let file = format!("{out}/{name}.safetensors");
-        let inspected = command::document(&["policy", "inspect", &file]);
+        let inspected = crate::command::document(&["policy", "inspect", &file]);
         assert_eq!(inspected["digest"], record["networks"][0]["sha256"], "{inspected}");
         // A second run has nothing left to do and says the same; another one is refused.
-        assert_eq!(command::document(&arguments), record);
+        assert_eq!(crate::command::document(&arguments), record);
         let other = [&run[..], &few[..], policy, &["--seed", "8"]].concat();
         refused(&other, &["another experiment"]);
     }

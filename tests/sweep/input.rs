@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod sweep_run;
-
+use crate::sweep_run;
 use std::path::Path;
 
-use sweep_run::{Folder, command, done, message_of, sweep, sweep_of};
+use crate::sweep_run::{Folder, command, done, message_of, sweep, sweep_of};
 
 /// Expects exit code 2, nothing on standard output, no folder, and `words` in the message.
 fn refused_by(config: &str, arguments: &[&str], words: &[&str]) {

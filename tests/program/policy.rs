@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, document, done, reachcast, refused};
+use crate::command::{Folder, document, done, reachcast, refused};
 use reachcast::policy::Mlp;
 use reachcast::policy::import::{Request, read};
 use safetensors::SafeTensors;

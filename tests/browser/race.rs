@@ -2,14 +2,12 @@
 //! through by slider, keys and buttons.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod chromium;
-mod races;
-
+use crate::races;
 use std::fs;
 use std::time::Duration;
 
-use chromium::{Scheme, browser, check_everywhere, measured, visit_for};
-use races::FRAMES;
+use crate::chromium::{Scheme, browser, check_everywhere, measured, visit_for};
+use crate::races::FRAMES;
 use reachcast::race::race_html;
 use reachcast::race::record::RaceRecord;
 use serde_json::{Value, json};

@@ -5,12 +5,10 @@
 //! --window-size=1400,1500 --screenshot=docs/report.png report.html`.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod chromium;
-mod records;
-
+use crate::records;
 use std::fs;
 
-use chromium::{Scheme, browser, check_everywhere, visit};
+use crate::chromium::{Scheme, browser, check_everywhere, visit};
 use reachcast::report::html;
 use reachcast::scenario::record::Record;
 

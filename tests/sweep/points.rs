@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod common;
-mod sweep_run;
-
+use crate::common;
+use crate::sweep_run;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::sweep_run::{CONFIG, Folder, command, done, message_of, record, sweep};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use reachcast::config::{Config, Overrides};
@@ -18,7 +18,6 @@ use reachcast::scenario::bound::{required_scenarios, simple_scenarios};
 use reachcast::scenario::record::{GrowthOutcome, Record};
 use reachcast::scenario::settings::Settings;
 use reachcast::scenario::{Keys, Unwatched, certify};
-use sweep_run::{CONFIG, Folder, command, done, message_of, record, sweep};
 
 /// Columns that are measured anew.
 const TIMED: [&str; 5] = ["step_ms_median", "step_ms_p95", "step_ms_p99", "batch_ms", "seconds"];

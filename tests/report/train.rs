@@ -1,9 +1,7 @@
 //! The page of a run of training as text: every number, escaping, and records at the edge.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod page;
-
-use page::assert_sound;
+use crate::page::assert_sound;
 use reachcast::report::train_html;
 use reachcast::scenario::record::Provenance;
 use reachcast::train::record::{CurvePoint, NetworkRecord, Origin, TRAIN_SCHEMA, TrainRecord};

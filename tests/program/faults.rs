@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-mod common;
-
-use command::{Folder, document, done, reachcast, refused};
+use crate::command::{Folder, document, done, reachcast, refused};
+use crate::common;
 use serde_json::Value;
 
 const STARTS: &str = "configs/race_starts_500.csv";

@@ -1,15 +1,12 @@
 //! The sweep report as text: every number, escaping, self-containment, and records at the edge.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod page;
-mod sweeps;
-
-use page::{assert_sound, attributes, change_strings, drawing, escaped, figure, tags};
+use crate::page::{assert_sound, attributes, change_strings, drawing, escaped, figure, tags};
+use crate::sweeps::{Axes, certificate_grid, certificates, judged, race_grid, races};
 use reachcast::race::judge::Judge;
 use reachcast::race::sweep::record::{CertificatePoint, PointResult, RacePoint, SweepRecord};
 use reachcast::race::sweep_html;
 use reachcast::scenario::record::GrowthOutcome;
-use sweeps::{Axes, certificate_grid, certificates, judged, race_grid, races};
 
 /// The words of enumerations.
 const MODES: [&str; 15] = [

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, document, done, reachcast};
+use crate::command::{Folder, document, done, reachcast};
 use reachcast::config::Config;
 use reachcast::rollout::replay::states_margins;
 use reachcast::scenario::deterministic::{Deterministic, Kind};

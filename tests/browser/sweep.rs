@@ -2,11 +2,9 @@
 //! sorts both ways, by mouse and by keyboard.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-mod chromium;
-mod sweeps;
-
-use chromium::live::Live;
-use chromium::{browser, check_everywhere};
+use crate::chromium::live::Live;
+use crate::chromium::{browser, check_everywhere};
+use crate::sweeps;
 use reachcast::race::sweep::record::SweepRecord;
 use reachcast::race::sweep_html;
 use serde_json::{Value, json};

@@ -1,0 +1,4 @@
+//! Races: whole experiments, and their input.
+
+mod experiment;
+mod input;
