@@ -427,5 +427,8 @@ fn what_a_file_has_is_turned_off_by_name_alone() {
     let folder = Folder::new();
     let out = folder.path("out");
     let certify = ["certify", LINE, "--out", &out, "--set", "sequential.most=500"];
-    command::refused(&certify, &["--set sequential.most=500", "nothing reads it", "--sequential"]);
+    crate::command::refused(
+        &certify,
+        &["--set sequential.most=500", "nothing reads it", "--sequential"],
+    );
 }
