@@ -168,11 +168,18 @@ fn npy(path: &Path) -> (Vec<u64>, Vec<f32>) {
     (file.shape().to_vec(), file.into_vec().unwrap())
 }
 
+/// One export, since its largest network takes a while.
 #[test]
-fn exported_measures_are_those_of_the_command_rollout() {
+fn exports_are_what_the_program_computes() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
-    done(&["bench", "--export", folder.path().to_str().unwrap(), "--backend", "cpu"]);
+    let out = folder.path().to_str().unwrap();
+    done(&["bench", "--export", out, "--backend", "cpu", "--seed", "7"]);
+    exported_measures_are_those_of_the_command_rollout(folder.path());
+    the_exported_plan_follows_from_controls_and_costs(folder.path());
+}
+
+fn exported_measures_are_those_of_the_command_rollout(folder: &Path) {
+    let path = |name: &str| folder.join(name);
     let settings = std::fs::read_to_string(path("settings.json")).unwrap();
     let settings: serde_json::Value = serde_json::from_str(&settings).unwrap();
     assert_eq!((&settings["horizon"], &settings["mppi"]["horizon"]), (&30.into(), &20.into()));
@@ -203,11 +210,8 @@ fn exported_measures_are_those_of_the_command_rollout() {
 }
 
 /// The exported plan is the mean of the controls, weighted by the exponentials of the costs.
-#[test]
-fn the_exported_plan_follows_from_controls_and_costs() {
-    let folder = tempfile::tempdir().unwrap();
-    done(&["bench", "--export", folder.path().to_str().unwrap(), "--seed", "7"]);
-    let read = |name: &str| npy(&folder.path().join(name));
+fn the_exported_plan_follows_from_controls_and_costs(folder: &Path) {
+    let read = |name: &str| npy(&folder.join(name));
     let (shape, controls) = read("mppi_controls.npy");
     assert_eq!(shape, [1024, 60]);
     assert!(controls.iter().all(|u| (-1.0..=1.0).contains(u)));
