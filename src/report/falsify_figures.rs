@@ -33,7 +33,7 @@ pub(super) fn progress(record: &FalsifyRecord) -> Figure {
         drawing,
         legend: vec![
             (Swatch::Line("bound"), "smallest measure so far".to_owned()),
-            (Swatch::Line("zero"), "0: below it a start fails".to_owned()),
+            (Swatch::Line("zero"), "0: at or below it a start fails".to_owned()),
         ],
         caption: "Uniform draws first, then clouds by cross-entropy and descent.".to_owned(),
     }
