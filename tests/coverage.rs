@@ -18,6 +18,7 @@ use reachcast::real::Real;
 use reachcast::rollout::Tightening;
 use reachcast::scenario::bound::{certified_risk, required_scenarios};
 use reachcast::scenario::boundary::Boundary;
+use reachcast::scenario::criterion::Criterion;
 use reachcast::scenario::growth::{Growth, grow};
 use reachcast::scenario::purpose;
 use reachcast::scenario::settings::{Joint, Settings};
@@ -306,6 +307,7 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     let bound = supremum(&system, PERTURBATION, STEPS as u32);
     let tightening = deviation::tightening(&bound, SMALL_CONSTANT, SMALL_CONSTANT, &settings.spec);
     let [failures, certified] = conditional_failures(&tightening);
+    let criterion = Criterion::Margins(tightening.clone());
     // Clopper and Pearson's lower end: the true probability is at least this.
     let below = Beta::new(failures as f64, (certified - failures + 1) as f64).expect("beta");
     let truth = below.inverse_cdf(FALSE_ALARM);
@@ -317,7 +319,7 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     for seed in 0..SEEDS {
         settings.seed = seed;
         let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-        let record = global::conditional(context, &settings, &tightening, purposes)
+        let record = global::conditional(context, &settings, &criterion, purposes)
             .expect("conditional failure");
         let (n, k) = (record.accepted, record.claim.failures);
         assert_eq!(record.claim.certified_risk, certified_risk(n, k, BETA));

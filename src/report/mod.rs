@@ -7,6 +7,7 @@
 
 mod contour;
 mod deterministic;
+mod enclosed;
 pub(crate) mod figure;
 mod figures;
 mod growth;

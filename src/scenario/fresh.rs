@@ -4,6 +4,7 @@
 //! no more often than that, each.
 
 use super::bound::{interval, lower_bound};
+use super::criterion::Criterion;
 use super::finding::{Figure, Finding};
 use super::record::{DeviationRecord, GlobalRecord, Record};
 use super::settings::{Joint, Settings};
@@ -33,9 +34,10 @@ pub(super) fn findings(
 ) -> Result<Vec<Finding>> {
     let settings = &Settings { seed, ..settings.clone() };
     let mut findings = Vec::from_iter(beyond(context, settings, &record.deviation)?);
-    let tightening = sets::tightening(record, &settings.spec);
+    let lost = sets::tightening(record, &settings.spec);
+    let criterion = Criterion::new(context.plant(), settings, &lost)?;
     let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
-    let fresh = global::conditional(context, settings, &tightening, purposes)?;
+    let fresh = global::conditional(context, settings, &criterion, purposes)?;
     let (failures, accepted) = (fresh.claim.failures, fresh.accepted);
     let name = "conditional failure on fresh pairs";
     findings.push(refuted(name, record.global.claim.certified_risk, failures, accepted));

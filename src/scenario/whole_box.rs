@@ -6,6 +6,8 @@ use super::box_record::BoxRecord;
 use super::box_settings::BoxSettings;
 use super::coordinates::{Coordinates, coordinates};
 use super::counterexamples::{Worst, failing_pairs};
+use super::criterion::Criterion;
+use super::enclosure;
 use super::finding::{Figure, Finding};
 use super::purpose;
 use super::record::{Claim, GlobalRecord, Record};
@@ -29,7 +31,7 @@ const FIRST_SCHEMA: u32 = 3;
 pub(super) fn record(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     global: &GlobalRecord,
 ) -> Result<Option<BoxRecord>> {
     let Some(asked) = settings.whole_box else { return Ok(None) };
@@ -39,7 +41,7 @@ pub(super) fn record(
     let drawn = task(settings, purpose::CONDITIONAL_NOMINAL, &untightened)?;
     record.starts = count.worst.starts(&drawn.starts);
     if global.claim.failures > 0 {
-        record.pairs = failing_pairs(context, settings, tightening)?;
+        record.pairs = failing_pairs(context, settings, criterion, global.band)?;
     }
     Ok(Some(record))
 }
@@ -164,7 +166,7 @@ fn conclude(
     let risk_interval = [low, high];
     Ok(BoxRecord {
         claim: claim(model, settings, asked, failures, risk_interval)?,
-        verdict: verdict(global, risk_interval),
+        verdict: verdict(global, enclosure::record(settings).as_ref(), risk_interval),
         draws,
         failures,
         non_finite: count.non_finite,
