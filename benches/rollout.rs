@@ -27,6 +27,7 @@ use reachcast::rollout::{
     Tightening,
 };
 use reachcast::scenario::boundary::Boundary;
+use reachcast::scenario::criterion::Criterion as Certifying;
 use reachcast::scenario::settings::{Settings, SliceAxis};
 use reachcast::scenario::{Context, Unwatched, global, growth};
 
@@ -203,13 +204,14 @@ fn growth_round(criterion: &mut Criterion) {
     let mut point = bench.data.starts[0];
     (point[0], point[2]) = (0.6, -0.55);
     let boundary = Boundary { point: point.to_vec(), distance: 0.0 };
+    let tightened = Certifying::Margins(bench.tightening.clone());
     let mut group = criterion.benchmark_group("growth");
     for (name, backend) in &bench.backends {
         let program = backend.prepare(&plant).expect("a program");
         let context = Context { program: &program, watch: &Unwatched };
         group.bench_function(BenchmarkId::new(*name, "slice + 5 x 159"), |b| {
             b.iter(|| {
-                let slice = global::slice(context, &settings, &bench.tightening, 0.0);
+                let slice = global::slice(context, &settings, &tightened, 0.0);
                 black_box(slice.expect("a slice"));
                 let run = growth::grow(context, &settings, &boundary, 0.0, 0).expect("a growth");
                 let outcome = run.outcome;

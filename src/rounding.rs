@@ -113,6 +113,12 @@ fn trimmed(text: &str) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// The shortest decimal that is this f32, so that a record says 0.4 and not 0.4000000059604645; as an
+/// f32 it is `value` again.
+pub(crate) fn as_written(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::{complement, confidence, interval, lower, number, upper};

@@ -33,6 +33,8 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
         interval(record.global.share_interval)
     ));
     lines.push(format!("conditional     {}", conditional(&record.global)));
+    lines
+        .extend(record.enclosed.as_ref().map(|found| format!("enclosed        {}", found.short())));
     lines.push(format!("growth          {}", growth(record)));
     let state = &record.state;
     let check_margin = lower(state.check_margin);

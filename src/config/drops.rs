@@ -9,6 +9,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub enum TighteningSource {
     /// How much less margin perturbed rollouts have than their nominal ones.
     Drops,
+    /// No sample: the ball of `deviation.radius` around a start is enclosed, of a plant that is linear in its
+    /// state and under `deviation.control = "replay"`, and each piece of the margins loses what it has to.
+    Pieces,
+    /// No sample: the ball of `deviation.radius` around a start is enclosed in a tube, of any plant, under
+    /// `deviation.control`.
+    Tube,
     /// Lipschitz constants of the margins times the deviation bound.
     #[default]
     Lipschitz,

@@ -5,6 +5,7 @@ mod deterministic;
 mod deterministic_settings;
 mod drop_settings;
 mod drops;
+mod enclosed;
 mod keys;
 mod layers;
 mod model;

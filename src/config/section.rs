@@ -215,7 +215,7 @@ pub struct GlobalSection {
     /// Largest risk that a start of the whole box may fail with, where that is asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub box_risk: Option<f64>,
-    /// What tightens the margins.
+    /// What says that a start is certified: margins that are tightened, or an enclosure of the ball around it.
     #[serde(default)]
     pub tightening: TighteningSource,
     /// Conditional risk that the certified set is to have, by margin drops: a claim. 1 asks for none, and

@@ -67,6 +67,7 @@ impl Config {
             global: self.global_settings()?,
             whole_box: Some(self.box_settings()?),
             drops: self.drop_settings()?,
+            enclosed: self.enclosed()?,
             deterministic: self.deterministic_settings()?,
             slice: self.slice(axes)?,
             state: in_order("state", &self.state, axes, finite)?,

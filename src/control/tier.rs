@@ -4,9 +4,11 @@ use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::rollout::{Ball, Query, StateList, States};
 use crate::scenario::boundary::on_slice;
+use crate::scenario::criterion::Criterion;
 use crate::scenario::drops_record::SequenceRecord;
+use crate::scenario::enclosure::Enclosure;
 use crate::scenario::fit::check_sizes;
-use crate::scenario::global::{band, check_margins, slice_through};
+use crate::scenario::global::{band, slice_through};
 use crate::scenario::growth::{Growth, check_scenarios};
 use crate::scenario::growth_batch::{Request, grow_each};
 use crate::scenario::growth_plan::GrowthShape;
@@ -84,6 +86,7 @@ pub struct Certifier<'a> {
     program: &'a Program<'a>,
     settings: &'a Settings,
     tightened: Tightened,
+    criterion: Criterion<'a>,
     sequence: Option<SequenceRecord>,
     band: f64,
     asked: Asked,
@@ -101,6 +104,7 @@ impl<'a> Certifier<'a> {
             check_ball(&settings.growth)?;
         }
         check_sizes(settings, &program.plant().model)?;
+        Enclosure::of(program.plant(), settings)?;
         let context = Context { program, watch: &Unwatched };
         let mut tightened = tightened(context, settings)?;
         let mut sequence = None;
@@ -109,12 +113,13 @@ impl<'a> Certifier<'a> {
             (tightened.tightening, sequence) = (tightening, Some(chosen));
         }
         let lost = tightened.deviation.non_finite;
-        if lost > 0 && tightened.drops.is_none() {
+        if lost > 0 && tightened.drops.is_none() && settings.enclosed.is_none() {
             let problem = format!("{lost} rollouts of the deviation bound are not finite");
             return Err(Error::Refused(problem));
         }
         let band = band(context, settings, &tightened.tightening)?;
-        Ok(Self { program, settings, tightened, sequence, band, asked })
+        let criterion = Criterion::new(program.plant(), settings, &tightened.tightening)?;
+        Ok(Self { program, settings, tightened, criterion, sequence, band, asked })
     }
 
     /// The settings of the certificates.
@@ -186,8 +191,7 @@ impl<'a> Certifier<'a> {
     /// `V_check` of each state, or its sign.
     fn margins(&self, states: States<'_>, query: Query) -> Result<Vec<f32>> {
         let context = Context { program: self.program, watch: &Unwatched };
-        let (spec, tightening) = (&self.settings.spec, &self.tightened.tightening);
-        check_margins(context, spec, tightening, states, query, self.band)
+        self.criterion.margins(context, &self.settings.spec, states, query, self.band)
     }
 
     /// The certified cells of the slices through the states `left`. Signs in f32: a cell says

@@ -1,6 +1,5 @@
 //! The page: verdict, statements, figures and numbers of a record.
 
-use super::deterministic;
 use super::figures;
 use super::growth;
 use super::palette;
@@ -10,6 +9,7 @@ use super::shell::{self, HATCH, Scripts, items};
 use super::table;
 use super::text::{escape, upper};
 use super::words::{self, Verdict};
+use super::{deterministic, enclosed};
 use crate::rollout::PairControl;
 use crate::scenario::record::{GrowthOutcome, Record};
 use crate::scenario::settings::Joint;
@@ -105,13 +105,14 @@ fn statements(record: &Record) -> String {
 
 /// What a reader might take the certificate for, and what it is.
 fn limits(record: &Record) -> Vec<String> {
+    let given = format!(
+        "Nothing is certified for one given state. Each claim is about a measure: how much \
+         of what is drawn from it may fail, not which start does. The deviation bound is \
+         about {}; the certified set about {}.",
+        record.deviation.claim.measure, record.global.claim.measure
+    );
     let mut limits = vec![
-        format!(
-            "Nothing is certified for one given state. Each claim is about a measure: how much \
-             of what is drawn from it may fail, not which start does. The deviation bound is \
-             about {}; the certified set about {}.",
-            record.deviation.claim.measure, record.global.claim.measure
-        ),
+        record.enclosed.as_ref().map_or(given, |found| enclosed::limit(record, found)),
         format!(
             "Confidence is about the draw of the scenarios: the procedure gives a false \
              certificate with probability at most {}.",
@@ -138,11 +139,11 @@ fn limits(record: &Record) -> Vec<String> {
         PairControl::ClosedLoop => {}
     }
     if record.deviation.joint == Joint::Separate {
-        limits.push(
+        let used = if record.enclosed.is_none() { ", though V_check uses them so" } else { "" };
+        limits.push(format!(
             "The deviation bound was drawn for each step on its own: there is no statement about \
-             all steps at once, though V_check uses them so."
-                .to_owned(),
-        );
+             all steps at once{used}."
+        ));
     }
     match (record.growth.outcome, &record.growth.claim) {
         (GrowthOutcome::Verified, Some(claim)) => {
@@ -188,7 +189,7 @@ fn numbers(record: &Record) -> String {
          {}</section>\n",
         table::claims(record),
         sets::sets(record),
-        table::narrow(record) + &deterministic::table(record),
+        table::narrow(record) + &enclosed::table(record) + &deterministic::table(record),
         sets::drops(record),
         table::wide(record) + &growth::upward(record) + &sequential::sequential(record),
         table::steps(record),

@@ -7,6 +7,7 @@
 
 mod contour;
 mod deterministic;
+mod enclosed;
 mod falsify;
 mod falsify_figures;
 pub(crate) mod figure;

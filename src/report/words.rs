@@ -107,7 +107,10 @@ fn global(record: &Record) -> Verdict<'_> {
             "empty".to_owned()
         },
         detail: format!(
-            "Chance of failure inside the set, which fills {} of the sampled box.",
+            "{}Chance of failure inside the set, which fills {} of the sampled box.",
+            record.enclosed.as_ref().map_or_else(String::new, |found| {
+                format!("Deterministic: {}. What draws from the box show: ", found.short())
+            }),
             interval(global.share_interval)
         ),
         claim: Some(&global.claim),

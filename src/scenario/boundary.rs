@@ -1,13 +1,14 @@
 //! Boundary search: the point of the certified set's boundary that is closest to a state.
 
-use super::global::{check_margins, slice_through};
+use super::criterion::Criterion;
+use super::global::slice_through;
 use super::growth_plan::Around;
 use super::purpose;
 use super::settings::Settings;
 use super::{Context, settings::BoundarySearch};
 use crate::error::Result;
 use crate::real::Lanes;
-use crate::rollout::{Query, StateList, States, Stream, Tightening, sample_ball};
+use crate::rollout::{Query, StateList, States, Stream, sample_ball};
 
 /// Directions of each sweep of the ray search.
 const DIRECTIONS: u64 = 512;
@@ -15,6 +16,10 @@ const DIRECTIONS: u64 = 512;
 const POINTS: usize = 16;
 /// Halvings of a bracket.
 const BISECTIONS: usize = 20;
+/// Directions where a state costs an enclosure instead of a rollout.
+const ENCLOSED_DIRECTIONS: u64 = 64;
+/// Halvings there: a bracket to within a thousandth of its width.
+const ENCLOSED_BISECTIONS: usize = 10;
 /// Spread of the directions around the best one so far, sweep by sweep; the first is uniform.
 const SPREADS: [f32; 4] = [0.0, 0.6, 0.3, 0.1];
 /// The eight neighbours of a cell.
@@ -32,21 +37,21 @@ pub struct Boundary {
     pub distance: f64,
 }
 
-/// The closest boundary point of the set that the bound certifies by itself, where `bound` is its
-/// tightening and there is one; else of the set that `certified` leaves. `band` as in [`check_margins`].
+/// The closest boundary point of the set that `bound` certifies, where there is one; else of the certified
+/// set. `band` as in [`Criterion::margins`].
 ///
 /// # Errors
 /// Those of the backend.
 pub fn center(
     context: Context<'_>,
     settings: &Settings,
-    bound: Option<&Tightening>,
-    certified: &Tightening,
+    bound: Option<&Criterion<'_>>,
+    certified: &Criterion<'_>,
     band: f64,
 ) -> Result<Option<Center>> {
     let sets = bound.map(|bound| (Around::Bound, bound));
-    for (around, tightening) in sets.into_iter().chain([(Around::Set, certified)]) {
-        if let Some(boundary) = search(context, settings, tightening, band)? {
+    for (around, criterion) in sets.into_iter().chain([(Around::Set, certified)]) {
+        if let Some(boundary) = search(context, settings, criterion, band)? {
             return Ok(Some(Center { around, boundary }));
         }
     }
@@ -62,23 +67,23 @@ pub struct Center {
     pub boundary: Boundary,
 }
 
-/// The closest boundary point of the set that `tightening` leaves, by the method that `settings` ask for;
-/// none if there is none. `band` as in [`check_margins`].
+/// The closest boundary point of the set that `criterion` certifies, by the method that `settings` ask for;
+/// none if there is none.
 fn search(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     band: f64,
 ) -> Result<Option<Boundary>> {
     match settings.growth.boundary {
         BoundarySearch::Slice => {
             let cells = slice_through(settings, &settings.state);
             let (spec, cells, query) = (&settings.spec, cells.view(), Query::Measure);
-            let margins = check_margins(context, spec, tightening, cells, query, band)?;
+            let margins = criterion.margins(context, spec, cells, query, band)?;
             let certified: Vec<bool> = margins.iter().map(|margin| *margin > 0.0).collect();
             Ok(on_slice(settings, &settings.state, &certified))
         }
-        BoundarySearch::Rays => along_rays(context, settings, tightening),
+        BoundarySearch::Rays => along_rays(context, settings, criterion),
     }
 }
 
@@ -140,22 +145,27 @@ pub(super) fn distance(a: &[f32], b: &[f32]) -> f64 {
 fn along_rays(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
 ) -> Result<Option<Boundary>> {
-    let rays = DIRECTIONS * (POINTS + BISECTIONS) as u64;
+    let effort = Effort::of(criterion);
+    let rays = effort.directions * (POINTS + effort.bisections) as u64;
     context.watch.begin("boundary search", rays * SPREADS.len() as u64);
     let certified = |states: States<'_>| -> Result<Vec<bool>> {
-        let margins = check_margins(context, &settings.spec, tightening, states, Query::Sign, 0.0)?;
         let inside =
             |x: &[f32]| (0..x.len()).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
-        Ok(states.iter().zip(margins).map(|(x, margin)| margin > 0.0 && inside(x)).collect())
+        let asked = StateList::new(states.size()).with(states.iter().filter(|x| inside(x)));
+        let (spec, query) = (&settings.spec, Query::Sign);
+        let signs = criterion.margins(context, spec, asked.view(), query, 0.0)?;
+        let mut signs = signs.into_iter();
+        let certified = |x: &[f32]| inside(x) && signs.next().is_some_and(|sign| sign > 0.0);
+        Ok(states.iter().map(certified).collect())
     };
     let start_certified = certified(States::one(&settings.state))?[0];
     let mut best: Option<Found> = None;
     for (sweep, spread) in SPREADS.into_iter().enumerate() {
         let around = best.as_ref().map(|found| Cone { axis: &found.direction, spread });
-        let directions = directions(settings, sweep as u32, around);
-        let found = sweep_rays(settings, directions.view(), start_certified, certified)?;
+        let directions = directions(settings, effort, sweep as u32, around);
+        let found = sweep_rays(settings, effort, directions.view(), start_certified, certified)?;
         let nearer = |found: &Found| {
             best.as_ref().is_none_or(|best| found.boundary.distance < best.boundary.distance)
         };
@@ -164,6 +174,26 @@ fn along_rays(
         }
     }
     Ok(best.map(|found| found.boundary))
+}
+
+/// How finely rays are searched.
+#[derive(Clone, Copy)]
+struct Effort {
+    /// Directions of each sweep.
+    directions: u64,
+    /// Halvings of a bracket.
+    bisections: usize,
+}
+
+impl Effort {
+    /// What a state costs decides.
+    fn of(criterion: &Criterion<'_>) -> Self {
+        let (directions, bisections) = match criterion {
+            Criterion::Margins(_) => (DIRECTIONS, BISECTIONS),
+            Criterion::Enclosed(_) => (ENCLOSED_DIRECTIONS, ENCLOSED_BISECTIONS),
+        };
+        Self { directions, bisections }
+    }
 }
 
 /// Directions around one.
@@ -175,7 +205,12 @@ struct Cone<'a> {
 }
 
 /// Unit directions in the coordinates that vary: uniform, or spread around a given one.
-fn directions(settings: &Settings, sweep: u32, around: Option<Cone<'_>>) -> StateList {
+fn directions(
+    settings: &Settings,
+    effort: Effort,
+    sweep: u32,
+    around: Option<Cone<'_>>,
+) -> StateList {
     let stream = Stream::new(settings.seed, purpose::DIRECTION, sweep);
     let draw = |index: u64| {
         let mut offset = vec![Lanes([0.0]); settings.state.len()];
@@ -189,7 +224,7 @@ fn directions(settings: &Settings, sweep: u32, around: Option<Cone<'_>>) -> Stat
             None => direction,
         }
     };
-    StateList::new(settings.state.len()).with((0..DIRECTIONS).map(draw))
+    StateList::new(settings.state.len()).with((0..effort.directions).map(draw))
 }
 
 /// `vector` scaled to length one.
@@ -208,6 +243,7 @@ struct Found {
 /// The closest change of `certified` along the rays, with its direction.
 fn sweep_rays(
     settings: &Settings,
+    effort: Effort,
     directions: States<'_>,
     start_certified: bool,
     certified: impl Fn(States<'_>) -> Result<Vec<bool>>,
@@ -234,7 +270,7 @@ fn sweep_rays(
             ));
         }
     }
-    for _ in 0..BISECTIONS {
+    for _ in 0..effort.bisections {
         let middle =
             |(ray, near, far): &(usize, f32, f32)| at(directions.row(*ray), 0.5 * (near + far));
         let middles = StateList::new(size).with(brackets.iter().map(middle));

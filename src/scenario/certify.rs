@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::budget::{ledger, spendings};
+use super::criterion::Criterion;
+use super::enclosure::{self, Enclosure};
 use super::fit::check_sizes;
 use super::growth_plan::Around;
 use super::origin::{provenance, system_record};
@@ -46,11 +48,13 @@ pub fn certify(
     let settings = &settings.keyed(plant);
     check_sizes(settings, &plant.model)?;
     check_settings(settings)?;
+    Enclosure::of(plant, settings)?;
+    deterministic_set::check(plant, settings)?;
     let ledger = ledger(settings)?;
     let mut tightened = tightened(context, settings)?;
     let mut drops = tightened.drops.take();
     let around_bound = drops.is_some() && settings.growth.plan.around == Around::Bound;
-    let alone = around_bound.then(|| tightened.tightening.clone());
+    let alone = around_bound.then(|| Criterion::Margins(tightened.tightening.clone()));
     let mut share_rollouts = 0;
     let (global, sequence, calibration) = match (&settings.drops, &mut drops) {
         (Some(asked), Some(drops)) => {
@@ -60,17 +64,18 @@ pub fn certify(
         }
         _ => {
             let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-            let lost = &tightened.tightening;
-            (global::conditional(context, settings, lost, purposes)?, None, None)
+            let criterion = Criterion::new(plant, settings, &tightened.tightening)?;
+            (global::conditional(context, settings, &criterion, purposes)?, None, None)
         }
     };
     let Tightened { constants, deviation, tightening, .. } = tightened;
-    let whole_box = whole_box::record(context, settings, &tightening, &global)?;
-    let slice = global::slice(context, settings, &tightening, global.band)?;
-    let center = boundary::center(context, settings, alone.as_ref(), &tightening, global.band)?;
+    let criterion = Criterion::new(plant, settings, &tightening)?;
+    let whole_box = whole_box::record(context, settings, &criterion, &global)?;
+    let slice = global::slice(context, settings, &criterion, global.band)?;
+    let center = boundary::center(context, settings, alone.as_ref(), &criterion, global.band)?;
     let growth = growth::record(context, settings, center, global.band)?;
-    let sequential = sequential::record(context, settings, &tightening, global.band)?;
-    let state = state(context, settings, &tightening, &growth, global.band)?;
+    let sequential = sequential::record(context, settings, &criterion, global.band)?;
+    let state = state(context, settings, &criterion, &growth, global.band)?;
     let picture = picture(plant, settings, &growth);
     let deterministic = deterministic_set::record(context, settings)?;
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
@@ -98,6 +103,7 @@ pub fn certify(
         drops,
         sequence,
         calibration,
+        enclosed: enclosure::record(settings),
         deterministic,
         state,
         slice,
@@ -134,13 +140,13 @@ pub fn check_settings(settings: &Settings) -> Result<()> {
 fn state(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     growth: &GrowthRecord,
     band: f64,
 ) -> Result<StateRecord> {
     let (x, query) = (&*settings.state, Query::Measure);
     let states = States::one(x);
-    let margins = global::check_margins(context, &settings.spec, tightening, states, query, band)?;
+    let margins = criterion.margins(context, &settings.spec, states, query, band)?;
     let check_margin = decimal(margins[0]);
     let target_margin = decimal(finite_margin(context.model().target_at(x, 0)));
     let tier = tier(target_margin, check_margin, growth, x).number();

@@ -58,14 +58,18 @@ pub(super) fn statements(plant: &Plant, settings: &Settings, record: &Record) ->
     statements.extend(of_the_box(record.whole_box.as_ref()));
     statements.extend(sets::statements(record, settings.global.draws));
     statements.extend(record.deterministic.as_ref().map(|found| found.statement.clone()));
+    statements.extend(record.enclosed.as_ref().map(|found| found.statement.clone()));
     if global.accepted == 0 {
-        statements.extend(empty::reasons(model, record, &settings.spec));
+        statements.extend(match &record.enclosed {
+            Some(enclosed) => enclosed.reasons(),
+            None => empty::reasons(model, record, &settings.spec),
+        });
     }
     statements.extend(growth_statement(growth));
     statements.extend(record.sequential.as_ref().map(|asked| asked.claim.statement.clone()));
     statements.extend(side::statement(model, settings, growth));
-    // Margin drops rest on no constant.
-    if record.drops.is_none() {
+    // Margin drops and enclosures rest on no constant.
+    if record.drops.is_none() && record.enclosed.is_none() {
         statements.extend(constants.statements());
     }
     statements.extend(probe::statement(global));

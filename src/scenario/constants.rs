@@ -69,7 +69,8 @@ fn over(
     let sampled = lipschitz::sampled(model, inner, GRADIENT_SAMPLES, settings.seed);
     let given = &settings.constants;
     let place = if region.is_some() { VISITED } else { BOX };
-    let need = if settings.drops.is_some() { Need::None } else { Need::Finite };
+    let rest = settings.drops.is_none() && settings.enclosed.is_none();
+    let need = if rest { Need::Finite } else { Need::None };
     let one = |name, given, inside: Lipschitz, outside: Lipschitz, sampled| {
         constant(&Found { name, place, inside, beyond: outside.constant, sampled, need }, given)
     };
@@ -108,7 +109,7 @@ struct Found {
     need: Need,
 }
 
-/// Whether a certificate needs a finite constant: margin drops need none.
+/// Whether a certificate needs a finite constant: margin drops and enclosures need none.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Need {
     Finite,

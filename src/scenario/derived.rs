@@ -2,6 +2,7 @@
 
 use super::budget::{ledger, spendings};
 use super::claims::{holds, statements};
+use super::enclosure;
 use super::origin::{Hashes, hashes, system_record};
 use super::record::{Record, SliceRecord, decimal, finite_margin};
 use super::settings::Settings;
@@ -36,6 +37,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     }
     record.whole_box =
         whole_box::derived(model, settings, &record.global, stored.whole_box.as_ref())?;
+    record.enclosed = enclosure::record(settings);
     record.deterministic = deterministic_set::derived(settings, stored.deterministic.as_ref());
     record.growth = growth::derived(model, settings, &stored.growth)?;
     record.sequential = sequential::derived(model, settings, stored.sequential.as_ref())?;

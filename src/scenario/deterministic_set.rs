@@ -11,6 +11,7 @@ use super::purpose;
 use super::record::decimal;
 use super::settings::Settings;
 use crate::error::Result;
+use crate::model::Plant;
 use crate::real::bound::Interval;
 use crate::rollout::{
     PairControl, Pairs, Query, Region, Starts, StateList, States, Stream, Tightening, replay,
@@ -79,6 +80,17 @@ pub(super) fn radii_around(
     let Some(asked) = &settings.deterministic else { return Ok(None) };
     let certificate = certificate(context, settings, asked)?;
     Ok(Some(certificate.radii(states, MOST * f64::from(asked.radius))))
+}
+
+/// Refuses a kind that the plant is not for, before any work.
+///
+/// # Errors
+/// As [`Deterministic::new`].
+pub(super) fn check(plant: &Plant, settings: &Settings) -> Result<()> {
+    let asked = settings.deterministic.as_ref();
+    let made =
+        asked.map(|asked| Deterministic::new(plant, settings.spec, asked.control, asked.kind));
+    made.transpose().map(|_| ())
 }
 
 fn certificate<'a>(

@@ -1,5 +1,6 @@
 //! The claims of a stored certificate on samples that it has not seen.
 
+use super::criterion::Criterion;
 use super::finding::Finding;
 use super::record::{DeviationRecord, Record};
 use super::refuted::{FALSE_ALARM, refuted, refuted_at, share};
@@ -31,9 +32,10 @@ pub(super) fn findings(
 ) -> Result<Vec<Finding>> {
     let settings = &Settings { seed, ..settings.clone() };
     let mut findings = Vec::from_iter(beyond(context, settings, &record.deviation)?);
-    let tightening = sets::tightening(record, &settings.spec);
+    let lost = sets::tightening(record, &settings.spec);
+    let criterion = Criterion::new(context.plant(), settings, &lost)?;
     let purposes = [purpose::CHECK, purpose::CHECK_PERTURBATION];
-    let fresh = global::conditional(context, settings, &tightening, purposes)?;
+    let fresh = global::conditional(context, settings, &criterion, purposes)?;
     let (failures, accepted) = (fresh.claim.failures, fresh.accepted);
     let name = "conditional failure on fresh pairs";
     findings.push(refuted(name, record.global.claim.certified_risk, failures, accepted));
@@ -45,7 +47,7 @@ pub(super) fn findings(
         findings.push(whole_box::on_fresh_starts(context, settings, stored, band, FALSE_ALARM)?);
     }
     let (sequential, band) = (record.sequential.as_ref(), record.global.band);
-    let found = sequential::on_fresh_starts(context, settings, sequential, &tightening, band)?;
+    let found = sequential::on_fresh_starts(context, settings, sequential, &criterion, band)?;
     findings.extend(found);
     findings.extend(deterministic_set::adversaries(context, settings)?);
     if let Some(set) = verified_set(&record.growth, settings.state.len()) {

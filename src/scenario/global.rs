@@ -3,9 +3,11 @@
 use super::Context;
 use super::bound::{certified_risk, interval};
 use super::coordinates::{Coordinates, coordinates};
+use super::criterion::Criterion;
 use super::drops::pairs;
 use super::drops_record::{SequenceOutcome, SequenceRecord, ShareRecord};
 use super::drops_settings::ConditionalRisk;
+pub use super::margins::check_margins;
 use super::pairs_f64;
 use super::probe::{PROBES, Probe, probe};
 use super::purpose;
@@ -14,8 +16,8 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::model::{Model, Plant};
 use crate::rollout::{
-    DeviationTask, Keep, NON_FINITE, PairMeasure, Pairs, Purpose, Query, ReachAvoidTask, Region,
-    RolloutSpec, Starts, StateList, States, Tightening, replay,
+    DeviationTask, NON_FINITE, PairMeasure, Pairs, Purpose, Query, Region, Starts, StateList,
+    States, Tightening,
 };
 use crate::rounding::{confidence, upper};
 
@@ -24,48 +26,19 @@ const BAND_FACTOR: f64 = 8.0;
 /// The least band: rounding of a margin of order 10 in f32.
 const LEAST_BAND: f64 = 1e-5;
 
-/// `V_check` (or its sign) of each of `states`; a measure within `band` of zero is that of f64.
-pub fn check_margins(
-    context: Context<'_>,
-    spec: &RolloutSpec,
-    tightening: &Tightening,
-    states: States<'_>,
-    query: Query,
-    band: f64,
-) -> Result<Vec<f32>> {
-    if states.is_empty() {
-        return Ok(Vec::new());
-    }
-    let (starts, range) = (Starts::Listed(states), 0..states.len() as u64);
-    let task = ReachAvoidTask { starts, range: range.clone(), spec: *spec, tightening, query };
-    let advance = &mut |count| context.watch.advance(count);
-    let tally = context.program.tally_told(&task, Keep::Measures, advance)?;
-    let mut margins = tally.finish(range)?.values;
-    if query == Query::Measure {
-        let near = |margin: &&mut f32| f64::from(margin.abs()) <= band;
-        let pairs = margins.iter_mut().zip(states.iter());
-        for (margin, start) in pairs.filter(|(margin, _)| near(margin)) {
-            // Rounding to f32 keeps the sign.
-            *margin = replay::measure(context.plant(), start, spec, tightening) as f32;
-        }
-    }
-    Ok(margins)
-}
-
 /// `V_check`, target and constraint margin over the slice through the state; `band` as in
 /// [`check_margins`].
 pub fn slice(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     band: f64,
 ) -> Result<SliceRecord> {
     let states = slice_through(settings, &settings.state);
     context.watch.begin("slice", states.len() as u64);
     let query = Query::Measure;
     let mut slice = slice_record(context.model(), settings, states.view());
-    slice.check_margin =
-        check_margins(context, &settings.spec, tightening, states.view(), query, band)?;
+    slice.check_margin = criterion.margins(context, &settings.spec, states.view(), query, band)?;
     Ok(slice)
 }
 
@@ -108,12 +81,13 @@ pub fn slice_through(settings: &Settings, state: &[f32]) -> StateList {
 pub fn conditional(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     purposes: [Purpose; 2],
 ) -> Result<GlobalRecord> {
     let draws = settings.global.draws;
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let [nominal, perturbation] = purposes.map(|purpose| settings.stream(purpose, 0));
+    let tightening = criterion.tightening(&settings.spec);
     let task = DeviationTask {
         pairs: Pairs {
             nominal: Starts::Drawn { region, stream: nominal },
@@ -122,14 +96,15 @@ pub fn conditional(
         },
         range: 0..draws,
         spec: settings.spec,
-        tightening,
+        tightening: &tightening,
         control: settings.deviation.control,
     };
     context.watch.begin("certified set", draws);
     let probe = probe(context, &task)?;
     let mut count = Count { band: band_of(probe.error), ..Count::default() };
     context.program.deviation(&task, &mut |first, pairs| {
-        count.add(context.plant(), &task, first, pairs);
+        let enclosed = criterion.enclosed(context, &task, first, pairs, count.band)?;
+        count.add(context.plant(), &task, first, pairs, enclosed.as_deref());
         context.watch.advance(pairs.len() as u64)
     })?;
     let record = conclude(context.model(), settings, &count, probe.error)?;
@@ -177,8 +152,8 @@ fn conclude(
         scenarios: count.accepted,
         failures: count.failures,
         decision_vars: 1,
-        // The certified set is to be as safe as the bound that it rests on.
-        epsilon: Some(settings.deviation.epsilon),
+        // The certified set is to be as safe as the bound that it rests on; an enclosure rests on none.
+        epsilon: settings.enclosed.is_none().then_some(settings.deviation.epsilon),
         beta,
         beta_used: beta,
         required_simple: None,
@@ -275,35 +250,46 @@ struct Count {
 
 impl Count {
     /// Adds the pairs `first..`: those that are certified, or of which a measure is within the band, as
-    /// f64 has them. Whether a start is certified is for f64 to say within the band alone.
-    fn add(&mut self, plant: &Plant, task: &DeviationTask<'_>, first: u64, pairs: &[PairMeasure]) {
+    /// f64 has them. Whether a start is certified is for f64 to say within the band alone, or for an
+    /// enclosure, which says it of each in `enclosed`.
+    fn add(
+        &mut self,
+        plant: &Plant,
+        task: &DeviationTask<'_>,
+        first: u64,
+        pairs: &[PairMeasure],
+        enclosed: Option<&[bool]>,
+    ) {
         let band = self.band;
         let near = |pair: &PairMeasure| {
             [pair.nominal, pair.perturbed].iter().any(|measure| f64::from(measure.abs()) <= band)
         };
-        let again = |pair: &PairMeasure| pair.nominal > 0.0 || near(pair);
-        let numbered = (first..).zip(pairs);
-        let indices = numbered.filter(|(_, pair)| again(pair)).map(|(index, _)| index);
-        let indices: Vec<u64> = indices.collect();
+        let again = |place: usize| {
+            let certified = enclosed.map_or(pairs[place].nominal > 0.0, |all| all[place]);
+            certified || near(&pairs[place])
+        };
+        let indices = (0..pairs.len()).filter(|place| again(*place));
+        let indices: Vec<u64> = indices.map(|place| first + place as u64).collect();
         let mut doubles = pairs_f64::measures(plant, task, &indices).into_iter();
-        for pair in pairs {
+        for (place, pair) in pairs.iter().enumerate() {
             let single = [pair.nominal, pair.perturbed].map(f64::from);
-            let double = again(pair).then(|| doubles.next()).flatten();
+            let double = again(place).then(|| doubles.next()).flatten();
             self.f64_reruns += u64::from(double.is_some());
             let [nominal, perturbed] = match double {
                 Some(double) if near(pair) => double,
                 Some([_, perturbed]) => [single[0], perturbed],
                 None => single,
             };
-            self.count(nominal, perturbed);
+            let certified = enclosed.map_or(nominal > 0.0, |all| all[place]);
+            self.count(certified, perturbed);
         }
     }
 
-    /// Counts a pair of these measures.
-    fn count(&mut self, nominal: f64, perturbed: f64) {
+    /// Counts a pair: whether its nominal start is certified, and the measure of the perturbed one.
+    fn count(&mut self, certified: bool, perturbed: f64) {
         self.reached += u64::from(perturbed > 0.0);
         self.non_finite += u64::from(perturbed == f64::from(NON_FINITE));
-        if nominal > 0.0 {
+        if certified {
             self.accepted += 1;
             // What is no number failed.
             self.failures += u64::from(perturbed.is_nan() || perturbed <= 0.0);

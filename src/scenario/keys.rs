@@ -75,6 +75,9 @@ fn claimed(plant: &Plant, settings: &Settings) -> String {
     if let Some(asked) = &settings.drops {
         drops(&mut text, asked);
     }
+    if let Some(kind) = settings.enclosed {
+        let _ = writeln!(text, "enclosed {}", kind.name());
+    }
     if let Some(asked) = &settings.deterministic {
         let _ = writeln!(text, "deterministic {asked:?}");
     }
@@ -130,6 +133,7 @@ fn growth(text: &mut String, asked: &GrowthSettings) {
 mod tests {
     use super::*;
     use crate::rollout::RolloutSpec;
+    use crate::scenario::deterministic::Kind;
     use crate::system::{BangBang, DoubleIntegrator};
 
     fn plant(acceleration: f32) -> Plant {
@@ -143,13 +147,15 @@ mod tests {
         let plain = Settings::new(&plant_of_all.model, [0.0; 2], spec).unwrap();
         let of = |settings: &Settings| key(&plant_of_all, settings);
         let mut found = vec![of(&plain), key(&plant(0.5), &plain)];
-        let changes: [fn(&mut Settings); 7] = [
+        let changes: [fn(&mut Settings); 9] = [
             |s| s.seed = 2,
             |s| s.spec.horizon = 11,
             |s| s.high[1] = 0.75,
             |s| s.deviation.epsilon = 0.2,
             |s| s.global.draws += 1,
             |s| s.growth.rounds += 1,
+            |s| s.enclosed = Some(Kind::Tube),
+            |s| s.enclosed = Some(Kind::Pieces),
             |s| *s = s.clone().as_attempt(2).unwrap(),
         ];
         for change in changes {

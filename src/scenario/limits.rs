@@ -172,6 +172,10 @@ impl Settings {
         self.deterministic.as_ref().map_or(Ok(()), DeterministicSettings::check)?;
         self.whole_box.map_or(Ok(()), |asked| asked.check())?;
         self.drops.as_ref().map_or(Ok(()), DropSettings::check)?;
+        if self.drops.is_some() && self.enclosed.is_some() {
+            let problem = "margin drops and an enclosure both say what is certified; ask for one";
+            return Err(Error::invalid("global.tightening", problem));
+        }
         self.sequential.iter().try_for_each(SequentialSettings::check)?;
         self.growth.check()?;
         spacing::check(self)
@@ -208,6 +212,7 @@ mod tests {
             global: GlobalSettings { draws: 100, beta: 1e-3 },
             whole_box: None,
             drops: None,
+            enclosed: None,
             deterministic: None,
             slice: Some([axis(0), axis(1)]),
             state: vec![0.0; 2],

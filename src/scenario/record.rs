@@ -10,11 +10,13 @@ pub use super::claim::Claim;
 pub use super::constant_record::{Assumption, ConstantRecord, ConstantsRecord, VisitedRecord};
 pub use super::deterministic_record::{DeterministicRecord, RadiiRecord};
 use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
+pub use super::enclosed_record::EnclosedRecord;
 pub use super::growth_plan::{Around, UpwardRecord};
 pub use super::sequential_record::SequentialRecord;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
 use crate::rollout::PairControl;
+pub(crate) use crate::rounding::as_written as decimal;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
@@ -28,12 +30,6 @@ pub(crate) const HASHED_ALIKE: u32 = 2;
 /// A margin as a record has it: the largest number stands for infinity, as it does in a measure.
 pub(crate) fn finite_margin(margin: f32) -> f32 {
     margin.clamp(f32::MIN, f32::MAX)
-}
-
-/// The shortest decimal that is this f32, so that a record says 0.4 and not 0.4000000059604645; as an
-/// f32 it is `value` again.
-pub(crate) fn decimal(value: f32) -> f64 {
-    value.to_string().parse().unwrap_or(f64::from(value))
 }
 
 /// A stored certificate: everything in `certificate.json`.
@@ -79,6 +75,9 @@ pub struct Record {
     /// The calibration of the score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationRecord>,
+    /// That the certified set rests on an enclosure, where it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub enclosed: Option<EnclosedRecord>,
     /// The deterministic certificate, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deterministic: Option<DeterministicRecord>,
@@ -122,9 +121,9 @@ impl Record {
     }
 
     /// Whether nothing speaks against the Lipschitz constants, where the certified set rests on them:
-    /// margin drops rest on none.
+    /// margin drops and enclosures rest on none.
     pub fn constants_stand(&self) -> bool {
-        self.drops.is_some() || self.constants.stand()
+        self.drops.is_some() || self.enclosed.is_some() || self.constants.stand()
     }
 }
 

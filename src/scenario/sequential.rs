@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::Context;
 use super::bound::{required_scenarios, simple_scenarios};
 use super::coordinates::{Coordinates, coordinates};
+use super::criterion::Criterion;
 use super::evidence::Evidence;
 use super::finding::Finding;
 use super::purpose;
@@ -17,7 +18,7 @@ use super::settings::Settings;
 use super::walk::Walk;
 use crate::error::Result;
 use crate::model::Model;
-use crate::rollout::{Ball, DeviationTask, Pairs, Region, Starts, Tightening, replay};
+use crate::rollout::{Ball, DeviationTask, Pairs, Region, Starts, replay};
 use crate::rounding::confidence;
 
 /// Draws of the first batch; each next one has twice as many.
@@ -40,7 +41,7 @@ struct Counts {
 pub(super) fn record(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     band: f64,
 ) -> Result<Option<SequentialRecord>> {
     let Some(asked) = &settings.sequential else { return Ok(None) };
@@ -50,7 +51,7 @@ pub(super) fn record(
     while counts.draws < asked.most && asked.end(counts.failures, counts.starts).is_none() {
         let range = counts.draws..asked.most.min(counts.draws + batch);
         batch = LARGEST_BATCH.min(2 * batch);
-        for failed in outcomes(context, settings, asked, range, tightening, band)? {
+        for failed in outcomes(context, settings, asked, range, criterion, band)? {
             counts.draws += 1;
             let Some(failed) = failed else { continue };
             counts.starts += 1;
@@ -96,14 +97,14 @@ pub(super) fn on_fresh_starts(
     context: Context<'_>,
     settings: &Settings,
     stored: Option<&SequentialRecord>,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     band: f64,
 ) -> Result<Option<Finding>> {
     let obtained = stored.filter(|one| one.outcome == SequentialOutcome::Certified);
     let (Some(asked), Some(stored)) = (&settings.sequential, obtained) else { return Ok(None) };
     let draws = settings.global.draws;
     context.watch.begin("fresh starts of the sequential claim", draws);
-    let outcomes = outcomes(context, settings, asked, 0..draws, tightening, band)?;
+    let outcomes = outcomes(context, settings, asked, 0..draws, criterion, band)?;
     let of_claim = outcomes.iter().flatten();
     let (starts, failures) = (of_claim.clone().count(), of_claim.filter(|failed| **failed).count());
     let name = "failures of the sequential claim on fresh starts";
@@ -139,11 +140,11 @@ fn outcomes(
     settings: &Settings,
     asked: &SequentialSettings,
     range: Range<u64>,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     band: f64,
 ) -> Result<Vec<Option<bool>>> {
     match asked.of {
-        SequentialOf::Set => of_set(context, settings, range, tightening, band),
+        SequentialOf::Set => of_set(context, settings, range, criterion, band),
         _ => of_region(context, settings, asked, range, band),
     }
 }
@@ -153,9 +154,10 @@ fn of_set(
     context: Context<'_>,
     settings: &Settings,
     range: Range<u64>,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     band: f64,
 ) -> Result<Vec<Option<bool>>> {
+    let tightening = &criterion.tightening(&settings.spec);
     let stream = |purpose| settings.stream(purpose, 0);
     let region = Region::new_box(&*settings.low, &*settings.high)?;
     let task = DeviationTask {
@@ -171,6 +173,7 @@ fn of_set(
     };
     let mut outcomes = Vec::new();
     context.program.deviation(&task, &mut |first, pairs| {
+        let enclosed = criterion.enclosed(context, &task, first, pairs, band)?;
         for (index, pair) in (first..).zip(pairs) {
             let (mut nominal, mut perturbed) = (f64::from(pair.nominal), f64::from(pair.perturbed));
             if nominal.abs() <= band || perturbed.abs() <= band {
@@ -180,7 +183,9 @@ fn of_set(
                     replay::pair_measures(plant, pair, &task.spec, tightening, task.control);
             }
             // A measure that is no number is a failure.
-            outcomes.push((nominal > 0.0).then(|| perturbed.is_nan() || perturbed <= 0.0));
+            let place = (index - first) as usize;
+            let certified = enclosed.as_ref().map_or(nominal > 0.0, |all| all[place]);
+            outcomes.push(certified.then(|| perturbed.is_nan() || perturbed <= 0.0));
         }
         context.watch.advance(pairs.len() as u64)
     })?;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::bound::CountRule;
 use super::box_settings::BoxSettings;
 use super::constant_record::Assumption;
+use super::deterministic::Kind;
 use super::deterministic_settings::DeterministicSettings;
 use super::drops_settings::DropSettings;
 use super::growth_plan::GrowthPlan;
@@ -162,6 +163,9 @@ pub struct Settings {
     pub whole_box: Option<BoxSettings>,
     /// Margin drops, where these tighten the margins and not constants times the deviation bound.
     pub drops: Option<DropSettings>,
+    /// How the ball of the deviation bound around a start is enclosed, where that certifies it and no margins
+    /// are tightened.
+    pub enclosed: Option<Kind>,
     /// The deterministic certificate, where there is to be one.
     pub deterministic: Option<DeterministicSettings>,
     /// The slice: the axis across the columns, then the axis along the rows; none where there is but
@@ -274,6 +278,7 @@ impl Settings {
             global: GlobalSettings { draws: 20_000, beta },
             whole_box: Some(BoxSettings { risk: None, beta }),
             drops: None,
+            enclosed: None,
             deterministic: None,
             slice,
             state,

@@ -29,6 +29,7 @@ pub fn tightened(context: Context<'_>, settings: &Settings) -> Result<Tightened>
     let drops = drops.map(|asked| drops::bound(context, settings, asked)).transpose()?;
     let tightening = match &drops {
         Some(drops) => drops.shapes().tightening(drops.level),
+        None if settings.enclosed.is_some() => Tightening::none(&settings.spec),
         None => tightening(&deviation.bound, &constants, &settings.spec),
     };
     Ok(Tightened { constants, deviation, drops, tightening })
@@ -43,6 +44,6 @@ pub struct Tightened {
     pub deviation: DeviationRecord,
     /// The bound on margin drops, where these tighten the margins.
     pub drops: Option<DropsRecord>,
-    /// What the margins lose.
+    /// What the margins lose; nothing where an enclosure says what is certified.
     pub tightening: Tightening,
 }

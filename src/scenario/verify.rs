@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::answer::{Beside, beside};
 use super::certify::certify;
+use super::criterion::Criterion;
 use super::derived::derived;
 use super::finding::{CheckReport, Figure, Finding};
 use super::fit::check_sizes;
@@ -13,7 +14,7 @@ use super::origin::{Hashes, hashes, provenance};
 use super::record::{HASHED_ALIKE, Provenance, Record, SCHEMA, finite_margin};
 use super::settings::Settings;
 use super::tier::{Tier, tier};
-use super::{Context, Unwatched, Watch, compare, global, sets, whole_box};
+use super::{Context, Unwatched, Watch, compare, sets, whole_box};
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Plant;
@@ -122,16 +123,10 @@ pub fn query(
     let settings = &whole_box::as_recorded(settings, record);
     check_derived(program, record, settings)?;
     let spec = settings.spec;
-    let tightening = sets::tightening(record, &spec);
+    let criterion = Criterion::new(plant, settings, &sets::tightening(record, &spec))?;
     let context = Context { program, watch: &Unwatched };
-    let margins = global::check_margins(
-        context,
-        &spec,
-        &tightening,
-        states,
-        Query::Measure,
-        record.global.band,
-    )?;
+    let band = record.global.band;
+    let margins = criterion.margins(context, &spec, states, Query::Measure, band)?;
     let beside = beside(context, record, settings, states)?;
     let row = |(x, (check_margin, beside)): (&[f32], (f32, Beside))| {
         let target_margin = finite_margin(plant.model.target_at(x, 0));

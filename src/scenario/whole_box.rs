@@ -6,6 +6,8 @@ use super::box_record::BoxRecord;
 use super::box_settings::BoxSettings;
 use super::coordinates::{Coordinates, coordinates};
 use super::counterexamples::{Worst, failing_pairs};
+use super::criterion::Criterion;
+use super::enclosure;
 use super::finding::{Figure, Finding};
 use super::purpose;
 use super::record::{Claim, GlobalRecord, Record};
@@ -14,7 +16,7 @@ use super::verdict::verdict;
 use super::walk::Walk;
 use crate::error::Result;
 use crate::model::Model;
-use crate::rollout::{NON_FINITE, Purpose, Region, Starts, Tightening};
+use crate::rollout::{NON_FINITE, Purpose, Region, Starts};
 use crate::rounding::{confidence, lower, upper};
 
 /// The first version of the record that says something of the whole box.
@@ -28,7 +30,7 @@ const FIRST_SCHEMA: u32 = 3;
 pub(super) fn record(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
     global: &GlobalRecord,
 ) -> Result<Option<BoxRecord>> {
     let Some(asked) = settings.whole_box else { return Ok(None) };
@@ -36,7 +38,7 @@ pub(super) fn record(
     let mut record = conclude(context.model(), settings, asked, global, &count)?;
     record.starts = count.worst.starts(&starts(settings, purpose::CONDITIONAL_NOMINAL)?);
     if global.claim.failures > 0 {
-        record.pairs = failing_pairs(context, settings, tightening)?;
+        record.pairs = failing_pairs(context, settings, criterion, global.band)?;
     }
     Ok(Some(record))
 }
@@ -136,7 +138,7 @@ fn conclude(
     let risk_interval = [low, high];
     Ok(BoxRecord {
         claim: claim(model, settings, asked, failures, risk_interval)?,
-        verdict: verdict(global, risk_interval),
+        verdict: verdict(global, enclosure::record(settings).as_ref(), risk_interval),
         draws,
         failures,
         non_finite: count.non_finite,

@@ -90,6 +90,7 @@ pub(crate) fn settings<S: System<NX, NU>, const NX: usize, const NU: usize>(
         global: GlobalSettings { draws: 600, beta: 1e-3 },
         whole_box: None,
         drops: None,
+        enclosed: None,
         deterministic: None,
         slice: Some([0, 1].map(|state| SliceAxis { state, values: values(state) })),
         state: axes.iter().map(|axis| 0.5 * (axis.low + axis.high)).collect(),

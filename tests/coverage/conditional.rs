@@ -7,6 +7,7 @@ use rand::{RngExt, SeedableRng};
 use reachcast::model::Plant;
 use reachcast::rollout::Tightening;
 use reachcast::scenario::bound::certified_risk;
+use reachcast::scenario::criterion::Criterion;
 use reachcast::scenario::purpose;
 use reachcast::scenario::{Context, Unwatched, deviation, global};
 use reachcast::system::{BangBang, DoubleIntegrator};
@@ -76,11 +77,12 @@ fn conditional_failure_bounds_are_false_at_most_as_often_as_claimed() {
     assert!(truth > 0.03 && truth < 0.5, "{truth}");
     let loss: Vec<f64> = tightening.target.iter().copied().map(f64::from).collect();
     let share = ClosedForm::of(&system).share(literal(1.2), literal(1.5), &loss);
+    let criterion = Criterion::Margins(tightening.clone());
     let (mut false_bounds, mut false_halves, mut false_shares) = (0, 0, 0);
     for seed in 0..CERTIFICATES {
         settings.seed = seed;
         let purposes = [purpose::CONDITIONAL_NOMINAL, purpose::CONDITIONAL_PERTURBATION];
-        let record = global::conditional(context, &settings, &tightening, purposes)
+        let record = global::conditional(context, &settings, &criterion, purposes)
             .expect("conditional failure");
         let (n, k) = (record.accepted, record.claim.failures);
         assert_eq!(record.claim.certified_risk, certified_risk(n, k, BETA));

@@ -150,6 +150,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             global: global(NX),
             whole_box: None,
             drops: None,
+            enclosed: None,
             sequence: None,
             calibration: None,
             deterministic: None,

@@ -143,7 +143,8 @@ impl Training<'_> {
         let tightening = match settings.analytic.certified > 0.0 {
             true => {
                 // Gradients run through constants and the deviation bound of the untrained policy.
-                let settings = Settings { drops: None, ..config.settings(&model.states)? };
+                let settings =
+                    Settings { drops: None, enclosed: None, ..config.settings(&model.states)? };
                 Some(tightened(context, &settings)?.tightening)
             }
             false => None,

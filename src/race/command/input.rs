@@ -59,6 +59,7 @@ impl RaceInput {
         let networks = Networks::read(&race, &folder)?;
         let mut certificates = config.settings(&DroneRace::default().states())?;
         certificates.growth.plan.method = race.hybrid.growth;
+        no_enclosure(&certificates)?;
         let system = system(&config)?;
         policy_of(&system, &policy)?;
         Ok(Self { config, folder, race, certificates, system, policy, networks })
@@ -119,6 +120,17 @@ impl RaceInput {
         let source = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok(RaceStarts { states, source })
     }
+}
+
+/// Refuses certificates that races would wait for: an enclosure takes a thousand times as long as a rollout.
+fn no_enclosure(certificates: &Settings) -> Result<()> {
+    let Some(kind) = certificates.enclosed else { return Ok(()) };
+    let problem = format!(
+        "`{}` is for `certify`, `query`, `check` and `sweep --of certificate`: races ask for the tier of \
+         hundreds of states at each step; use `drops` or `lipschitz`",
+        kind.name()
+    );
+    Err(Error::invalid("global.tightening", problem))
 }
 
 /// The drone race that the configuration asks for.

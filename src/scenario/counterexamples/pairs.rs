@@ -8,6 +8,7 @@ use crate::model::{Model, Plant};
 use crate::rollout::{
     DeviationTask, PairControl, Pairs, Region, RolloutSpec, Starts, Tightening, replay,
 };
+use crate::scenario::criterion::Criterion;
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, purpose};
 
@@ -61,14 +62,19 @@ impl Replayed {
 pub(in crate::scenario) fn failing_pairs(
     context: Context<'_>,
     settings: &Settings,
-    tightening: &Tightening,
+    criterion: &Criterion<'_>,
+    band: f64,
 ) -> Result<Vec<FailingPair>> {
-    let task = task(settings, tightening)?;
+    let tightening = criterion.tightening(&settings.spec);
+    let task = task(settings, &tightening)?;
     context.watch.begin("failing pairs", settings.global.draws);
     let mut worst = Worst::default();
     context.program.deviation(&task, &mut |first, pairs| {
-        for (index, pair) in (first..).zip(pairs).filter(|(_, pair)| pair.nominal > 0.0) {
-            worst.add(pair.perturbed, index);
+        let enclosed = criterion.enclosed(context, &task, first, pairs, band)?;
+        for (place, pair) in pairs.iter().enumerate() {
+            if enclosed.as_ref().map_or(pair.nominal > 0.0, |all| all[place]) {
+                worst.add(pair.perturbed, first + place as u64);
+            }
         }
         context.watch.advance(pairs.len() as u64)
     })?;

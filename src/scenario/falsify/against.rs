@@ -54,8 +54,17 @@ impl Target {
     /// The pairs of `record` whose nominal start is certified.
     ///
     /// # Errors
-    /// As [`Target::whole_box`].
+    /// As [`Target::whole_box`], and a sentence of a set that is enclosed: what is certified there is not
+    /// told by a rollout of the nominal start.
     pub fn certified(record: &Record, spec: &RolloutSpec) -> Result<Self, String> {
+        if let Some(enclosed) = &record.enclosed {
+            return Err(format!(
+                "the certified set is enclosed by `{}`, which holds for every perturbation within {}: no \
+                 search among them; look within its box (--within box), or try it with `check`",
+                enclosed.kind.name(),
+                lower(enclosed.radius)
+            ));
+        }
         let pairs = PairSettings {
             radius: record.deviation.radius as f32,
             control: record.deviation.control,
