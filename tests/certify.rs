@@ -118,7 +118,10 @@ fn a_certificate_is_written_queried_and_checked() {
     let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(rows["rows"][0]["tier"], record["state"]["tier"]);
     let plain = text(&reachcast(&["query", dir, "--states", states]).stdout);
-    assert!(plain.starts_with("index,tier,check_margin,target_margin\n0,"), "{plain}");
+    assert!(
+        plain.starts_with("index,tier,check_margin,target_margin,score,measure,calibrated\n0,"),
+        "{plain}"
+    );
     let answers = folder.path().join("answers");
     let output = reachcast(&["query", dir, "--states", states, "--out", answers.to_str().unwrap()]);
     assert!(text(&output.stdout).contains("tier 0 (in the target)"));

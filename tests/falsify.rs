@@ -397,7 +397,9 @@ fn the_certified_set_is_searched_by_pairs() {
     {
         let (out, to) = (folder.path(name), folder.path(&format!("{name}-search")));
         let control = format!("deviation.control={control}");
-        certify(config, &[set, &[control.as_str()]].concat(), &out, "cpu");
+        // By constants: a set by drops has a risk, and pairs that fail.
+        let by_constants = [control.as_str(), "global.tightening=lipschitz"];
+        certify(config, &[set, &by_constants].concat(), &out, "cpu");
         let asked = ["falsify", "--around", &out, "--within", "certified", "--budget", "20000"];
         let asked = [&asked[..], &["--out", &to, "--backend", "cpu", "--json"]].concat();
         let (code, said, message) = reachcast(&asked);
@@ -422,7 +424,12 @@ fn the_certified_set_is_searched_by_pairs() {
 fn failing_pairs_are_replayed_under_their_controls() {
     let folder = Folder::new();
     let config = "configs/models/dubins.toml";
-    let set = ["constants.target=0.001", "constants.constraint=0.001", "deviation.radius=0.3"];
+    let set = [
+        "constants.target=0.001",
+        "constants.constraint=0.001",
+        "deviation.radius=0.3",
+        "global.tightening=lipschitz",
+    ];
     let out = folder.path("c");
     let (_, record) = certify(config, &set, &out, "cpu");
     let pairs = record["whole_box"]["pairs"].as_array().unwrap();
