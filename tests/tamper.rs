@@ -231,7 +231,7 @@ fn verdict(
 }
 
 /// What only rollouts can tell, so that `query` takes it from the record as it is.
-const ROLLED_OUT: [&str; 29] = [
+const ROLLED_OUT: [&str; 39] = [
     "constants.region",
     "deviation.bound",
     "deviation.largest",
@@ -240,6 +240,16 @@ const ROLLED_OUT: [&str; 29] = [
     "deviation.non_finite",
     "drops.target_shape",
     "drops.constraint_shape",
+    "drops.level",
+    "drops.largest",
+    "drops.widest",
+    "drops.non_finite",
+    "drops.by_constants",
+    "sequence.pilot",
+    "sequence.levels",
+    "calibration.level",
+    "calibration.failing",
+    "growth.around",
     "global.accepted",
     "global.claim.failures",
     "global.reached",

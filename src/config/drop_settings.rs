@@ -3,6 +3,7 @@
 use super::drops::{CalibrationSection, Count, DropsSection, TighteningSource};
 use super::section::{Config, Profile};
 use crate::error::Result;
+use crate::scenario::attempt_share;
 use crate::scenario::drops_settings::{ConditionalRisk, DropSettings, SampleSettings};
 
 /// The conditional risk that asks for none.
@@ -14,6 +15,17 @@ impl Config {
         if self.global.tightening != TighteningSource::Drops {
             return Ok(None);
         }
+        // Counts that nobody gave follow from the beta that the attempt books.
+        let share = self.attempt.map_or(1.0, attempt_share);
+        let sample = |epsilon, beta, scenarios, discards| {
+            let needed = SampleSettings::new(epsilon, share * beta, discards);
+            let scenarios = match scenarios {
+                // A claim that no count supports is left to whoever checks it.
+                Count::Needed => needed.map_or(0, |sample| sample.scenarios),
+                Count::Given(count) => count,
+            };
+            SampleSettings { epsilon, beta, scenarios, discards }
+        };
         let DropsSection { pilot, epsilon, beta, scenarios, discards } = self.drops;
         let calibration = &self.calibration;
         let calibrated = (calibration.epsilon < 1.0).then(|| {
@@ -39,15 +51,4 @@ impl Config {
             (None, Profile::Paper | Profile::Study) => None,
         }
     }
-}
-
-/// A claim with its pairs; a claim that no count supports is left to whoever checks it.
-fn sample(epsilon: f64, beta: f64, scenarios: Count, discards: u64) -> SampleSettings {
-    let needed =
-        || SampleSettings::new(epsilon, beta, discards).map_or(0, |sample| sample.scenarios);
-    let scenarios = match scenarios {
-        Count::Needed => needed(),
-        Count::Given(count) => count,
-    };
-    SampleSettings { epsilon, beta, scenarios, discards }
 }

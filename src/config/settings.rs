@@ -147,7 +147,11 @@ impl Config {
     fn varies(&self, axes: &[Axis]) -> Result<Vec<bool>> {
         let place = "growth.coordinates";
         match &self.growth.coordinates {
-            Coordinates::All => Ok(vec![true; axes.len()]),
+            // A state whose box has no width is frozen: nothing beside it is certified.
+            Coordinates::All => {
+                let (low, high) = self.corners(axes)?;
+                Ok(low.iter().zip(&high).map(|(low, high)| low < high).collect())
+            }
             Coordinates::Named(names) if names.is_empty() => {
                 let problem = "empty; name the states that vary, or say \"all\"";
                 Err(Error::invalid(place, problem))

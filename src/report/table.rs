@@ -141,7 +141,7 @@ fn deviation(record: &Record) -> String {
             ("radius around a nominal start", lower(deviation.radius)),
             ("perturbed rollouts", words::control(deviation.control).to_owned()),
             ("joint over the steps", words::joint(deviation.joint).to_owned()),
-            ("bound that tightens the margins", words::source(deviation.source).to_owned()),
+            ("the bound", words::source(deviation.source).to_owned()),
             ("pilot pairs", count(deviation.pilot)),
             ("scale of the fixed shape", or_dash(deviation.scale.map(upper))),
             ("support scenarios", count(deviation.support)),

@@ -151,6 +151,15 @@ fn growth(record: &Record) -> Verdict<'_> {
     }
 }
 
+/// What V_check takes off the margins.
+pub(crate) fn tightened(record: &Record) -> &'static str {
+    match (&record.enclosed, &record.drops) {
+        (Some(_), _) => "enclosed with the ball of starts around it",
+        (None, Some(_)) => "with margins that lose what drops in pairs of rollouts",
+        (None, None) => "with margins tightened by the deviation bound",
+    }
+}
+
 /// What local growth grew.
 pub(crate) fn grown(record: &Record) -> &'static str {
     record.growth.shape().name()

@@ -20,8 +20,9 @@ use crate::rounding::{complement, confidence};
 /// The least unit of a step, of the largest of its margin: a direction that dies out would leave a unit
 /// near zero, which one pair could exceed many times over.
 const FLOOR: f64 = 1e-2;
-/// The unit where no pair of the pilot has a drop.
-const NO_DROP: f64 = 1.0;
+/// The unit of a margin that drops in no pair of the pilot: a constant one loses next to nothing, whatever
+/// lambda is, and one that drops after all makes lambda large.
+const NO_DROP: f64 = 1e-9;
 /// Pairs whose margins are held at once.
 const CHUNK: u64 = 4096;
 

@@ -212,6 +212,13 @@ pub(super) fn of_sequence(
     if let Some(risk) = shown.or(asked.and_then(ConditionalRisk::asked)) {
         (global.claim.epsilon, global.claim.required_exact) = (Some(risk), sequence.required);
     }
+    // Which set was chosen depends on its failures: what holds of it is the risk that accepts, not the bound
+    // that these failures give.
+    if let Some(risk) = shown {
+        let (draws, beta) = (settings.global.draws, settings.global.beta);
+        global.claim.certified_risk = risk;
+        global.claim.statement = statement(&count, draws, beta, risk);
+    }
     global.share_interval = share.interval;
     global.volume_interval = share.interval.map(|end| end * global.box_volume);
     global.share = Some(share);
@@ -225,6 +232,12 @@ fn statement(count: &Count, draws: u64, beta: f64, risk: f64) -> String {
         return format!(
             "No claim is made about rollouts from the certified set: it holds none of {draws} nominal \
              starts that were drawn from the box."
+        );
+    }
+    if risk >= 1.0 {
+        return format!(
+            "No claim is made about rollouts from the certified set: {} of {} perturbed ones failed.",
+            count.failures, count.accepted
         );
     }
     format!(

@@ -2,7 +2,7 @@
 //! of either method.
 
 use super::Context;
-use super::bound::{certified_risk, required_scenarios, simple_scenarios};
+use super::bound::{certified_risk, required_scenarios, required_with_failures, simple_scenarios};
 use super::boundary::{self, Boundary, Center};
 use super::coordinates::{Coordinates, coordinates};
 use super::growth_plan::{Around, GrowthMethod, GrowthShape, UpwardRecord};
@@ -319,8 +319,12 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
         epsilon: Some(asked.epsilon),
         beta: asked.beta,
         beta_used,
-        required_simple: Some(simple_scenarios(asked.epsilon, beta_used, 1)?),
-        required_exact: Some(required_scenarios(asked.epsilon, beta_used, 1)?),
+        // The simple bound knows no failures that are allowed.
+        required_simple: match allowed {
+            0 => Some(simple_scenarios(asked.epsilon, beta_used, 1)?),
+            _ => None,
+        },
+        required_exact: Some(required_with_failures(asked.epsilon, beta_used, allowed)?),
         certified_risk: certified_risk(asked.scenarios, allowed, beta_used),
     })
 }

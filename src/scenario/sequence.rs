@@ -48,7 +48,7 @@ impl Levels {
             },
             _ => {
                 let bears = scores.first().is_some_and(|most| *most > single);
-                let median = scores.get(scores.len() / 2).copied().unwrap_or(0.0);
+                let median = below(&scores, scores.len() / 2);
                 let levels = vec![if bears { single } else { median }];
                 Self { levels, start: start.map(|start| start as u64), tested: false }
             }
@@ -56,14 +56,19 @@ impl Levels {
     }
 }
 
+/// The largest of the descending `scores` that at least `count` of them, and one, lie above; 0 where there is
+/// none: the laxest set is all starts whose own rollout succeeds. Of starts of one score a set has all or
+/// none.
+fn below(scores: &[f64], count: usize) -> f64 {
+    let count = count.max(1);
+    let Some(last) = scores.get(count - 1) else { return 0.0 };
+    scores[count..].iter().copied().find(|score| score < last).unwrap_or(0.0)
+}
+
 /// Levels below the first `first` of the descending `scores`, and so on to all of them, evenly.
 fn divided(scores: &[f64], first: f64) -> Vec<f64> {
     let step = (scores.len() as f64 - first) / (LEVELS - 1) as f64;
-    let at = |number: usize| {
-        let count = (first + number as f64 * step).ceil() as usize;
-        // Above 0 whatever the scores: the laxest set is all whose own rollout succeeds.
-        scores.get(count).copied().unwrap_or(0.0)
-    };
+    let at = |number: usize| below(scores, (first + number as f64 * step).ceil() as usize);
     let mut levels: Vec<f64> = (0..LEVELS).map(at).collect();
     levels.dedup();
     levels
@@ -205,6 +210,17 @@ mod tests {
         assert!(levels.levels.windows(2).all(|pair| pair[0] > pair[1]));
         assert!((levels.levels[0] - (1.0 - 3.0 * 0.20675)).abs() < 2e-3, "{:?}", levels.levels[0]);
         assert_eq!(levels.levels[59], 0.0);
+    }
+
+    /// A margin that saturates gives many starts one score: no level may leave them all out.
+    #[test]
+    fn starts_of_one_score_are_in_one_set() {
+        let ties: Vec<f64> = (0..4096).map(|i| if i < 3000 { 2.0 } else { 1.0 }).collect();
+        let levels = Levels::new(ties.clone(), 20_000, Some(0.005), 1e-3, 0.5);
+        assert_eq!((levels.levels, levels.tested), (vec![1.0, 0.0], true));
+        assert_eq!(Levels::new(ties, 20_000, None, 1e-3, 2.0).levels, [1.0]);
+        let all = Levels::new(vec![2.0; 4096], 20_000, Some(0.005), 1e-3, 2.0);
+        assert_eq!(all.levels, [0.0]);
     }
 
     #[test]

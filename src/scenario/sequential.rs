@@ -19,7 +19,7 @@ use super::walk::Walk;
 use crate::error::Result;
 use crate::model::Model;
 use crate::rollout::{Ball, DeviationTask, Pairs, Region, Starts, replay};
-use crate::rounding::confidence;
+use crate::rounding::{confidence, lower};
 
 /// Draws of the first batch; each next one has twice as many.
 const FIRST_BATCH: u64 = 256;
@@ -256,7 +256,13 @@ fn claim(
     let whose = whose(settings, asked);
     let Counts { starts, failures, .. } = counts;
     let (epsilon, beta) = (asked.epsilon, asked.beta);
-    let seen = format!("{failures} of {starts} starts failed");
+    let mut seen = format!("{failures} of {starts} starts failed");
+    if asked.carried != 0.0 {
+        seen += &format!(
+            "; with log evidence of {} carried over from earlier attempts, as `sequential.carried` says",
+            lower(asked.carried)
+        );
+    }
     let statement = match outcome {
         SequentialOutcome::Certified => format!(
             "With confidence {}, {whose} fails with probability at most {epsilon}: shown after \

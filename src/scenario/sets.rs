@@ -13,7 +13,7 @@ use super::settings::Settings;
 use super::shares::{self, Fresh, Scored, undiscounted};
 use super::tightened::Tightened;
 use super::{Context, calibration, drops, global, purpose, tightened};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::rollout::drops::Shapes;
 use crate::rollout::{
@@ -118,6 +118,7 @@ pub(super) fn rederived(
     record: &mut Record,
 ) -> Result<()> {
     let beta = settings.global.beta;
+    refuse_unsound(record)?;
     if let Some(stored) = &record.drops {
         record.drops = Some(drops::derived(model, settings, asked, stored)?);
     }
@@ -138,6 +139,34 @@ pub(super) fn rederived(
         record.global = global::of_sequence(model, settings, &chosen)?;
     }
     Ok(())
+}
+
+/// Refuses levels and units that no draw of any pairs comes to.
+fn refuse_unsound(record: &Record) -> Result<()> {
+    let refused = |field: &str, problem: &str| {
+        Err(Error::Refused(format!("{field} {problem}; certify again")))
+    };
+    let is_level = |level: f64| level >= 0.0;
+    let (Some(drops), Some(sequence)) = (&record.drops, &record.sequence) else {
+        return refused("drops", "and sequence are not both there");
+    };
+    let mut units = drops.target_shape.iter().chain(&drops.constraint_shape);
+    if !units.all(|unit| *unit > 0.0 && unit.is_finite()) {
+        return refused("drops.target_shape", "or constraint_shape is not positive throughout");
+    }
+    let levels: Vec<f64> = sequence.levels.iter().map(|level| level.level).collect();
+    if !levels.iter().all(|level| is_level(*level)) || !levels.is_sorted_by(|a, b| a > b) {
+        return refused("sequence.levels", "do not descend to 0");
+    }
+    if !is_level(drops.level) || drops.level > 1.000_001 * drops.largest.max(0.0) {
+        return refused("drops.level", "is not a level of these pairs");
+    }
+    match &record.calibration {
+        Some(calibration) if !is_level(calibration.level) => {
+            refused("calibration.level", "is below 0")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The sentences of these sets.

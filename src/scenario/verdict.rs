@@ -23,7 +23,7 @@ pub(super) fn verdict(
 
 /// What is certified of the box.
 fn subset(global: &GlobalRecord, enclosed: Option<&EnclosedRecord>) -> String {
-    if global.accepted == 0 {
+    if global.accepted == 0 || global.claim.certified_risk >= 1.0 {
         return "nothing of the box is certified".to_owned();
     }
     let share = interval(global.share_interval.map(|share| 100.0 * share));

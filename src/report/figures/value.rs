@@ -49,9 +49,9 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
         drawing: Ok(drawing(grid)),
         legend,
         caption: format!(
-            "Each cell is one rollout from its centre, with margins tightened by the deviation \
-             bound, over {x} and {y}{held}. Blue is certified, orange is not. Only the sign has a \
-             meaning: margins mix units."
+            "Each cell is one rollout from its centre, {}, over {x} and {y}{held}. Blue is certified, \
+             orange is not. Only the sign has a meaning: margins mix units.",
+            words::tightened(record)
         ),
     }
 }
