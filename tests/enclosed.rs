@@ -1,5 +1,7 @@
 //! Certified sets that rest on an enclosure and no sample: whose they are, on every backend, stored and refused.
 
+#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+
 mod command;
 mod common;
 
