@@ -88,6 +88,18 @@ fn check_identity(plant: &Plant, record: &Record) -> Result<()> {
         let expected = format!("{} by its horizon", record.horizon + 1);
         return refuse("deviation.bound length", &found, &expected);
     }
+    if let Some(drops) = &record.drops {
+        let shapes = [
+            ("drops.target_shape", &drops.target_shape),
+            ("drops.constraint_shape", &drops.constraint_shape),
+        ];
+        for (field, shape) in shapes {
+            if shape.len() != record.horizon as usize + 1 {
+                let expected = format!("{} by its horizon", record.horizon + 1);
+                return refuse(&format!("{field} length"), &shape.len().to_string(), &expected);
+            }
+        }
+    }
     Ok(())
 }
 
