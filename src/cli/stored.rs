@@ -18,6 +18,7 @@ use crate::rollout::States;
 use crate::rounding::upper;
 use crate::scenario::drops_record::SequenceRecord;
 use crate::scenario::record::{Record, SCHEMA};
+use crate::scenario::settings::Settings;
 use crate::scenario::{self, Beside, CheckReport, Figure, Finding, QueryRow};
 
 /// Name of the file with a line per state.
@@ -96,19 +97,16 @@ fn ask(global: &Global, stored: &Stored, states: &Path) -> Result<Vec<QueryRow>>
 }
 
 /// Says how many of `states` lie outside the box, where no claim speaks of them.
-fn note_outside(settings: &scenario::settings::Settings, states: States<'_>) {
-    let (low, high) = (&settings.low, &settings.high);
-    let inside = |x: &[f32]| (0..x.len()).all(|i| low[i] <= x[i] && x[i] <= high[i]);
-    let outside = states.iter().filter(|x| !inside(x)).count();
+fn note_outside(settings: &Settings, states: States<'_>) {
+    use std::io::Write as _;
+    let outside = states.iter().filter(|x| !settings.in_box(x)).count();
     if outside > 0 {
         // Whatever becomes of standard error, the answers stand.
-        let _ = std::io::Write::write_fmt(
-            &mut std::io::stderr(),
-            format_args!(
-                "note: {outside} of {} states lie outside the box that was drawn from: no claim speaks of them, \
-             whatever their tier\n",
-                states.len()
-            ),
+        let _ = writeln!(
+            std::io::stderr(),
+            "note: {outside} of {} states lie outside the box that was drawn from: no claim speaks of them, \
+             whatever their tier",
+            states.len()
         );
     }
 }

@@ -183,9 +183,7 @@ impl<'a> Certifier<'a> {
 
     /// Whether the deviation bound speaks of `state`, as far as that is asked.
     fn covers(&self, state: &[f32]) -> bool {
-        let Settings { low, high, .. } = self.settings;
-        let inside = || (0..state.len()).all(|i| low[i] <= state[i] && state[i] <= high[i]);
-        self.asked.domain == Domain::Anywhere || inside()
+        self.asked.domain == Domain::Anywhere || self.settings.in_box(state)
     }
 
     /// `V_check` of each state, or its sign.

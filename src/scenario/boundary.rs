@@ -151,8 +151,7 @@ fn along_rays(
     let rays = effort.directions * (POINTS + effort.bisections) as u64;
     context.watch.begin("boundary search", rays * SPREADS.len() as u64);
     let certified = |states: States<'_>| -> Result<Vec<bool>> {
-        let inside =
-            |x: &[f32]| (0..x.len()).all(|i| settings.low[i] <= x[i] && x[i] <= settings.high[i]);
+        let inside = |x: &[f32]| settings.in_box(x);
         let asked = StateList::new(states.size()).with(states.iter().filter(|x| inside(x)));
         let (spec, query) = (&settings.spec, Query::Sign);
         let signs = criterion.margins(context, spec, asked.view(), query, 0.0)?;

@@ -226,6 +226,11 @@ impl Settings {
         ])
     }
 
+    /// Whether `state` lies in the box, outside of which no claim speaks.
+    pub fn in_box(&self, state: &[f32]) -> bool {
+        (0..state.len()).all(|i| self.low[i] <= state[i] && state[i] <= self.high[i])
+    }
+
     /// Columns and rows of the slice; none of both where there is no slice.
     pub(crate) fn slice_size(&self) -> [usize; 2] {
         self.slice.as_ref().map_or([0, 0], |axes| axes.each_ref().map(|axis| axis.values.len()))
