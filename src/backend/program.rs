@@ -66,7 +66,8 @@ impl Program<'_> {
         // Nothing after the last step that matters changes a measure.
         let last = self.plant.model.task.last(task.spec.horizon).max(1);
         let spec = RolloutSpec { horizon: last, ..task.spec };
-        let task = &ReachAvoidTask { spec, ..task.clone() };
+        let shorter = (spec != task.spec).then(|| ReachAvoidTask { spec, ..task.clone() });
+        let task = shorter.as_ref().unwrap_or(task);
         match &self.prepared {
             Prepared::Cpu(cpu, prepared) => {
                 prepared.reach_avoid(cpu, task, &mut |first, values| sink.take(first, values))

@@ -9,6 +9,7 @@ mod recorded;
 mod role;
 mod stage;
 mod task;
+mod task_words;
 pub mod text;
 
 use std::sync::Arc;
@@ -18,6 +19,7 @@ pub use plant::Plant;
 pub use role::Role;
 pub use stage::{MapCost, StageCost};
 pub use task::{Task, Window};
+pub use task_words::Form;
 
 use self::compiled::CompiledForm;
 use crate::formula::Graph;

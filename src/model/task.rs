@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use super::Role;
 use crate::error::{Error, Result};
 
@@ -15,7 +17,8 @@ use crate::error::{Error, Result};
 /// let required = |step: u32| task.role(step, 5).has(Role::REQUIREMENT);
 /// assert_eq!([0, 2, 3, 5].map(required), [false, false, true, true]);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Task {
     /// Be in the target at a step of the window, safe up to it.
     ReachAvoid(Window),
@@ -33,7 +36,7 @@ pub enum Task {
 }
 
 /// Steps at which the target counts: `from..=to`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Window {
     /// The first.
     pub from: u32,
@@ -117,6 +120,21 @@ impl Task {
     /// Whether it is reach-avoid over the whole rollout: every step has the same role.
     pub fn is_plain(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Whether it has a target.
+    pub fn has_target(&self) -> bool {
+        *self != Self::Avoid
+    }
+
+    /// Whether it has a constraint.
+    pub fn has_constraint(&self) -> bool {
+        !matches!(self, Self::Reach(_))
+    }
+
+    /// Whether a rollout that is in the target at its first state has reached it.
+    pub fn is_reached_at_once(&self) -> bool {
+        matches!(self, Self::ReachAvoid(window) | Self::Reach(window) if window.from == 0)
     }
 
     /// The last step that matters in a rollout of `horizon` steps: what comes after it changes no measure.

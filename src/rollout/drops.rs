@@ -50,7 +50,8 @@ impl Shapes {
         let bounded = |x: f64| x.clamp(-huge, huge);
         let units = self.target.iter().zip(&self.constraint);
         let mut fold = Fold::new();
-        let counts = |(margins, _): &(&Margins, _)| margins.role != Role::OVER && margins.are_numbers();
+        let counts =
+            |(margins, _): &(&Margins, _)| margins.role != Role::OVER && margins.are_numbers();
         for (margins, (target, constraint)) in margins.iter().zip(units).take_while(counts) {
             let scaled = [margins.target / target, margins.constraint / constraint].map(bounded);
             fold.add_as(margins.role, scaled[0], scaled[1], 1.0);

@@ -119,9 +119,26 @@ impl<R: Real> Default for Fold<R> {
 /// assert!(reach_avoid([(-1.0, -0.1), (0.5, 1.0)], 0.95) < 0.0_f64);
 /// ```
 pub fn reach_avoid<R: Real>(margins: impl IntoIterator<Item = (R, R)>, gamma: R) -> R {
+    measure_as(std::iter::repeat(Role::REACH_AVOID), margins, gamma)
+}
+
+/// Measure of margins `(r_t, c_t)` for t = 0..=T, by what each step is to the task.
+///
+/// ```
+/// use reachcast::model::Task;
+/// use reachcast::rollout::measure_as;
+/// // Safe at all steps; the target does not count.
+/// let roles = Task::Avoid.roles(1);
+/// assert_eq!(measure_as(roles, [(-1.0, 2.0), (-1.0, 0.5)], 1.0), 0.5_f64);
+/// ```
+pub fn measure_as<R: Real>(
+    roles: impl IntoIterator<Item = Role>,
+    margins: impl IntoIterator<Item = (R, R)>,
+    gamma: R,
+) -> R {
     let mut fold = Fold::new();
-    for (target, constraint) in margins {
-        fold.add(target, constraint, gamma);
+    for (role, (target, constraint)) in roles.into_iter().zip(margins) {
+        fold.add_as(role, target, constraint, gamma);
     }
     fold.measure()
 }

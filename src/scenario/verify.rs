@@ -131,7 +131,7 @@ pub fn query(
     let row = |(x, check_margin): (&[f32], f32)| {
         let target_margin = finite_margin(plant.model.target_at(x, 0));
         let check = f64::from(check_margin);
-        let tier = tier(f64::from(target_margin), check, &record.growth, x);
+        let tier = tier(&plant.model.task, f64::from(target_margin), check, &record.growth, x);
         QueryRow { tier, check_margin, target_margin }
     };
     Ok(states.iter().zip(margins).map(row).collect())

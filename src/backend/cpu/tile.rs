@@ -272,13 +272,7 @@ impl<const N: usize> Score<N> {
 
     /// The same where steps differ in what they are to the task; once it is over, nothing fails.
     #[inline(always)]
-    fn add_as(
-        &mut self,
-        roles: &[u32; N],
-        margins: [Lanes<N>; 2],
-        largest: [u32; N],
-        gamma: f32,
-    ) {
+    fn add_as(&mut self, roles: &[u32; N], margins: [Lanes<N>; 2], largest: [u32; N], gamma: f32) {
         self.failed = per_lane!(N, i => {
             self.failed[i] | (u32::from(largest[i] >= EXPONENT) & roles[i] & Role::LIVE.bits())
         });

@@ -37,9 +37,7 @@ impl Description {
     pub fn model(&self) -> Result<Model> {
         let networks = self.table()?;
         let margin = |written: &Option<Written>, absent: f32| match written {
-            Some(written) => {
-                self.recorded(&written.key, std::slice::from_ref(written), &networks)
-            }
+            Some(written) => self.recorded(&written.key, std::slice::from_ref(written), &networks),
             None => Ok(record(self.inputs(), |_| vec![Real::lit(absent)])),
         };
         Ok(Model {

@@ -41,9 +41,8 @@ pub(super) fn task(
     }
     refuse_unused(section, kind)?;
     let time = |key| moment(section, key, period);
-    let window = || -> Result<Window> {
-        Ok(Window { from: time("from")?.unwrap_or(0), to: time("to")? })
-    };
+    let window =
+        || -> Result<Window> { Ok(Window { from: time("from")?.unwrap_or(0), to: time("to")? }) };
     let task = match kind {
         "avoid" => Task::Avoid,
         "reach" => Task::Reach(window()?),
@@ -72,7 +71,8 @@ fn used(kind: &str) -> &'static [&'static str] {
 /// Refuses a key that the kind has no use for.
 fn refuse_unused(section: &Section<'_>, kind: &str) -> Result<()> {
     let used = used(kind);
-    let mut given = ["target", "constraint"].into_iter().chain(TIMES).filter(|key| section.has(key));
+    let mut given =
+        ["target", "constraint"].into_iter().chain(TIMES).filter(|key| section.has(key));
     match given.find(|key| !used.contains(key)) {
         Some(key) => {
             let problem = format!(

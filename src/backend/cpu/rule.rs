@@ -1,0 +1,95 @@
+//! How the margins of a step count: what they lose, and what the step is to the task.
+
+use super::tile::TilePlant;
+use crate::model::Role;
+use crate::real::{Lanes, Real, per_lane};
+use crate::rollout::{Effect, RolloutSpec, Tightening};
+
+/// What each step is to the task, `[T + 1]` roles as bits; nothing where all steps are alike, as in a
+/// reach-avoid task without a window.
+pub(super) struct Roles(Option<Vec<u32>>);
+
+impl Roles {
+    /// Those of the task of `plant`.
+    pub(super) fn of(plant: &TilePlant<'_>, spec: &RolloutSpec) -> Self {
+        let roles = || plant.task.roles(spec.horizon).into_iter().map(Role::bits).collect();
+        Self((!plant.task.is_plain()).then(roles))
+    }
+}
+
+/// How the margins of the next states of a group count.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rule<const N: usize> {
+    loss: Loss<N>,
+    /// Roles as bits; none where the step is that of a reach-avoid task without a window.
+    pub(super) roles: Option<[u32; N]>,
+}
+
+impl<const N: usize> Rule<N> {
+    /// At step `t`, the same for all lanes.
+    #[inline(always)]
+    pub(super) fn at(tightening: &Tightening, roles: &Roles, t: usize) -> Self {
+        let roles = roles.0.as_ref().map(|roles| [roles[t]; N]);
+        Self { loss: Loss::at(tightening, t), roles }
+    }
+
+    /// At a step of its own for each lane.
+    #[inline(always)]
+    pub(super) fn at_each(tightening: &Tightening, roles: &Roles, steps: &[u32; N]) -> Self {
+        let roles = roles.0.as_ref();
+        let roles = roles.map(|roles| per_lane!(N, i => roles[steps[i] as usize]));
+        Self { loss: Loss::at_each(tightening, steps), roles }
+    }
+
+    /// The same for margins that lose nothing.
+    #[inline(always)]
+    pub(super) fn without_loss(self) -> Self {
+        Self { loss: Loss::NONE, ..self }
+    }
+
+    /// The margins `[target, constraint]` after what they lose.
+    #[inline(always)]
+    pub(super) fn act(&self, margins: [Lanes<N>; 2]) -> [Lanes<N>; 2] {
+        self.loss.act(margins)
+    }
+}
+
+/// What both margins lose, per lane: off the target margin, off the constraint margin; or their factors.
+#[derive(Clone, Copy, Debug)]
+struct Loss<const N: usize> {
+    numbers: [Lanes<N>; 2],
+    effect: Effect,
+}
+
+impl<const N: usize> Loss<N> {
+    /// Nothing.
+    const NONE: Self = Self { numbers: [Lanes([0.0; N]); 2], effect: Effect::Subtracted };
+
+    /// At step `t`, the same for all lanes.
+    #[inline(always)]
+    fn at(tightening: &Tightening, t: usize) -> Self {
+        let (target, constraint) = (tightening.target[t], tightening.constraint[t]);
+        Self { numbers: [Lanes::lit(target), Lanes::lit(constraint)], effect: tightening.effect }
+    }
+
+    /// At a step of its own for each lane.
+    #[inline(always)]
+    fn at_each(tightening: &Tightening, steps: &[u32; N]) -> Self {
+        let Tightening { target, constraint, effect } = tightening;
+        let numbers = [
+            Lanes(per_lane!(N, i => target[steps[i] as usize])),
+            Lanes(per_lane!(N, i => constraint[steps[i] as usize])),
+        ];
+        Self { numbers, effect: *effect }
+    }
+
+    /// The margins `[target, constraint]` with it taken off, or multiplied with it.
+    #[inline(always)]
+    fn act(&self, [target, constraint]: [Lanes<N>; 2]) -> [Lanes<N>; 2] {
+        let [of_target, of_constraint] = self.numbers;
+        match self.effect {
+            Effect::Subtracted => [target - of_target, constraint - of_constraint],
+            Effect::Multiplied => [target * of_target, constraint * of_constraint],
+        }
+    }
+}
