@@ -34,7 +34,12 @@ impl Tube<'_> {
                 fold.hold(lost(self.constraint.below(set, step), constraint));
             }
             if role.sees_target() {
-                fold.target(role, lost(self.target.below(set, step), target));
+                let low = self.target.below(set, step);
+                // What may be no number fails the rollout from here on; and so may what has no constant.
+                if low == f64::NEG_INFINITY || target == f64::INFINITY {
+                    break;
+                }
+                fold.target(role, lost(low, target));
             }
             fold.end_step(role);
             if fold.safe <= fold.best || step == self.spec.horizon || role == Role::OVER {

@@ -141,7 +141,12 @@ impl<'a> Tube<'a> {
             }
             // Where the constraint decides, the target changes nothing.
             if role.sees_target() && !decided(&fold) {
-                fold.target(role, self.target.below(&set, step));
+                let target = self.target.below(&set, step);
+                // What may be no number fails the rollout from here on.
+                if target == f64::NEG_INFINITY {
+                    break;
+                }
+                fold.target(role, target);
             }
             fold.end_step(role);
             if decided(&fold) || role == Role::OVER {

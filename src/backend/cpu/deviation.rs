@@ -42,7 +42,8 @@ impl Unit for Deviation<'_> {
                 if t > 0 {
                     pairs.step(&mut runner, task.control);
                 }
-                let rule = Rule::at(task.tightening, roles, t);
+                let steps = [t as u32; N];
+                let rule = Rule::at(task.tightening, roles, &steps);
                 let step = Step { t, rule, gamma: task.spec.gamma };
                 pairs.judge(&runner, step, farthest);
             }
@@ -53,11 +54,11 @@ impl Unit for Deviation<'_> {
 }
 
 /// A step of the rollouts.
-struct Step<const N: usize> {
+struct Step<'a, const N: usize> {
     /// Its number.
     t: usize,
     /// How the margins of the nominal rollouts count.
-    rule: Rule<N>,
+    rule: Rule<'a, N>,
     /// Discount.
     gamma: f32,
 }
@@ -110,7 +111,7 @@ impl<K: Kernel, const N: usize> Pairs<K, N> {
     fn judge(
         &mut self,
         runner: &TileRunner<'_, K>,
-        Step { t, rule, gamma }: Step<N>,
+        Step { t, rule, gamma }: Step<'_, N>,
         farthest: &mut Farthest,
     ) {
         let rules = [rule, rule.without_loss()];

@@ -76,8 +76,8 @@ fn judge<K: Kernel, const N: usize>(
 ) {
     runner.at_steps(frame, groups.iter().flat_map(|group| group.step));
     let scores = groups.iter_mut().map(|group| {
-        let rule = Rule::at_each(task.tightening, roles, &group.step);
-        (&mut group.score, rule)
+        let Group { score, step, .. } = group;
+        (score, Rule::at_each(task.tightening, roles, step))
     });
     runner.judge(frame, live, task.spec.gamma, scores);
     groups.iter_mut().take(live.div_ceil(N)).for_each(|group| group.decide(task.spec.horizon));

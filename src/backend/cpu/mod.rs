@@ -137,7 +137,7 @@ impl Cpu {
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
-        let roles = &Roles::of(&plant, &task.spec);
+        let roles = &Roles::of(plant.task, &task.spec);
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, plant.widest());
@@ -159,7 +159,7 @@ impl Cpu {
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
-        let roles = &Roles::of(&plant, &task.spec);
+        let roles = &Roles::of(plant.task, &task.spec);
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {

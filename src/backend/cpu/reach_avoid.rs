@@ -41,7 +41,8 @@ pub(super) fn measures<K: Kernel, const N: usize>(
                 runner.step(&mut frame, count);
             }
             runner.at_step(&mut frame, t);
-            let rule = Rule::at(task.tightening, unit.roles, t);
+            let steps = [t as u32; N];
+            let rule = Rule::at(task.tightening, unit.roles, &steps);
             let scores = scores.iter_mut().map(|score| (score, rule));
             runner.judge(&mut frame, count, task.spec.gamma, scores);
         }

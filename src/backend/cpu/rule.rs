@@ -1,44 +1,41 @@
 //! How the margins of a step count: what they lose, and what the step is to the task.
 
-use super::tile::TilePlant;
-use crate::model::Role;
+use crate::model::{Role, Task};
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{Effect, RolloutSpec, Tightening};
 
-/// What each step is to the task, `[T + 1]` roles as bits; nothing where all steps are alike, as in a
-/// reach-avoid task without a window.
-pub(super) struct Roles(Option<Vec<u32>>);
+/// What each step is to the task, `[T + 1]` roles as bits; none where all steps are alike, as in a reach-avoid
+/// task without a window.
+pub(super) struct Roles(Vec<u32>);
 
 impl Roles {
-    /// Those of the task of `plant`.
-    pub(super) fn of(plant: &TilePlant<'_>, spec: &RolloutSpec) -> Self {
-        let roles = || plant.task.roles(spec.horizon).into_iter().map(Role::bits).collect();
-        Self((!plant.task.is_plain()).then(roles))
+    /// Those of `task`.
+    pub(super) fn of(task: Task, spec: &RolloutSpec) -> Self {
+        let roles = || task.roles(spec.horizon).into_iter().map(Role::bits).collect();
+        Self(if task.is_plain() { Vec::new() } else { roles() })
     }
 }
 
 /// How the margins of the next states of a group count.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rule<const N: usize> {
+pub(super) struct Rule<'a, const N: usize> {
     loss: Loss<N>,
-    /// Roles as bits; none where the step is that of a reach-avoid task without a window.
-    pub(super) roles: Option<[u32; N]>,
+    /// Roles as bits, and the step of each lane; asked for where steps differ alone.
+    roles: &'a [u32],
+    steps: &'a [u32; N],
 }
 
-impl<const N: usize> Rule<N> {
-    /// At step `t`, the same for all lanes.
+impl<'a, const N: usize> Rule<'a, N> {
+    /// At the same step for all lanes, which `steps` holds once for each.
     #[inline(always)]
-    pub(super) fn at(tightening: &Tightening, roles: &Roles, t: usize) -> Self {
-        let roles = roles.0.as_ref().map(|roles| [roles[t]; N]);
-        Self { loss: Loss::at(tightening, t), roles }
+    pub(super) fn at(tightening: &Tightening, roles: &'a Roles, steps: &'a [u32; N]) -> Self {
+        Self { loss: Loss::at(tightening, steps[0] as usize), roles: &roles.0, steps }
     }
 
     /// At a step of its own for each lane.
     #[inline(always)]
-    pub(super) fn at_each(tightening: &Tightening, roles: &Roles, steps: &[u32; N]) -> Self {
-        let roles = roles.0.as_ref();
-        let roles = roles.map(|roles| per_lane!(N, i => roles[steps[i] as usize]));
-        Self { loss: Loss::at_each(tightening, steps), roles }
+    pub(super) fn at_each(tightening: &Tightening, roles: &'a Roles, steps: &'a [u32; N]) -> Self {
+        Self { loss: Loss::at_each(tightening, steps), roles: &roles.0, steps }
     }
 
     /// The same for margins that lose nothing.
@@ -51,6 +48,12 @@ impl<const N: usize> Rule<N> {
     #[inline(always)]
     pub(super) fn act(&self, margins: [Lanes<N>; 2]) -> [Lanes<N>; 2] {
         self.loss.act(margins)
+    }
+
+    /// What the step of each lane is to the task, as bits, where steps differ.
+    #[inline(always)]
+    pub(super) fn roles(&self) -> [u32; N] {
+        per_lane!(N, i => self.roles[self.steps[i] as usize])
     }
 }
 

@@ -162,11 +162,15 @@ impl<'a, K: Kernel> TileRunner<'a, K> {
         frame: &mut Frame,
         lanes: usize,
         gamma: f32,
-        scores: impl Iterator<Item = (&'s mut Score<N>, Rule<N>)>,
+        scores: impl Iterator<Item = (&'s mut Score<N>, Rule<'s, N>)>,
     ) {
         self.plant.system.margins(self.plant.with, frame, lanes);
         let scores = scores.take(lanes.div_ceil(N));
-        self.kernel.call(Judge { frame, scores, gamma });
+        // Steps that are all alike need no masks.
+        match self.plant.task.is_plain() {
+            true => self.kernel.call(Judge { frame, scores, gamma }),
+            false => self.kernel.call(JudgeByRole { frame, scores, gamma }),
+        }
     }
 
     /// The kernel, for other bodies.
@@ -193,34 +197,64 @@ struct Judge<'a, I> {
 
 impl<'s, I, const N: usize> Body for Judge<'_, I>
 where
-    I: Iterator<Item = (&'s mut Score<N>, Rule<N>)>,
+    I: Iterator<Item = (&'s mut Score<N>, Rule<'s, N>)>,
 {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         let Self { frame, scores, gamma } = self;
-        let (states, [target_row, constraint_row]) = (frame.states().len(), frame.margins());
         for (group, (score, rule)) in scores.enumerate() {
             let at = group * N;
-            // Infinite margins are satisfied or violated, only a NaN fails the rollout.
-            let rows = [target_row, constraint_row];
-            let [target, constraint] = rule.act(rows.map(|row| lanes(frame, row, at)));
-            let [mut target, mut constraint] = [bounded(target), bounded(constraint)];
-            if let Some(roles) = &rule.roles {
-                target = seen(roles, Role::CHANCE.with(Role::REQUIREMENT), target);
-                constraint = seen(roles, Role::CONSTRAINT, constraint);
-            }
-            let mut largest = with_largest(with_largest([0; N], target), constraint);
-            for row in 0..states {
-                largest = with_largest(largest, lanes(frame, row, at));
-            }
-            match &rule.roles {
-                None => score.add(target, constraint, largest, gamma),
-                Some(roles) => score.add_as(roles, [target, constraint], largest, gamma),
-            }
+            let [target, constraint] = margins(frame, at, &rule);
+            let largest = largest(frame, at, [target, constraint]);
+            score.add(target, constraint, largest, gamma);
         }
     }
+}
+
+/// The same where steps differ in what they are to the task.
+struct JudgeByRole<'a, I> {
+    frame: &'a Frame,
+    scores: I,
+    gamma: f32,
+}
+
+impl<'s, I, const N: usize> Body for JudgeByRole<'_, I>
+where
+    I: Iterator<Item = (&'s mut Score<N>, Rule<'s, N>)>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { frame, scores, gamma } = self;
+        for (group, (score, rule)) in scores.enumerate() {
+            let (at, roles) = (group * N, rule.roles());
+            let [target, constraint] = margins(frame, at, &rule);
+            let target = seen(&roles, Role::CHANCE.with(Role::REQUIREMENT), target);
+            let constraint = seen(&roles, Role::CONSTRAINT, constraint);
+            let largest = largest(frame, at, [target, constraint]);
+            score.add_as(&roles, [target, constraint], largest, gamma);
+        }
+    }
+}
+
+/// The margins of a group after what they lose: infinite ones are satisfied or violated, only a NaN fails the
+/// rollout.
+#[inline(always)]
+fn margins<const N: usize>(frame: &Frame, at: usize, rule: &Rule<'_, N>) -> [Lanes<N>; 2] {
+    rule.act(frame.margins().map(|row| lanes(frame, row, at))).map(bounded)
+}
+
+/// The largest bits without sign of margins and states of a group.
+#[inline(always)]
+fn largest<const N: usize>(frame: &Frame, at: usize, margins: [Lanes<N>; 2]) -> [u32; N] {
+    let mut largest = margins.into_iter().fold([0; N], with_largest);
+    for row in frame.states() {
+        largest = with_largest(largest, lanes(frame, row, at));
+    }
+    largest
 }
 
 /// The margin where its step has one of the marks, 0 elsewhere.
