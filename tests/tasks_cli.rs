@@ -35,7 +35,7 @@ const SMALL: [&str; 8] = [
     "growth.radius=0.1",
     "rollout.horizon=20",
     "slice.x.step=0.3",
-    "slice.v.step=0.3",
+    "slice.y.step=0.3",
     "state.x=0.1",
 ];
 

@@ -50,11 +50,25 @@ impl<'a, const N: usize> Rule<'a, N> {
         self.loss.act(margins)
     }
 
+    /// The margins as far as the step of each lane lets them count, where steps differ.
+    #[inline(always)]
+    pub(super) fn seen(&self, target: Lanes<N>, constraint: Lanes<N>) -> [Lanes<N>; 2] {
+        let roles = self.roles();
+        let target = seen(&roles, Role::CHANCE.with(Role::REQUIREMENT), target);
+        [target, seen(&roles, Role::CONSTRAINT, constraint)]
+    }
+
     /// What the step of each lane is to the task, as bits, where steps differ.
     #[inline(always)]
     pub(super) fn roles(&self) -> [u32; N] {
         per_lane!(N, i => self.roles[self.steps[i] as usize])
     }
+}
+
+/// The margin where its step has one of the marks, 0 elsewhere.
+#[inline(always)]
+fn seen<const N: usize>(roles: &[u32; N], marks: Role, margin: Lanes<N>) -> Lanes<N> {
+    Lanes(per_lane!(N, i => if roles[i] & marks.bits() != 0 { margin.0[i] } else { 0.0 }))
 }
 
 /// What both margins lose, per lane: off the target margin, off the constraint margin; or their factors.

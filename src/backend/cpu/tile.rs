@@ -166,11 +166,8 @@ impl<'a, K: Kernel> TileRunner<'a, K> {
     ) {
         self.plant.system.margins(self.plant.with, frame, lanes);
         let scores = scores.take(lanes.div_ceil(N));
-        // Steps that are all alike need no masks.
-        match self.plant.task.is_plain() {
-            true => self.kernel.call(Judge { frame, scores, gamma }),
-            false => self.kernel.call(JudgeByRole { frame, scores, gamma }),
-        }
+        let steps = if self.plant.task.is_plain() { Steps::Alike } else { Steps::Differ };
+        self.kernel.call(Judge { frame, scores, gamma, steps });
     }
 
     /// The kernel, for other bodies.
@@ -187,12 +184,22 @@ pub(super) fn lanes<const N: usize>(frame: &Frame, row: usize, at: usize) -> Lan
     Lanes(lanes)
 }
 
+/// Whether what a step is to the task differs from step to step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Steps {
+    /// All are those of a reach-avoid task without a window, which needs no masks.
+    Alike,
+    /// Each has a role of its own.
+    Differ,
+}
+
 /// The margins of the groups of a tile, folded: one body for all of them.
 struct Judge<'a, I> {
     frame: &'a Frame,
     /// The score of each group, and how its margins count.
     scores: I,
     gamma: f32,
+    steps: Steps,
 }
 
 impl<'s, I, const N: usize> Body for Judge<'_, I>
@@ -203,64 +210,28 @@ where
 
     #[inline(always)]
     fn run(self) {
-        let Self { frame, scores, gamma } = self;
+        let Self { frame, scores, gamma, steps } = self;
+        let (states, [target_row, constraint_row]) = (frame.states().len(), frame.margins());
         for (group, (score, rule)) in scores.enumerate() {
             let at = group * N;
-            let [target, constraint] = margins(frame, at, &rule);
-            let largest = largest(frame, at, [target, constraint]);
-            score.add(target, constraint, largest, gamma);
+            // Infinite margins are satisfied or violated, only a NaN fails the rollout. Nothing is mapped here:
+            // what a closure returns goes through memory.
+            let rows = [lanes(frame, target_row, at), lanes(frame, constraint_row, at)];
+            let [target, constraint] = rule.act(rows);
+            let [mut target, mut constraint] = [bounded(target), bounded(constraint)];
+            if steps == Steps::Differ {
+                [target, constraint] = rule.seen(target, constraint);
+            }
+            let mut largest = with_largest(with_largest([0; N], target), constraint);
+            for row in 0..states {
+                largest = with_largest(largest, lanes(frame, row, at));
+            }
+            match steps {
+                Steps::Alike => score.add(target, constraint, largest, gamma),
+                Steps::Differ => score.add_as(&rule.roles(), [target, constraint], largest, gamma),
+            }
         }
     }
-}
-
-/// The same where steps differ in what they are to the task.
-struct JudgeByRole<'a, I> {
-    frame: &'a Frame,
-    scores: I,
-    gamma: f32,
-}
-
-impl<'s, I, const N: usize> Body for JudgeByRole<'_, I>
-where
-    I: Iterator<Item = (&'s mut Score<N>, Rule<'s, N>)>,
-{
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { frame, scores, gamma } = self;
-        for (group, (score, rule)) in scores.enumerate() {
-            let (at, roles) = (group * N, rule.roles());
-            let [target, constraint] = margins(frame, at, &rule);
-            let target = seen(&roles, Role::CHANCE.with(Role::REQUIREMENT), target);
-            let constraint = seen(&roles, Role::CONSTRAINT, constraint);
-            let largest = largest(frame, at, [target, constraint]);
-            score.add_as(&roles, [target, constraint], largest, gamma);
-        }
-    }
-}
-
-/// The margins of a group after what they lose: infinite ones are satisfied or violated, only a NaN fails the
-/// rollout.
-#[inline(always)]
-fn margins<const N: usize>(frame: &Frame, at: usize, rule: &Rule<'_, N>) -> [Lanes<N>; 2] {
-    rule.act(frame.margins().map(|row| lanes(frame, row, at))).map(bounded)
-}
-
-/// The largest bits without sign of margins and states of a group.
-#[inline(always)]
-fn largest<const N: usize>(frame: &Frame, at: usize, margins: [Lanes<N>; 2]) -> [u32; N] {
-    let mut largest = margins.into_iter().fold([0; N], with_largest);
-    for row in frame.states() {
-        largest = with_largest(largest, lanes(frame, row, at));
-    }
-    largest
-}
-
-/// The margin where its step has one of the marks, 0 elsewhere.
-#[inline(always)]
-fn seen<const N: usize>(roles: &[u32; N], marks: Role, margin: Lanes<N>) -> Lanes<N> {
-    Lanes(per_lane!(N, i => if roles[i] & marks.bits() != 0 { margin.0[i] } else { 0.0 }))
 }
 
 /// Infinite margins as the largest number; NaN stays.
