@@ -40,21 +40,29 @@ pub(super) fn task(
         return Err(section.refuse(LATER, "this part of a task does not work yet; leave it out"));
     }
     refuse_unused(section, kind)?;
+    let margin = |key: &str| {
+        let needed = used(kind).contains(&key);
+        needed.then(|| margin(section, key, scope)).transpose()
+    };
+    Ok(WrittenTask {
+        task: timed(section, kind, period)?,
+        target: margin("target")?,
+        constraint: margin("constraint")?,
+    })
+}
+
+/// The task of this kind with its times.
+fn timed(section: &Section<'_>, kind: &str, period: Option<f32>) -> Result<Task> {
     let time = |key| moment(section, key, period);
     let window =
         || -> Result<Window> { Ok(Window { from: time("from")?.unwrap_or(0), to: time("to")? }) };
-    let task = match kind {
+    Ok(match kind {
         "avoid" => Task::Avoid,
         "reach" => Task::Reach(window()?),
         "reach-stay" => Task::ReachStay { by: time("by")? },
         "at-end" => Task::AtEnd,
         _ => Task::ReachAvoid(window()?),
-    };
-    let margin = |key: &str| {
-        let needed = used(kind).contains(&key);
-        needed.then(|| margin(section, key, scope)).transpose()
-    };
-    Ok(WrittenTask { task, target: margin("target")?, constraint: margin("constraint")? })
+    })
 }
 
 /// The keys that a kind of task has a use for.
@@ -124,8 +132,8 @@ fn moment(section: &Section<'_>, key: &str, period: Option<f32>) -> Result<Optio
                 return Err(section.wrong(key, expected, value));
             };
             let step = whole_periods(section, key, seconds, period)?;
-            let known = step >= 0.0 && step <= f64::from(u32::MAX);
-            known.then_some(Some(step as u32)).ok_or_else(|| beyond(text))
+            let steps = 0.0..=f64::from(u32::MAX);
+            if steps.contains(&step) { Ok(Some(step as u32)) } else { Err(beyond(text)) }
         }
         other => Err(section.wrong(key, expected, other)),
     }
