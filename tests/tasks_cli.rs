@@ -1,4 +1,5 @@
-//! Tasks through the commands: certificates, rollouts and searches in the words of each task, checked as stored.
+//! Tasks through the commands: certificates, rollouts and searches in the words of each task, checked
+//! as stored.
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
@@ -148,6 +149,25 @@ fn rollouts_speak_of_their_task() {
         assert!(said.contains(&format!("positive where a start {})", case.words)), "{said}");
         let again = [&arguments[..], &horizon, &["--overwrite"]].concat();
         assert_eq!(document(&again)["successes"].as_u64().unwrap(), 1, "{}", case.lines);
+    }
+}
+
+/// A start that fails its task is found, and fails again where it is rolled out from the file.
+#[test]
+fn searches_find_starts_that_fail_the_task() {
+    let folder = Folder::new();
+    for (i, case) in CASES.iter().enumerate() {
+        let (config, out) = (folder.path(&format!("{i}.toml")), folder.path(&format!("{i}")));
+        std::fs::write(&config, case.text()).unwrap();
+        let horizon = ["--set", "rollout.horizon=20", "--backend", "cpu"];
+        let search = ["falsify", &config, "--budget", "5000", "--out", &out];
+        let (code, _, message) = reachcast(&[&search[..], &horizon].concat());
+        assert_eq!(code, Some(3), "{}: {message}", case.lines);
+        let (starts, measures) = (format!("{out}/counterexamples.csv"), folder.path("m.npy"));
+        let replay = ["rollout", &config, "--starts", &starts, "--measures", &measures];
+        let again = document(&[&replay[..], &horizon, &["--overwrite"]].concat());
+        assert!(again["starts"].as_u64().unwrap() > 0);
+        assert_eq!(again["successes"].as_u64().unwrap(), 0, "{}", case.lines);
     }
 }
 

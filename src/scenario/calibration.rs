@@ -67,7 +67,8 @@ fn claim(model: &Model, settings: &Settings, asked: &SampleSettings) -> Result<C
     };
     let measure = if model.task.is_plain() { "reach-avoid measure" } else { "measure" };
     let statement = format!(
-        "With confidence 1 - {beta}, the chance that a nominal start of the box has a {measure} above alpha and its perturbed rollout fails is at most {epsilon}{discarded}."
+        "With confidence 1 - {beta}, the chance that a nominal start of the box has a {measure} \
+         above alpha and its perturbed rollout fails is at most {epsilon}{discarded}."
     );
     sample_claim(model, settings, asked, "calibration", statement)
 }

@@ -78,7 +78,8 @@ impl Method {
         }
         let (name, kinds) = (self.name(), "`analytic` and `value`");
         let problem = format!(
-            "`{name}` learns the task `reach-avoid` without a window alone, this one is `{task}`; {kinds} learn any"
+            "`{name}` learns the task `reach-avoid` without a window alone, this one is `{task}`; \
+             {kinds} learn any"
         );
         Err(Error::invalid("train.method", problem))
     }

@@ -84,7 +84,8 @@ fn refuse_unused(section: &Section<'_>, kind: &str) -> Result<()> {
     match given.find(|key| !used.contains(key)) {
         Some(key) => {
             let problem = format!(
-                "a task of the kind \"{kind}\" has no use for it, but for {}; leave it out or take another kind",
+                "a task of the kind \"{kind}\" has no use for it, but for {}; leave it \
+                 out or take another kind",
                 used.join(", ")
             );
             Err(section.refuse(key, problem))
