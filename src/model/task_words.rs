@@ -58,8 +58,8 @@ impl Task {
 impl Window {
     fn time(self, horizon: u32) -> String {
         match (self.from, self.to) {
+            (from, Some(to)) if from == to => format!("at step {from}"),
             (0, to) => format!("within {} steps", to.unwrap_or(horizon)),
-            (from, to) if to == Some(from) => format!("at step {from}"),
             (from, to) => format!("at a step from {from} to {}", to.unwrap_or(horizon)),
         }
     }
@@ -77,6 +77,7 @@ mod tests {
             (Task::ReachAvoid(window(0, Some(9))), "reaches the target safely within 9 steps"),
             (Task::ReachAvoid(window(3, None)), "reaches the target safely at a step from 3 to 30"),
             (Task::Reach(window(7, Some(7))), "reaches the target at step 7"),
+            (Task::Reach(window(0, Some(0))), "reaches the target at step 0"),
             (Task::Avoid, "stays safe for 30 steps"),
             (Task::AtEnd, "stays safe for 30 steps, in the target at the last of them"),
             (
