@@ -16,6 +16,8 @@ use reachcast::rollout::{
     DeviationTask, Keep, NON_FINITE, PairControl, Pairs, Purpose, Query, ReachAvoidTask, Region,
     RolloutSpec, Starts, Stream, Tightening,
 };
+use reachcast::train::settings::Method;
+use reachcast::train::soft::measure_tape;
 use reachcast::tube::Tube;
 
 /// Steps.
@@ -389,6 +391,43 @@ fn what_a_tube_certifies_holds_of_every_perturbed_start() {
         }
         println!("{}: {certified} certified, {refused} rollouts fail", case.task);
         assert!(certified > 3 && refused > 3, "{}: {certified}, {refused}", case.task);
+    }
+}
+
+/// What training ascends tends to the measure of the task as the temperature falls.
+#[test]
+fn the_softened_measure_tends_to_that_of_the_task() {
+    let (spec, losses, temperature) = (spec(), losses(), 1e-4);
+    for case in cases() {
+        let (plant, mut compared) = (case.plant(), 0);
+        let tape = measure_tape(&plant.model, &spec, Some(&losses));
+        for i in 0..200 {
+            let states = states::<f64>(&plant, &starts().start(i), HORIZON);
+            let wanted = of_states(case.task, &states, &losses);
+            if wanted == f64::from(NON_FINITE) || states.iter().flatten().any(|x| !x.is_finite()) {
+                continue;
+            }
+            let mut values = Vec::new();
+            tape.forward(&states.concat(), temperature, &mut values);
+            let found = tape.read(&values).nth(1).expect("the tightened measure");
+            assert!((found - wanted).abs() < 2e-3, "{}, {i}: {found}, not {wanted}", case.task);
+            compared += 1;
+        }
+        assert!(compared > 50, "{}: {compared}", case.task);
+    }
+}
+
+/// A method that knows the backup of reach-avoid alone refuses another task by name.
+#[test]
+fn methods_that_know_reach_avoid_alone_refuse_other_tasks() {
+    for method in [Method::ActionValue, Method::Ddpg, Method::Ppo] {
+        method.check_task(&Task::default()).expect("reach-avoid");
+        let found = method.check_task(&Task::AtEnd).expect_err("refused").to_string();
+        let words = ["train.method", method.name(), "this one is `at-end`", "`analytic`"];
+        words.iter().for_each(|word| assert!(found.contains(word), "no `{word}` in: {found}"));
+    }
+    for method in [Method::Analytic, Method::Value] {
+        method.check_task(&Task::Avoid).expect("any task");
     }
 }
 
