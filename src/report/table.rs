@@ -88,21 +88,21 @@ pub(crate) fn wide(record: &Record) -> String {
 
 fn setting(record: &Record) -> String {
     let task = &record.system.task;
-    pairs(
-        "Setting",
-        &[
-            ("task", format!("{task}: a rollout that {}", task.words(Form::One, record.horizon))),
-            ("horizon T", format!("{} steps", record.horizon)),
-            ("discount gamma", number(record.gamma)),
-            ("seed", record.provenance.seed.to_string()),
-            ("generator", record.provenance.generator.clone()),
-            ("backend", record.provenance.backend.clone()),
-            ("device", record.provenance.device.clone()),
-            ("wall time", format!("{} s", number(record.timing.wall_seconds))),
-            ("threads", record.timing.threads.to_string()),
-            ("rollouts", count(record.timing.rollouts)),
-        ],
-    )
+    // Of reach-avoid without a window the sentences say it all.
+    let words = format!("{task}: a rollout that {}", task.words(Form::One, record.horizon));
+    let task = (!task.is_plain()).then_some(("task", words));
+    let rows = [
+        ("horizon T", format!("{} steps", record.horizon)),
+        ("discount gamma", number(record.gamma)),
+        ("seed", record.provenance.seed.to_string()),
+        ("generator", record.provenance.generator.clone()),
+        ("backend", record.provenance.backend.clone()),
+        ("device", record.provenance.device.clone()),
+        ("wall time", format!("{} s", number(record.timing.wall_seconds))),
+        ("threads", record.timing.threads.to_string()),
+        ("rollouts", count(record.timing.rollouts)),
+    ];
+    pairs("Setting", &task.into_iter().chain(rows).collect::<Vec<_>>())
 }
 
 fn constants(record: &Record) -> String {
