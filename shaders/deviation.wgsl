@@ -38,7 +38,7 @@ fn deviation(
             distances[place] = gap(nominal, perturbed);
         }
         nominal_fold = judge(nominal_fold, nominal, t, row);
-        perturbed_fold = judge(perturbed_fold, perturbed, t, vec4<f32>(row.x, 0.0, 0.0, 0.0));
+        perturbed_fold = judge(perturbed_fold, perturbed, t, without_loss(row));
         if t < params.horizon {
             let replayed = drive(lane, column, nominal, t);
             if params.closed_loop != 0u {

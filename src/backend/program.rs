@@ -47,7 +47,7 @@ impl Program<'_> {
         &self.plant
     }
 
-    /// Reach-avoid measure, or its sign, of each start of `task`; sent to `sink` in order.
+    /// The measure by the model's task, or its sign, of each start of `task`; sent to `sink` in order.
     ///
     /// # Errors
     /// [`Error::Invalid`] where the parts of the task do not fit, those of the device, and the first
@@ -63,6 +63,11 @@ impl Program<'_> {
         mut sink: StartSink<'_>,
     ) -> Result<()> {
         self.check(&task.starts, task.range.end, task.tightening, &task.spec)?;
+        // Nothing after the last step that matters changes a measure.
+        let last = self.plant.model.task.last(task.spec.horizon).max(1);
+        let spec = RolloutSpec { horizon: last, ..task.spec };
+        let shorter = (spec != task.spec).then(|| ReachAvoidTask { spec, ..task.clone() });
+        let task = shorter.as_ref().unwrap_or(task);
         match &self.prepared {
             Prepared::Cpu(cpu, prepared) => {
                 prepared.reach_avoid(cpu, task, &mut |first, values| sink.take(first, values))
@@ -108,6 +113,7 @@ impl Program<'_> {
             let problem = format!("starts of {size} numbers; the model has {states} states");
             return Err(Error::invalid("starts", problem));
         }
-        check_task(starts, end, tightening, spec)
+        check_task(starts, end, tightening, spec)?;
+        self.plant.model.task.check(spec.horizon)
     }
 }

@@ -75,6 +75,7 @@ pub struct PreparedWorkload<'a> {
 }
 
 /// What a backend keeps of it.
+#[expect(clippy::large_enum_variant, reason = "a workload has one, and it is not moved")]
 enum Prepared<'a> {
     Plant(Program<'a>),
     Plans(PlanProgram<'a>),

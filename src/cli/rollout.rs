@@ -13,7 +13,7 @@ use crate::backend::{Event, Program};
 use crate::config::Config;
 use crate::error::Result;
 use crate::files::{MeasureWriter, StateReader, check_room, spare_existing};
-use crate::model::Plant;
+use crate::model::{Form, Plant, Task};
 use crate::rollout::{
     Keep, MeasureCounts, MeasureTally, Query, ReachAvoidTask, RolloutSpec, Starts, StateList,
     States, Tightening,
@@ -42,6 +42,9 @@ struct Summary {
     #[serde(with = "crate::files::number")]
     success_interval: [f64; 2],
     horizon: u32,
+    /// What a rollout has to do; nothing is said of reach-avoid without a window.
+    #[serde(skip_serializing_if = "Task::is_plain")]
+    task: Task,
     #[serde(with = "crate::files::number")]
     gamma: f32,
     measures: String,
@@ -80,20 +83,20 @@ struct Rollout<'a> {
 impl Rollout<'_> {
     fn run(self, plant: &Plant) -> Result<Summary> {
         match replayed::measures(self.starts, &plant.model, &self.spec)? {
-            Some(measures) => self.write_replayed(&measures),
+            Some(measures) => self.write_replayed(plant.model.task, &measures),
             None => self.roll_out(plant),
         }
     }
 
     /// Writes the measures of starts that came with their controls.
-    fn write_replayed(self, measures: &[f32]) -> Result<Summary> {
+    fn write_replayed(self, task: Task, measures: &[f32]) -> Result<Summary> {
         let begun = Instant::now();
         let mut writer = MeasureWriter::create(self.measures)?;
         writer.add(measures)?;
         writer.publish()?;
         let mut tally = MeasureTally::new(Keep::Counts);
         tally.add(0, measures)?;
-        let done = Done { notes: vec![replayed::NOTE.to_owned()], begun, tally };
+        let done = Done { task, notes: vec![replayed::NOTE.to_owned()], begun, tally };
         Ok(self.summary(done, ["cpu".to_owned(), "the host, in f64".to_owned()], Vec::new()))
     }
 
@@ -127,12 +130,13 @@ impl Rollout<'_> {
         writer.publish()?;
         devices::note_events(self.global, &backend);
         let ran_on = [backend.name().to_owned(), backend.device()];
-        Ok(self.summary(Done { notes, begun, tally }, ran_on, backend.events()))
+        let done = Done { task: plant.model.task, notes, begun, tally };
+        Ok(self.summary(done, ran_on, backend.events()))
     }
 
     /// What is reported of rollouts that are done.
     fn summary(self, done: Done, [backend, device]: [String; 2], events: Vec<Event>) -> Summary {
-        let Done { notes, begun, tally } = done;
+        let Done { task, notes, begun, tally } = done;
         let MeasureCounts { starts, successes, non_finite, .. } = *tally.counts();
         let (low, high) = interval(successes, starts, BETA);
         Summary {
@@ -141,6 +145,7 @@ impl Rollout<'_> {
             non_finite,
             success_interval: [low, high],
             horizon: self.spec.horizon,
+            task,
             gamma: self.spec.gamma,
             measures: self.measures.display().to_string(),
             backend,
@@ -154,6 +159,7 @@ impl Rollout<'_> {
 
 /// Rollouts that are done.
 struct Done {
+    task: Task,
     notes: Vec<String>,
     begun: Instant,
     tally: MeasureTally,
@@ -180,16 +186,21 @@ fn measure(
 fn text(summary: &Summary) -> String {
     let Summary { starts, successes, non_finite, success_interval, .. } = summary;
     let notes: String = summary.notes.iter().map(|note| format!("note: {note}\n")).collect();
+    let (task, horizon) = (&summary.task, summary.horizon);
+    let success = match task.is_plain() {
+        true => "the target is reached safely".to_owned(),
+        false => format!("a start {}", task.words(Form::One, horizon)),
+    };
     let share = 100.0 * *successes as f64 / *starts as f64;
     format!(
-        "{successes} of {starts} starts reach the target safely: {} % (95 % interval {} %)\n\
+        "{successes} of {starts} starts {}: {} % (95 % interval {} %)\n\
          {non_finite} failed for a state that is not finite\n\
-         measures (positive where the target is reached safely): {}\n\
-         {} steps, {}, {} s\n{notes}",
+         measures (positive where {success}): {}\n\
+         {horizon} steps, {}, {} s\n{notes}",
+        task.short_words(Form::Many, horizon),
         rounding::number(share),
         rounding::interval(success_interval.map(|end| 100.0 * end)),
         summary.measures,
-        summary.horizon,
         summary.device,
         rounding::number(summary.wall_seconds)
     )

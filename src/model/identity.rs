@@ -37,6 +37,10 @@ impl Plant {
             text.push('\n');
             text += &model.function(name, graph, more);
         }
+        // The open reach-avoid task goes without saying, so that its plants have the same text as ever.
+        if !model.task.is_plain() {
+            writeln!(text, "// task {}", model.task).expect("a String grows");
+        }
         for parameter in &model.parameters {
             // The bits, so that no decimal hides a difference.
             let (name, value) = (&parameter.name, parameter.value);

@@ -6,14 +6,20 @@ mod fit;
 mod identity;
 mod plant;
 mod recorded;
+mod role;
 mod stage;
+mod task;
+mod task_words;
 pub mod text;
 
 use std::sync::Arc;
 
 pub use controller::{Controller, Law};
 pub use plant::Plant;
+pub use role::Role;
 pub use stage::{MapCost, StageCost};
+pub use task::{Task, Window};
+pub use task_words::Form;
 
 use self::compiled::CompiledForm;
 use crate::formula::Graph;
@@ -39,6 +45,8 @@ pub struct Model {
     pub period: Option<f32>,
     /// The next state, `[states]`; clips the controls to their bounds.
     pub step: Graph,
+    /// What a rollout has to do.
+    pub task: Task,
     /// Target margin: positive inside the target set.
     pub target: Graph,
     /// Constraint margin: positive where safe.
@@ -58,6 +66,7 @@ impl PartialEq for Model {
         let same_axes = self.states == other.states && self.controls == other.controls;
         let same_data = self.parameters == other.parameters && self.period == other.period;
         let same_formulas = self.step == other.step
+            && self.task == other.task
             && self.target == other.target
             && self.constraint == other.constraint;
         self.name == other.name

@@ -3,8 +3,8 @@
 use std::array::from_fn;
 use std::sync::Arc;
 
-use super::Model;
 use super::compiled::CompiledForm;
+use super::{Model, Task};
 use crate::formula::{Expr, Graph, record_with};
 use crate::system::System;
 use crate::tile::{CompiledSystem, NativeSystem};
@@ -44,6 +44,7 @@ impl Model {
             parameters: system.parameters(),
             period: None,
             step: record(&|x, u| system.step(x, u).to_vec()),
+            task: Task::default(),
             target: record(&|x, _| vec![system.target(x)]),
             constraint: record(&|x, _| vec![system.constraint(x)]),
             bodies: system.bodies(),

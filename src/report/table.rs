@@ -2,6 +2,7 @@
 
 use super::text::{count, escape, interval, lower, number, or_dash, upper};
 use super::words;
+use crate::model::Form;
 use crate::scenario::record::{Claim, Record};
 
 /// A table in a box of its own that scrolls; the first row holds headings, cells are text.
@@ -86,20 +87,22 @@ pub(crate) fn wide(record: &Record) -> String {
 }
 
 fn setting(record: &Record) -> String {
-    pairs(
-        "Setting",
-        &[
-            ("horizon T", format!("{} steps", record.horizon)),
-            ("discount gamma", number(record.gamma)),
-            ("seed", record.provenance.seed.to_string()),
-            ("generator", record.provenance.generator.clone()),
-            ("backend", record.provenance.backend.clone()),
-            ("device", record.provenance.device.clone()),
-            ("wall time", format!("{} s", number(record.timing.wall_seconds))),
-            ("threads", record.timing.threads.to_string()),
-            ("rollouts", count(record.timing.rollouts)),
-        ],
-    )
+    let task = &record.system.task;
+    // Of reach-avoid without a window the sentences say it all.
+    let words = format!("{task}: a rollout that {}", task.words(Form::One, record.horizon));
+    let task = (!task.is_plain()).then_some(("task", words));
+    let rows = [
+        ("horizon T", format!("{} steps", record.horizon)),
+        ("discount gamma", number(record.gamma)),
+        ("seed", record.provenance.seed.to_string()),
+        ("generator", record.provenance.generator.clone()),
+        ("backend", record.provenance.backend.clone()),
+        ("device", record.provenance.device.clone()),
+        ("wall time", format!("{} s", number(record.timing.wall_seconds))),
+        ("threads", record.timing.threads.to_string()),
+        ("rollouts", count(record.timing.rollouts)),
+    ];
+    pairs("Setting", &task.into_iter().chain(rows).collect::<Vec<_>>())
 }
 
 fn constants(record: &Record) -> String {
@@ -129,8 +132,10 @@ fn constants(record: &Record) -> String {
         ]
     });
     let [target, constraint] = rows;
-    let head = head.map(str::to_owned).to_vec();
-    table("Lipschitz constants", &[head, target, constraint])
+    let task = &record.system.task;
+    let rows = [task.has_target().then_some(target), task.has_constraint().then_some(constraint)];
+    let head = std::iter::once(head.map(str::to_owned).to_vec());
+    table("Lipschitz constants", &head.chain(rows.into_iter().flatten()).collect::<Vec<_>>())
 }
 
 fn deviation(record: &Record) -> String {
@@ -156,6 +161,10 @@ fn deviation(record: &Record) -> String {
 
 fn certified_set(record: &Record) -> String {
     let global = &record.global;
+    let reached = match record.system.task.is_plain() {
+        true => "perturbed starts that reach the target",
+        false => "perturbed starts that succeed",
+    };
     pairs(
         "Certified set",
         &[
@@ -164,7 +173,7 @@ fn certified_set(record: &Record) -> String {
             ("P(V_global)", interval(global.share_interval)),
             ("volume of the box", number(global.box_volume)),
             ("volume of V_global", interval(global.volume_interval)),
-            ("perturbed starts that reach the target", count(global.reached)),
+            (reached, count(global.reached)),
             ("failures that are not finite", count(global.non_finite)),
             ("measured f32 error of the measure", upper(global.f32_error)),
             ("band of f64 re-runs", lower(global.band)),
@@ -174,16 +183,16 @@ fn certified_set(record: &Record) -> String {
 }
 
 fn state(record: &Record) -> String {
-    let state = &record.state;
-    pairs(
-        "The state of slice and growth",
-        &[
-            ("tier", words::tier(record)),
-            ("V_check", lower(state.check_margin)),
-            ("target margin", number(state.target_margin)),
-            ("constraint margin", number(state.constraint_margin)),
-        ],
-    )
+    let (state, task) = (&record.state, &record.system.task);
+    let target = ("target margin", number(state.target_margin));
+    let constraint = ("constraint margin", number(state.constraint_margin));
+    let all = [
+        Some(("tier", words::tier(record))),
+        Some(("V_check", lower(state.check_margin))),
+        task.has_target().then_some(target),
+        task.has_constraint().then_some(constraint),
+    ];
+    pairs("The state of slice and growth", &all.into_iter().flatten().collect::<Vec<_>>())
 }
 
 fn growth(record: &Record) -> String {

@@ -1,8 +1,9 @@
 //! Margin drops of pairs, and the score of starts: the tightening that a start just bears.
 
-use super::fold::{HUGE, reach_avoid};
+use super::fold::{Fold, HUGE};
 use super::replay::{Margins, PairMargins};
 use super::spec::{Effect, RolloutSpec, Tightening};
+use crate::model::Role;
 
 /// What margins are measured in at each step: `rho_t` and `kappa_t`, `[T + 1]` each, above 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,20 +44,23 @@ impl Shapes {
     }
 
     /// The score of a nominal rollout: the least level at which it is not certified any more, in f64.
-    /// Minus [`HUGE`] where its first state violates the constraint.
+    /// Minus [`HUGE`] where it was no success when something was no number.
     pub fn score(&self, margins: &[Margins]) -> f64 {
-        let units = self.target.iter().zip(&self.constraint);
-        let scaled = margins.iter().zip(units).map_while(|(margins, (target, constraint))| {
-            let number = !margins.target.is_nan() && !margins.constraint.is_nan();
-            number.then(|| (margins.target / target, margins.constraint / constraint))
-        });
         let huge = f64::from(HUGE);
         let bounded = |x: f64| x.clamp(-huge, huge);
-        reach_avoid(scaled.map(|(target, constraint)| (bounded(target), bounded(constraint))), 1.0)
+        let units = self.target.iter().zip(&self.constraint);
+        let mut fold = Fold::new();
+        let counts =
+            |(margins, _): &(&Margins, _)| margins.role != Role::OVER && margins.are_numbers();
+        for (margins, (target, constraint)) in margins.iter().zip(units).take_while(counts) {
+            let scaled = [margins.target / target, margins.constraint / constraint].map(bounded);
+            fold.add_as(margins.role, scaled[0], scaled[1], 1.0);
+        }
+        fold.measure()
     }
 
-    /// The largest drop of a pair in these units, section 3 of `docs/method.md`: over both margins and the
-    /// steps before the nominal rollout's first violation. Minus infinity where there is no such step.
+    /// The largest drop of a pair in these units, section 3 of `docs/method.md`: over the margins that count
+    /// and the steps before the nominal rollout fails its task. Minus infinity where there is no such step.
     pub fn largest(&self, pair: &PairMargins) -> f64 {
         let units = self.target.iter().zip(&self.constraint);
         let scaled = drops(pair).zip(units).map(|(drop, (target, constraint))| {
@@ -67,16 +71,24 @@ impl Shapes {
 }
 
 /// How far the margins of the perturbed rollout lie below those of the nominal one, step by step up to,
-/// and without, the first violation of the nominal rollout: its constraint margin is not above 0, or a
-/// margin or state of it is no number.
+/// and without, the first step that decides the nominal rollout as failed: a margin that has to hold is not above
+/// 0, or a margin that counts or a state of it is no number; or up to the end of the task.
 ///
-/// Infinite where the perturbed rollout has no number; two equal infinite margins drop 0.
+/// Infinite where the perturbed rollout has no number; two equal infinite margins drop 0, and one that does not
+/// count minus infinity.
 pub fn drops(pair: &PairMargins) -> impl Iterator<Item = Margins> {
-    let counts = |margins: &Margins| margins.constraint > 0.0 && !margins.target.is_nan();
     let both = pair.nominal.iter().zip(&pair.perturbed);
-    both.take_while(move |(nominal, _)| counts(nominal)).map(|(nominal, perturbed)| Margins {
-        target: drop(nominal.target, perturbed.target),
-        constraint: drop(nominal.constraint, perturbed.constraint),
+    both.take_while(|(nominal, _)| nominal.is_open()).map(|(nominal, perturbed)| {
+        let role = nominal.role;
+        let counted = |counts: bool, nominal: f64, other: f64| match counts || other.is_nan() {
+            true => drop(nominal, other),
+            false => f64::NEG_INFINITY,
+        };
+        Margins {
+            role,
+            target: counted(role.sees_target(), nominal.target, perturbed.target),
+            constraint: counted(role.sees_constraint(), nominal.constraint, perturbed.constraint),
+        }
     })
 }
 
@@ -95,7 +107,8 @@ mod tests {
     use crate::rollout::{RolloutSpec, replay};
 
     fn rollout(margins: &[[f64; 2]]) -> Vec<Margins> {
-        margins.iter().map(|&[target, constraint]| Margins { target, constraint }).collect()
+        let role = Role::REACH_AVOID;
+        margins.iter().map(|both| Margins::of(role, *both)).collect()
     }
 
     fn z(shapes: &Shapes, nominal: &[[f64; 2]], perturbed: &[[f64; 2]]) -> f64 {

@@ -22,7 +22,7 @@ mod tally_origin;
 
 pub use crate::files::{StateList, States};
 pub use ellipsoid::Ellipsoid;
-pub use fold::{Fold, HUGE, NON_FINITE, reach_avoid};
+pub use fold::{Fold, HUGE, NON_FINITE, measure_as, reach_avoid};
 pub use held::Keep;
 pub use measure_tally::{Extreme, MeasureCounts, MeasureTally, Measures};
 pub use mppi::MppiSpec;

@@ -3,7 +3,7 @@
 
 use super::fold::{Fold, NON_FINITE};
 use super::spec::{PairControl, RolloutSpec, Tightening};
-use crate::model::{Model, Plant};
+use crate::model::{Model, Plant, Role};
 use crate::real::Real;
 
 /// The states x_0..=x_T from `start`, `[T + 1, states]`.
@@ -17,7 +17,7 @@ pub fn states<R: Real>(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Vec<R>
     states
 }
 
-/// Reach-avoid measure of `start` in f64, with tightened margins.
+/// The measure of `start` in f64, with tightened margins.
 pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
     fold_states(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
 }
@@ -25,7 +25,7 @@ pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Ti
 /// The margins of the rollout from `start` in f64, `[T + 1]`.
 pub fn states_margins(plant: &Plant, start: &[f32], spec: &RolloutSpec) -> Vec<Margins> {
     let states = states::<f64>(plant, start, spec.horizon);
-    margins(&plant.model, states.iter().map(Vec::as_slice))
+    margins(&plant.model, spec.horizon, states.iter().map(Vec::as_slice))
 }
 
 /// Measures `(nominal, perturbed)` of a pair in f64, as [`super::PairMeasure`] has them.
@@ -50,13 +50,46 @@ pub struct PairMargins {
     pub perturbed: Vec<Margins>,
 }
 
-/// The margins at one step; both NaN where the state is not finite.
+/// The margins at one step; both NaN where the state is not finite, and 0 else where they do not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
+    /// What the step is to the task.
+    pub role: Role,
     /// Target margin `r_t`.
     pub target: f64,
     /// Constraint margin `c_t`.
     pub constraint: f64,
+}
+
+impl Margins {
+    /// The margins `[target, constraint]` of a finite state as far as `role` lets them count.
+    pub(super) fn of(role: Role, [target, constraint]: [f64; 2]) -> Self {
+        Self {
+            role,
+            target: if role.sees_target() { target } else { 0.0 },
+            constraint: if role.sees_constraint() { constraint } else { 0.0 },
+        }
+    }
+
+    /// The margins of a state that is not finite.
+    pub(super) fn lost(role: Role) -> Self {
+        Self { role, target: f64::NAN, constraint: f64::NAN }
+    }
+
+    /// Whether state and margins are numbers, as far as they count.
+    pub(super) fn are_numbers(&self) -> bool {
+        !self.target.is_nan() && !self.constraint.is_nan()
+    }
+
+    /// Whether what comes may still be a success, as far as this step tells: the task is not over, and what
+    /// has to hold holds.
+    pub(super) fn is_open(&self) -> bool {
+        let holds = |mark: Role, margin: f64| !self.role.has(mark) || margin > 0.0;
+        self.role.has(Role::LIVE)
+            && self.are_numbers()
+            && holds(Role::CONSTRAINT, self.constraint)
+            && holds(Role::REQUIREMENT, self.target)
+    }
 }
 
 /// The margins of the pair `[nominal, perturbed]` in f64.
@@ -78,8 +111,8 @@ pub fn pair_margins(
     }
     let nominal = nominal.iter().map(|driven| &*driven.state);
     PairMargins {
-        nominal: margins(&plant.model, nominal),
-        perturbed: margins(&plant.model, replayed.iter().map(Vec::as_slice)),
+        nominal: margins(&plant.model, spec.horizon, nominal),
+        perturbed: margins(&plant.model, spec.horizon, replayed.iter().map(Vec::as_slice)),
     }
 }
 
@@ -104,34 +137,40 @@ fn driven(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Driven> {
     all
 }
 
-/// The margins at each of `states`.
-fn margins<'a>(model: &Model, states: impl Iterator<Item = &'a [f64]>) -> Vec<Margins> {
-    let at = |(step, x): (u32, &[f64])| match x.iter().all(|x| x.is_finite()) {
-        true => {
-            Margins { target: model.target_at(x, step), constraint: model.constraint_at(x, step) }
+/// The margins at each of `states`, of rollouts of `horizon` steps.
+fn margins<'a>(
+    model: &Model,
+    horizon: u32,
+    states: impl Iterator<Item = &'a [f64]>,
+) -> Vec<Margins> {
+    let at = |(step, x): (u32, &[f64])| {
+        let role = model.task.role(step, horizon);
+        match x.iter().all(|x| x.is_finite()) {
+            true => Margins::of(role, [model.target_at(x, step), model.constraint_at(x, step)]),
+            false => Margins::lost(role),
         }
-        false => Margins { target: f64::NAN, constraint: f64::NAN },
     };
     (0..).zip(states).map(at).collect()
 }
 
-/// Reach-avoid measure of `states`.
+/// The measure of `states`.
 pub(crate) fn fold_states(
     model: &Model,
     states: &[Vec<f64>],
     spec: &RolloutSpec,
     tightening: &Tightening,
 ) -> f64 {
-    measure_of(&margins(model, states.iter().map(Vec::as_slice)), spec, tightening)
+    let states = states.iter().map(Vec::as_slice);
+    measure_of(&margins(model, spec.horizon, states), spec, tightening)
 }
 
-/// Reach-avoid measure of the margins of a rollout, `[T + 1]`, tightened.
+/// The measure of the margins of a rollout, `[T + 1]`, tightened.
 pub fn measure_of(margins: &[Margins], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
     fold(margins.iter().copied(), spec, tightening)
 }
 
-/// Folds the margins of states in order; a state that is not finite, or a margin that is no number, fails
-/// the rollout from there on.
+/// Folds the margins of states in order; a state that is not finite, or a margin that counts and is no
+/// number, fails the rollout from there on.
 pub(super) fn fold(
     steps: impl Iterator<Item = Margins>,
     spec: &RolloutSpec,
@@ -139,13 +178,17 @@ pub(super) fn fold(
 ) -> f64 {
     let mut fold = Fold::new();
     for (t, margins) in steps.enumerate() {
+        if margins.role == Role::OVER {
+            break;
+        }
         let target = tightening.acted(margins.target, tightening.target[t]);
         let constraint = tightening.acted(margins.constraint, tightening.constraint[t]);
         if target.is_nan() || constraint.is_nan() {
             let so_far: f64 = fold.measure();
             return if so_far > 0.0 { so_far } else { f64::from(NON_FINITE) };
         }
-        fold.add(bounded(target), bounded(constraint), f64::from(spec.gamma));
+        let gamma = f64::from(spec.gamma);
+        fold.add_as(margins.role, bounded(target), bounded(constraint), gamma);
     }
     fold.measure()
 }

@@ -2,7 +2,7 @@
 
 use super::replay::{Margins, fold};
 use super::spec::{PairControl, RolloutSpec, Tightening};
-use crate::model::{Model, Plant};
+use crate::model::{Model, Plant, Role};
 use crate::real::Wide;
 
 /// Pairs of a group.
@@ -66,15 +66,9 @@ impl PairGroup {
         let plain = Tightening::none(spec);
         let [nominal, perturbed] = [(0, tightening), (1, &plain)].map(|(side, tightening)| {
             let states = &self.states[side];
-            let margins = (0..).zip(states).map(|(step, x)| margins(model, x, step));
-            let margins: Vec<[Lane; 2]> = margins.collect();
+            let margins = margins(model, states);
             let one = |lane: usize| {
-                let steps = margins.iter().zip(states).map(|([target, constraint], x)| {
-                    let finite = x.iter().all(|x| x.0[lane].is_finite());
-                    let [target, constraint] = [target, constraint]
-                        .map(|margin| if finite { margin.0[lane] } else { f64::NAN });
-                    Margins { target, constraint }
-                });
+                let steps = margins.iter().zip(states).map(|(margins, x)| margins.of(lane, x));
                 fold(steps, spec, tightening)
             };
             (0..self.count).map(one).collect::<Vec<f64>>()
@@ -98,15 +92,12 @@ impl PairGroup {
         nominal.iter().zip(perturbed).map(length).collect()
     }
 
-    /// States of each pair before its nominal rollout violates its constraint, or is not finite.
-    pub(crate) fn safe_steps(&self, model: &Model) -> Vec<usize> {
+    /// States of each pair before its nominal rollout fails its task, or the task is over.
+    pub(crate) fn open_steps(&self, model: &Model) -> Vec<usize> {
         let [nominal, _] = &self.states;
-        let constraint = (0..).zip(nominal).map(|(step, x)| model.constraint_at(x, step));
-        let constraint: Vec<Lane> = constraint.collect();
-        let safe = |pair: usize, step: usize| {
-            constraint[step].0[pair] > 0.0 && nominal[step].iter().all(|x| x.0[pair].is_finite())
-        };
-        let steps = |pair| (0..nominal.len()).take_while(|step| safe(pair, *step)).count();
+        let margins = margins(model, nominal);
+        let open = |pair: usize, step: usize| margins[step].of(pair, &nominal[step]).is_open();
+        let steps = |pair| (0..nominal.len()).take_while(|step| open(pair, *step)).count();
         (0..self.count).map(steps).collect()
     }
 
@@ -116,9 +107,31 @@ impl PairGroup {
     }
 }
 
-/// Target and constraint margin at `x`.
-fn margins(model: &Model, x: &[Lane], step: u32) -> [Lane; 2] {
-    [model.target_at(x, step), model.constraint_at(x, step)]
+/// The margins of all lanes at a step, and what the step is to the task.
+struct LaneMargins {
+    role: Role,
+    /// Target and constraint margin.
+    both: [Lane; 2],
+}
+
+impl LaneMargins {
+    /// Those of one lane, whose state is among `x`.
+    fn of(&self, lane: usize, x: &[Lane]) -> Margins {
+        match x.iter().all(|x| x.0[lane].is_finite()) {
+            true => Margins::of(self.role, self.both.map(|margin| margin.0[lane])),
+            false => Margins::lost(self.role),
+        }
+    }
+}
+
+/// The margins at each of `states`, `[T + 1]`.
+fn margins(model: &Model, states: &[Vec<Lane>]) -> Vec<LaneMargins> {
+    let horizon = states.len() as u32 - 1;
+    let at = |(step, x): (u32, &Vec<Lane>)| LaneMargins {
+        role: model.task.role(step, horizon),
+        both: [model.target_at(x, step), model.constraint_at(x, step)],
+    };
+    (0..).zip(states).map(at).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Calibration of the reach-avoid measure: the level above which few failing pairs lie.
+//! Calibration of the measure: the level above which few failing pairs lie.
 
 use super::Context;
 use super::drops::{each_pair, level, sample_claim};
@@ -66,8 +66,9 @@ fn claim(model: &Model, settings: &Settings, asked: &SampleSettings) -> Result<C
         0 => String::new(),
         _ => format!(" ({discards} of {scenarios} pairs discarded)"),
     };
+    let measure = if model.task.is_plain() { "reach-avoid measure" } else { "measure" };
     let statement = format!(
-        "With confidence {}, the chance that a nominal start of the box has a reach-avoid measure above \
+        "With confidence {}, the chance that a nominal start of the box has a {measure} above \
          alpha and its perturbed rollout fails is at most {epsilon}{discarded}.",
         confidence(beta)
     );

@@ -149,7 +149,7 @@ fn state(
     let margins = criterion.margins(context, &settings.spec, states, query, band)?;
     let check_margin = decimal(margins[0]);
     let target_margin = decimal(finite_margin(context.model().target_at(x, 0)));
-    let tier = tier(target_margin, check_margin, growth, x).number();
+    let tier = tier(&context.model().task, target_margin, check_margin, growth, x).number();
     let constraint_margin = decimal(finite_margin(context.model().constraint_at(x, 0)));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
 }

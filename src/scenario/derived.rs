@@ -4,7 +4,7 @@ use super::budget::{ledger, spendings};
 use super::claims::{holds, statements};
 use super::enclosure;
 use super::origin::{Hashes, hashes, system_record};
-use super::record::{Record, SliceRecord, decimal, finite_margin};
+use super::record::{Record, SliceRecord, StateRecord, decimal, finite_margin};
 use super::settings::Settings;
 use super::tier::tier;
 use super::{constants, deterministic_set, deviation, global, growth, sequential, sets, whole_box};
@@ -38,7 +38,8 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     record.whole_box =
         whole_box::derived(model, settings, &record.global, stored.whole_box.as_ref())?;
     record.enclosed = enclosure::record(settings);
-    record.deterministic = deterministic_set::derived(settings, stored.deterministic.as_ref());
+    record.deterministic =
+        deterministic_set::derived(model, settings, stored.deterministic.as_ref());
     record.growth = growth::derived(model, settings, &stored.growth)?;
     record.sequential = sequential::derived(model, settings, stored.sequential.as_ref())?;
     record.attempt = settings.attempt_record();
@@ -57,7 +58,8 @@ fn margins(record: &mut Record, model: &Model, settings: &Settings) {
     state.x = x.to_vec();
     state.target_margin = decimal(finite_margin(model.target_at(x, 0)));
     state.constraint_margin = decimal(finite_margin(model.constraint_at(x, 0)));
-    state.tier = tier(state.target_margin, state.check_margin, &record.growth, x).number();
+    let StateRecord { target_margin, check_margin, .. } = *state;
+    state.tier = tier(&model.task, target_margin, check_margin, &record.growth, x).number();
     let cells = global::slice_through(settings, x);
     let check_margin = std::mem::take(&mut record.slice.check_margin);
     record.slice =

@@ -11,7 +11,7 @@ use super::purpose;
 use super::record::decimal;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::model::Plant;
+use crate::model::{Form, Model, Plant};
 use crate::real::bound::Interval;
 use crate::rollout::{
     PairControl, Pairs, Query, Region, Starts, StateList, States, Stream, Tightening, replay,
@@ -58,17 +58,23 @@ pub(super) fn record(
     let f32_distance = few.iter().map(|start| distance(context, &certificate, start));
     let f32_distance = f32_distance.fold(0.0, f64::max);
     let reached = candidates.len() as u64;
-    Ok(Some(conclude(settings, asked, Measured { reached, certified, radii, f32_distance })))
+    Ok(Some(conclude(
+        context.model(),
+        settings,
+        asked,
+        Measured { reached, certified, radii, f32_distance },
+    )))
 }
 
 /// What `stored` says as its own counts and `settings` give it.
 pub(super) fn derived(
+    model: &Model,
     settings: &Settings,
     stored: Option<&DeterministicRecord>,
 ) -> Option<DeterministicRecord> {
     let (asked, stored) = (settings.deterministic.as_ref()?, stored?.clone());
     let DeterministicRecord { reached, certified, radii, f32_distance, .. } = stored;
-    Some(conclude(settings, asked, Measured { reached, certified, radii, f32_distance }))
+    Some(conclude(model, settings, asked, Measured { reached, certified, radii, f32_distance }))
 }
 
 /// Certified radii around `states`; none where `settings` ask for no deterministic certificate.
@@ -171,6 +177,7 @@ fn distance(context: Context<'_>, certificate: &Deterministic<'_>, start: &[f32]
 
 /// The record that the counts support.
 fn conclude(
+    model: &Model,
     settings: &Settings,
     asked: &DeterministicSettings,
     measured: Measured,
@@ -192,12 +199,13 @@ fn conclude(
         f32_distance,
     };
     debug_assert_eq!(settings.deterministic.as_ref(), Some(asked));
-    record.statement = statement(&record);
+    let deed = model.task.short_words(Form::One, settings.spec.horizon);
+    record.statement = statement(&record, &deed);
     record
 }
 
-/// The certificate in words.
-fn statement(record: &DeterministicRecord) -> String {
+/// The certificate in words; `deed` is what a rollout does.
+fn statement(record: &DeterministicRecord, deed: &str) -> String {
     let DeterministicRecord { certified, starts, radius, beta, .. } = record;
     let driven = match record.control {
         PairControl::Replay => "under the controls of the nominal start",
@@ -205,7 +213,7 @@ fn statement(record: &DeterministicRecord) -> String {
     };
     let [low, high] = record.share_interval;
     format!(
-        "Every start within {radius} of a start that is certified by {} reaches the target safely {driven}: \
+        "Every start within {radius} of a start that is certified by {} {deed} {driven}: \
          no risk and no confidence, in real arithmetic with the f32 parameters of model and policy. With \
          confidence {}, this certifies between {} % and {} % of the box \
          ({certified} of {starts} starts). f32 rollouts were at most {} away from the enclosure.",

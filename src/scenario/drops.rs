@@ -245,9 +245,13 @@ fn claim(model: &Model, settings: &Settings, asked: &DropSettings) -> Result<Cla
         0 => String::new(),
         _ => format!(" ({discards} of {scenarios} pairs discarded)"),
     };
+    let fails = match model.task.is_plain() {
+        true => "violates the constraint",
+        false => "fails its task",
+    };
     let statement = format!(
         "With confidence {}, the margins of a fresh pair drop by at most lambda times the \
-         pilot's shapes, at all steps before the nominal rollout violates the constraint, with \
+         pilot's shapes, at all steps before the nominal rollout {fails}, with \
          probability at least {}{discarded}: the chance that a nominal start of the box is certified at \
          lambda and its perturbed rollout fails is at most {epsilon}.",
         confidence(beta),

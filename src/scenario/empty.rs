@@ -3,7 +3,7 @@
 use super::drops_record::{DropsRecord, WidestRecord};
 use super::record::{DeviationRecord, PictureRecord, Record};
 use super::tightened::tightening;
-use crate::model::Model;
+use crate::model::{Form, Model, Role};
 use crate::rollout::{HUGE, PairControl, RolloutSpec};
 use crate::rounding::{number, upper};
 
@@ -21,10 +21,17 @@ pub(super) fn reasons(model: &Model, record: &Record, spec: &RolloutSpec) -> Vec
         Some(drops) => level(drops),
         None => distances(deviation),
     }];
-    reasons.extend(least_lost("target", &seen.target, &losses.target));
-    reasons.extend(least_lost("constraint", &seen.constraint, &losses.constraint));
+    let sees = |sees: fn(Role) -> bool| {
+        let roles = model.task.roles(spec.horizon);
+        roles.into_iter().map(sees).collect::<Vec<bool>>()
+    };
+    let target = least_lost("target", &seen.target, &losses.target, &sees(Role::sees_target));
+    let constraint = sees(Role::sees_constraint);
+    let constraint = least_lost("constraint", &seen.constraint, &losses.constraint, &constraint);
+    reasons.extend(target);
+    reasons.extend(constraint);
     reasons.extend(if drops.is_none() { set_by(deviation) } else { None });
-    reasons.push(remedies(deviation, &seen));
+    reasons.push(remedies(deviation, &seen, &model.task.short_words(Form::One, spec.horizon)));
     reasons
 }
 
@@ -34,7 +41,7 @@ struct Seen {
     target: Vec<f64>,
     /// Of the constraint.
     constraint: Vec<f64>,
-    /// Whether any of them reaches the target safely.
+    /// Whether any of them succeeds.
     success: bool,
     /// How many there are.
     count: usize,
@@ -92,10 +99,10 @@ fn distances(deviation: &DeviationRecord) -> String {
     )
 }
 
-/// The step at which the bound leaves most of a margin, where that is nothing.
-fn least_lost(name: &str, margins: &[f64], losses: &[f32]) -> Option<String> {
+/// The step among those at which a margin counts where the bound leaves most of it, if that is nothing.
+fn least_lost(name: &str, margins: &[f64], losses: &[f32], counts: &[bool]) -> Option<String> {
     let left = |(margin, loss): (&f64, &f32)| margin - f64::from(*loss);
-    let steps = margins.iter().zip(losses).enumerate();
+    let steps = margins.iter().zip(losses).enumerate().filter(|(step, _)| counts[*step]);
     let (step, (margin, loss)) = steps.max_by(|a, b| left(a.1).total_cmp(&left(b.1)))?;
     (left((margin, loss)) <= 0.0).then(|| {
         format!(
@@ -122,11 +129,11 @@ fn set_by(deviation: &DeviationRecord) -> Option<String> {
     ))
 }
 
-/// What may help.
-fn remedies(deviation: &DeviationRecord, seen: &Seen) -> String {
+/// What may help; `deed` is what a rollout that succeeds does.
+fn remedies(deviation: &DeviationRecord, seen: &Seen, deed: &str) -> String {
     if !seen.success && seen.count > 0 {
         return format!(
-            "None of the {} pictured rollouts reaches the target safely: it is the policy, the horizon or \
+            "None of the {} pictured rollouts {deed}: it is the policy, the horizon or \
              the box that falls short, not the bound.",
             seen.count
         );

@@ -4,11 +4,11 @@ use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::model::Model;
 
-/// Refuses settings whose lists have another length than `model` has states, or that name a state
-/// which it has not.
+/// Refuses settings whose lists have another length than `model` has states, that name a state which it has
+/// not, or whose horizon ends before a time of its task.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the setting, with both figures.
+/// [`Error::Invalid`] naming the setting or the key of the task, with both figures.
 pub(crate) fn check_sizes(settings: &Settings, model: &Model) -> Result<()> {
     let Settings { state, low, high, growth, slice, .. } = settings;
     let (name, states) = (&model.name, model.states.len());
@@ -22,7 +22,7 @@ pub(crate) fn check_sizes(settings: &Settings, model: &Model) -> Result<()> {
     let across = slice.iter().flatten().map(|axis| ("slice", axis.state));
     let ahead = growth.heading.iter().flatten().map(|state| ("growth.heading", *state));
     match across.chain(ahead).find(|(_, state)| *state >= states) {
-        None => Ok(()),
+        None => model.task.check(settings.spec.horizon),
         Some((place, state)) => {
             let last = states.saturating_sub(1);
             let problem = format!("no state number {state}; `{name}` has the states 0 to {last}");

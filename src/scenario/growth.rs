@@ -13,7 +13,7 @@ use super::record::{Claim, GrowthOutcome, GrowthRecord, RoundRecord, SampleRecor
 use super::settings::{GrowthSettings, Settings};
 use super::spacing::is_fine;
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Form, Model};
 use crate::rollout::Ball;
 use crate::rounding::{complement, confidence, lower};
 
@@ -295,10 +295,9 @@ fn claim(model: &Model, settings: &Settings, record: &GrowthRecord) -> Result<Cl
     Ok(Claim {
         name: "growth".to_owned(),
         statement: format!(
-            "With confidence {}, a start drawn from the verified {set} reaches the target safely \
-             within {} steps with probability at least {}{}.",
+            "With confidence {}, a start drawn from the verified {set} {} with probability at least {}{}.",
             confidence(asked.beta),
-            settings.spec.horizon,
+            model.task.words(Form::One, settings.spec.horizon),
             complement(asked.epsilon),
             spent_words(asked, allowed)
         ),

@@ -58,5 +58,6 @@ pub(super) fn system_record(model: &Model, settings: &Settings) -> SystemRecord 
         states,
         controls: model.controls.clone(),
         bodies: model.bodies.clone(),
+        task: model.task,
     }
 }

@@ -15,6 +15,7 @@ pub use super::growth_plan::{Around, UpwardRecord};
 pub use super::sequential_record::SequentialRecord;
 use super::settings::{BoundarySearch, DeviationSource, Joint};
 use crate::backend::Event;
+use crate::model::Task;
 use crate::rollout::PairControl;
 pub(crate) use crate::rounding::as_written as decimal;
 use crate::system::{Axis, Body};
@@ -163,6 +164,9 @@ pub struct SystemRecord {
     pub controls: Vec<Axis>,
     /// What a picture shows.
     pub bodies: Vec<Body>,
+    /// What a rollout has to do; nothing is said of reach-avoid without a window.
+    #[serde(default, skip_serializing_if = "Task::is_plain")]
+    pub task: Task,
 }
 
 /// The deviation bound, `docs/method.md` section 3.

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::growth_set::Family;
 use super::record::{GrowthOutcome, GrowthRecord};
+use crate::model::Task;
 use crate::rollout::Region;
 
 /// Who controls at a state, section 6 of `docs/method.md` and Algorithm 2; a file has its number.
@@ -33,8 +34,9 @@ impl From<Tier> for u8 {
     }
 }
 
-/// Tier of a state.
+/// Tier of a state; a target counts where to be in it at once is enough for `task`.
 pub(super) fn tier(
+    task: &Task,
     target_margin: f64,
     check_margin: f64,
     growth: &GrowthRecord,
@@ -42,7 +44,7 @@ pub(super) fn tier(
 ) -> Tier {
     let local = || verified_set(growth, x.len()).is_some_and(|set| set.contains(x));
     match () {
-        () if target_margin > 0.0 => Tier::Target,
+        () if task.is_reached_at_once() && target_margin > 0.0 => Tier::Target,
         () if check_margin > 0.0 => Tier::Global,
         () if local() => Tier::Local,
         () => Tier::Recovery,

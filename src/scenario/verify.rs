@@ -143,7 +143,7 @@ pub fn query(
     let row = |(x, (check_margin, beside)): (&[f32], (f32, Beside))| {
         let target_margin = finite_margin(plant.model.target_at(x, 0));
         let check = f64::from(check_margin);
-        let tier = tier(f64::from(target_margin), check, &record.growth, x);
+        let tier = tier(&plant.model.task, f64::from(target_margin), check, &record.growth, x);
         QueryRow { tier, check_margin, target_margin, beside }
     };
     Ok(states.iter().zip(margins.into_iter().zip(beside)).map(row).collect())

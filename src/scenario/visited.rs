@@ -26,7 +26,7 @@ pub(super) fn visited(context: Context<'_>, settings: &Settings) -> Result<Visit
     let (plant, horizon) = (context.plant(), settings.spec.horizon);
     let of = |group: &PairGroup| {
         let mut hull = Hull::of_starts(settings);
-        for (pair, steps) in group.safe_steps(&plant.model).into_iter().enumerate() {
+        for (pair, steps) in group.open_steps(&plant.model).into_iter().enumerate() {
             for step in 0..steps {
                 group.states(pair, step).iter().for_each(|x| hull.add(x));
             }

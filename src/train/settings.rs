@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::adam::Optimiser;
 use crate::error::{Error, Result};
+use crate::model::Task;
 
 /// Most rows of a batch, neurons of a layer and layers: more is a slip, and a software adapter cuts
 /// sums over twice as many short, without a word.
@@ -65,6 +66,22 @@ impl Method {
             Self::Ddpg => "ddpg",
             Self::Ppo => "ppo",
         }
+    }
+
+    /// Refuses a method that knows the backup or the reward of reach-avoid alone for another task.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the method, the task, and the methods that know every task.
+    pub fn check_task(self, task: &Task) -> Result<()> {
+        if task.is_plain() || matches!(self, Self::Analytic | Self::Value) {
+            return Ok(());
+        }
+        let (name, kinds) = (self.name(), "`analytic` and `value`");
+        let problem = format!(
+            "`{name}` learns the task `reach-avoid` without a window alone, this one is `{task}`; \
+             {kinds} learn any"
+        );
+        Err(Error::invalid("train.method", problem))
     }
 }
 

@@ -4,7 +4,7 @@ use super::tape::Tape;
 use crate::formula::{Expr, record};
 use crate::model::Model;
 use crate::real::Real;
-use crate::rollout::{RolloutSpec, Tightening, reach_avoid};
+use crate::rollout::{RolloutSpec, Tightening, measure_as};
 
 /// The step: states, controls and the number of the step to the next states.
 pub fn step_tape(model: &Model) -> Tape {
@@ -29,7 +29,8 @@ pub fn measure_tape(model: &Model, spec: &RolloutSpec, tightening: Option<&Tight
             .map(|(step, x)| (model.target_at(x, step), model.constraint_at(x, step)))
             .collect();
         let gamma = Real::lit(spec.gamma);
-        let mut measures = vec![reach_avoid(margins.iter().copied(), gamma)];
+        let roles = || model.task.roles(spec.horizon);
+        let mut measures = vec![measure_as(roles(), margins.iter().copied(), gamma)];
         measures.extend(tightening.map(|tightening| {
             let tightened = margins.iter().enumerate().map(|(t, &(target, constraint))| {
                 let tightened = |margin, by: &[f32]| margin - Expr::lit(by[t]);
@@ -38,7 +39,7 @@ pub fn measure_tape(model: &Model, spec: &RolloutSpec, tightening: Option<&Tight
                     tightened(constraint, &tightening.constraint),
                 )
             });
-            reach_avoid(tightened, gamma)
+            measure_as(roles(), tightened, gamma)
         }));
         measures
     }))

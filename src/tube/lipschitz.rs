@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Fold, Nominal, Tube};
-use crate::model::Plant;
+use crate::model::{Plant, Role};
 use crate::real::bound::{Bound, Domain, Enclosure, Interval, enclose};
 use crate::rollout::PairControl;
 
@@ -11,7 +11,7 @@ use crate::rollout::PairControl;
 const SINGULAR_VALUE: f64 = 1.0 / (1_u64 << 40) as f64;
 
 impl Tube<'_> {
-    /// A number that the reach-avoid measure is nowhere below over the ball, by the published form: the distance
+    /// A number that the measure is nowhere below over the ball, by the published form: the distance
     /// from the nominal at step t is at most `radius` times the product of the steps' Lipschitz constants
     /// (`L^t` of a linear plant), and a margin loses its own constant times that. Each constant holds over a box
     /// around the nominal state that the distance cannot leave.
@@ -29,9 +29,20 @@ impl Tube<'_> {
                 (Interval::point(low.max(f64::MIN)) - product(slope, distance)).low
             };
             let [target, constraint] = self.slopes(&around, step);
-            fold.constrain(lost(self.constraint.below(set, step), constraint));
-            fold.reach(lost(self.target.below(set, step), target));
-            if fold.safe <= fold.best || step == self.spec.horizon {
+            let role = self.plant.model.task.role(step, self.spec.horizon);
+            if role.sees_constraint() {
+                fold.hold(lost(self.constraint.below(set, step), constraint));
+            }
+            if role.sees_target() {
+                let low = self.target.below(set, step);
+                // What may be no number fails the rollout from here on; and so may what has no constant.
+                if low == f64::NEG_INFINITY || target == f64::INFINITY {
+                    break;
+                }
+                fold.target(role, lost(low, target));
+            }
+            fold.end_step(role);
+            if fold.safe <= fold.best || step == self.spec.horizon || role == Role::OVER {
                 break;
             }
             distance = product(self.growth(nominal, &around, step), distance).high;

@@ -14,7 +14,7 @@ mod margin;
 mod piece;
 mod state;
 
-use crate::model::Plant;
+use crate::model::{Plant, Role};
 use crate::real::bound::Interval;
 use crate::rollout::{HUGE, PairControl, RolloutSpec};
 use affine::Affine;
@@ -118,10 +118,9 @@ impl<'a> Tube<'a> {
         self.sets(nominal, radius).map(|set| ranges(&set)).collect()
     }
 
-    /// A number that the reach-avoid measure is nowhere below over the ball of `radius` around the start of
-    /// `nominal`: max over t of `min(gamma^t r_t, min over s <= t of gamma^s c_s)` of the lower bounds of both
-    /// margins over the tube. Positive: every trajectory reaches the target, at one common step, and is safe
-    /// until then.
+    /// A number that the measure is nowhere below over the ball of `radius` around the start of `nominal`: the
+    /// measure of the lower bounds of both margins over the tube. Positive: every trajectory does the task; where
+    /// it may choose when to be in the target, at one common step.
     pub fn measure(&self, nominal: &Nominal, radius: f64) -> f64 {
         self.fold(nominal, radius, |fold| fold.safe <= fold.best)
     }
@@ -136,12 +135,21 @@ impl<'a> Tube<'a> {
         let mut fold = Fold::new(self.spec.gamma);
         for (step, set) in self.sets(nominal, radius).enumerate() {
             let step = step as u32;
-            fold.constrain(self.constraint.below(&set, step));
-            // Where the constraint decides, the target changes nothing.
-            if !decided(&fold) {
-                fold.reach(self.target.below(&set, step));
+            let role = self.plant.model.task.role(step, self.spec.horizon);
+            if role.sees_constraint() {
+                fold.hold(self.constraint.below(&set, step));
             }
-            if decided(&fold) {
+            // Where the constraint decides, the target changes nothing.
+            if role.sees_target() && !decided(&fold) {
+                let target = self.target.below(&set, step);
+                // What may be no number fails the rollout from here on.
+                if target == f64::NEG_INFINITY {
+                    break;
+                }
+                fold.target(role, target);
+            }
+            fold.end_step(role);
+            if decided(&fold) || role == Role::OVER {
                 break;
             }
         }
@@ -169,12 +177,26 @@ impl Fold {
         (self.discount * Interval::point(margin.max(-huge).min(huge))).low
     }
 
-    fn constrain(&mut self, margin: f64) {
+    /// A margin of this step that has to hold.
+    fn hold(&mut self, margin: f64) {
         self.safe = self.safe.min(self.discounted(margin));
     }
 
-    fn reach(&mut self, margin: f64) {
-        self.best = self.best.max(self.safe.min(self.discounted(margin)));
+    /// The target margin of this step, as the task sees it.
+    fn target(&mut self, role: Role, margin: f64) {
+        if role.has(Role::REQUIREMENT) {
+            self.hold(margin);
+        }
+        if role.has(Role::CHANCE) {
+            self.best = self.best.max(self.safe.min(self.discounted(margin)));
+        }
+    }
+
+    /// Ends this step.
+    fn end_step(&mut self, role: Role) {
+        if role.has(Role::CONCLUSION) {
+            self.best = self.best.max(self.safe);
+        }
         self.discount = self.discount * self.gamma;
     }
 }

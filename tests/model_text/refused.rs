@@ -189,17 +189,52 @@ fn what_does_not_work_yet_is_refused_by_name() {
         let place = format!("model.{section}: ");
         assert_refused("[model.time]", &text, &[&place, "not work yet; leave the section out"]);
     }
-    for kind in ["avoid", "reach", "reach-stay", "at-end"] {
-        let parts = ["model.task.kind", &format!("\"{kind}\" do not work yet")];
-        assert_refused("\"reach-avoid\"", &format!("\"{kind}\""), &parts);
-    }
-    for key in ["by", "from", "to", "between"] {
-        let text = format!("{key} = 3\nkind");
-        assert_refused("kind", &text, &[&format!("model.task.{key}"), "does not work yet"]);
-    }
+    assert_refused("kind", "between = 3\nkind", &["model.task.between", "does not work yet"]);
     for text in ["size = 0.2", "joined = \"cart\""] {
         assert_refused("cart = {", &format!("cart = {{ {text}, "), &["do not show this yet"]);
     }
+}
+
+#[test]
+fn a_task_has_the_margins_and_times_of_its_kind_alone() {
+    let unused = |kind: &str, key: &str, line: &str| {
+        let place = format!("model.task.{key}: a task of the kind \"{kind}\" has no use for it");
+        let task = format!("{line}kind = \"{kind}\"");
+        assert_refused("kind = \"reach-avoid\"", &task, &[&place]);
+    };
+    unused("avoid", "target", "");
+    unused("reach", "constraint", "");
+    unused("reach-stay", "from", "from = 3\n");
+    unused("at-end", "by", "by = 3\n");
+    unused("reach-avoid", "by", "by = 3\n");
+    let cart = cart_with("target = \"0.1 - abs(x)\"", "");
+    let missing = refusal(&cart.replacen("\"reach-avoid\"", "\"reach-stay\"", 1));
+    assert!(missing.contains("model.task.target: missing; expected a margin"), "{missing}");
+}
+
+/// The period of the cart is 0.1 s.
+#[test]
+fn times_of_a_task_are_steps_or_seconds() {
+    let refused = |time: &str, parts: &[&str]| {
+        assert_refused(
+            "kind",
+            &format!("to = {time}\nkind"),
+            &[&["model.task.to"], parts].concat(),
+        );
+    };
+    refused("-1", &["-1; expected a number of steps, or seconds as text, \"1.5 s\""]);
+    refused("1.5", &["expected a number of steps", "found the number 1.5"]);
+    refused("\"1.5\"", &["expected a number of steps", "found the text \"1.5\""]);
+    refused("\"15 ms\"", &["expected a number of steps", "found the text \"15 ms\""]);
+    refused("\"-0.1 s\"", &["-0.1 s; expected a number of steps"]);
+    refused("\"0.25 s\"", &["0.25 s is no multiple of the period, 0.1 s"]);
+    refused("\"inf s\"", &["no multiple of the period"]);
+    refused("\"1e12 s\"", &["expected a number of steps"]);
+    let seconds = |time: &str| {
+        let text = cart_with("kind", &format!("to = {time}\nkind"));
+        described(&text).expect("a text").model().expect("a model").task.last(1000)
+    };
+    assert_eq!(["\"0.3 s\"", "\"99.9s\"", "\"0 s\"", "7"].map(seconds), [3, 999, 0, 7]);
 }
 
 #[test]

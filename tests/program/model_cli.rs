@@ -317,7 +317,7 @@ fn what_does_not_work_is_refused_by_name() {
     refused(&["race", &config, "--out", &folder.path("race")], &["drone-race"]);
     for (from, to, words) in [
         ("level = \"inflow", "level = \"inflo", ["leak.toml:9", "inflow"]),
-        ("kind = \"reach-avoid\"", "kind = \"avoid\"", ["model.task.kind", "avoid"]),
+        ("kind = \"reach-avoid\"", "kind = \"avoid\"", ["model.task.target", "has no use for it"]),
         ("[model.task]", "[model.noise]\n[model.task]", ["model.noise", "noise does not work yet"]),
         // What shows once the plant is built, or its settings are used, has its line too.
         ("\"rk4\"", "\"rk4\"\nsubsteps = 100000", ["leak.toml:13: model.time.substeps", "at most"]),

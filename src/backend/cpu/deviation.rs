@@ -3,7 +3,8 @@
 use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::load::Loader;
-use super::tile::{Loss, Score, TilePlant, TileRunner, is_finite, lanes};
+use super::rule::{Roles, Rule};
+use super::tile::{Score, TilePlant, TileRunner, is_finite, lanes};
 use crate::real::simd::Body;
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure};
@@ -15,6 +16,8 @@ pub(super) struct Deviation<'a> {
     pub(super) plant: TilePlant<'a>,
     /// The task.
     pub(super) task: &'a DeviationTask<'a>,
+    /// What each step is to the plant's task.
+    pub(super) roles: &'a Roles,
     /// Most pairs in lockstep.
     pub(super) width: usize,
     /// Index of the first pair.
@@ -28,7 +31,7 @@ impl Unit for Deviation<'_> {
     type Output = Vec<Farthest>;
 
     fn run<K: Kernel, const N: usize>(self, kernel: K) -> Vec<Farthest> {
-        let Self { task, width, .. } = self;
+        let Self { task, roles, width, .. } = self;
         let mut runner = TileRunner::new(self.plant, kernel, width);
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut pairs = Pairs::<K, N>::new(&runner, width);
@@ -39,12 +42,25 @@ impl Unit for Deviation<'_> {
                 if t > 0 {
                     pairs.step(&mut runner, task.control);
                 }
-                pairs.judge(&runner, task, t, farthest);
+                let steps = [t as u32; N];
+                let rule = Rule::at(task.tightening, roles, &steps);
+                let step = Step { t, rule, gamma: task.spec.gamma };
+                pairs.judge(&runner, step, farthest);
             }
             pairs.write(out);
         }
         farthest
     }
+}
+
+/// A step of the rollouts.
+struct Step<'a, const N: usize> {
+    /// Its number.
+    t: usize,
+    /// How the margins of the nominal rollouts count.
+    rule: Rule<'a, N>,
+    /// Discount.
+    gamma: f32,
 }
 
 /// A tile of pairs.
@@ -91,20 +107,19 @@ impl<K: Kernel, const N: usize> Pairs<K, N> {
         runner.step(&mut self.perturbed, self.count);
     }
 
-    /// Adds the states of step `t` to the scores, and their distances to the farthest.
+    /// Adds the states of a step to the scores, and their distances to the farthest.
     fn judge(
         &mut self,
         runner: &TileRunner<'_, K>,
-        task: &DeviationTask<'_>,
-        t: usize,
+        Step { t, rule, gamma }: Step<'_, N>,
         farthest: &mut Farthest,
     ) {
-        let losses = [Loss::at(task.tightening, t), Loss::NONE];
+        let rules = [rule, rule.without_loss()];
         let frames = [&mut self.nominal, &mut self.perturbed];
-        for ((frame, scores), loss) in frames.into_iter().zip(&mut self.scores).zip(losses) {
+        for ((frame, scores), rule) in frames.into_iter().zip(&mut self.scores).zip(rules) {
             runner.at_step(frame, t);
-            let scores = scores.iter_mut().map(|score| (score, loss));
-            runner.judge(frame, self.count, task.spec.gamma, scores);
+            let scores = scores.iter_mut().map(|score| (score, rule));
+            runner.judge(frame, self.count, gamma, scores);
         }
         for at in (0..self.count).step_by(N) {
             let live = N.min(self.count - at);

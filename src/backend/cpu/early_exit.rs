@@ -5,7 +5,8 @@ use super::dispatch::Unit;
 use super::kernel::Kernel;
 use super::load::Loader;
 use super::reach_avoid::{ReachAvoid, measures};
-use super::tile::{Loss, Score, TileRunner};
+use super::rule::{Roles, Rule};
+use super::tile::{Score, TileRunner};
 use crate::real::per_lane;
 use crate::rollout::{NON_FINITE, Query, ReachAvoidTask};
 use crate::tile::Frame;
@@ -47,8 +48,21 @@ pub(super) fn signs<K: Kernel, const N: usize>(
         runner.decide(&mut frame, live);
         runner.step(&mut frame, live);
         groups.iter_mut().for_each(|group| group.tick(unit.task.spec.horizon));
-        judge(&runner, &mut frame, &mut groups, live, unit.task);
+        judge(&runner, &mut frame, &mut groups, live, Asked::of(&unit));
         live = retire(&mut frame, &mut groups, live, unit.out);
+    }
+}
+
+/// What states are judged by.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    task: &'a ReachAvoidTask<'a>,
+    roles: &'a Roles,
+}
+
+impl<'a> Asked<'a> {
+    fn of(unit: &ReachAvoid<'a>) -> Self {
+        Self { task: unit.task, roles: unit.roles }
     }
 }
 
@@ -58,12 +72,12 @@ fn judge<K: Kernel, const N: usize>(
     frame: &mut Frame,
     groups: &mut [Group<N>],
     live: usize,
-    task: &ReachAvoidTask<'_>,
+    Asked { task, roles }: Asked<'_>,
 ) {
     runner.at_steps(frame, groups.iter().flat_map(|group| group.step));
     let scores = groups.iter_mut().map(|group| {
-        let loss = Loss::at_each(task.tightening, &group.step);
-        (&mut group.score, loss)
+        let Group { score, step, .. } = group;
+        (score, Rule::at_each(task.tightening, roles, step))
     });
     runner.judge(frame, live, task.spec.gamma, scores);
     groups.iter_mut().take(live.div_ceil(N)).for_each(|group| group.decide(task.spec.horizon));
@@ -152,7 +166,7 @@ fn retire<const N: usize>(
 
 /// The next starts, judged at their first state: many are decided before any step.
 struct Queue<'a, K, const N: usize> {
-    task: &'a ReachAvoidTask<'a>,
+    asked: Asked<'a>,
     first: u64,
     count: usize,
     /// Starts loaded so far.
@@ -168,7 +182,7 @@ impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
     fn new(unit: &ReachAvoid<'a>, runner: &TileRunner<'_, K>) -> Self {
         let frame = runner.frame_of(N);
         Self {
-            task: unit.task,
+            asked: Asked::of(unit),
             first: unit.first,
             count: unit.out.len(),
             loaded: 0,
@@ -187,11 +201,11 @@ impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
             }
             let live = N.min(self.count - self.loaded);
             let first = self.first + self.loaded as u64;
-            self.loader.starts(&self.task.starts, first, live, &mut self.frame);
+            self.loader.starts(&self.asked.task.starts, first, live, &mut self.frame);
             self.group = Group::new();
             self.group.place = per_lane!(N, i => (self.loaded + i) as u32);
             let group = std::slice::from_mut(&mut self.group);
-            judge(runner, &mut self.frame, group, live, self.task);
+            judge(runner, &mut self.frame, group, live, self.asked);
             self.loaded += live;
             self.waiting = retire(&mut self.frame, group, live, out);
         }

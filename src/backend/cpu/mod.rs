@@ -18,6 +18,7 @@ mod packs;
 mod planning;
 mod prepared;
 mod reach_avoid;
+mod rule;
 mod schedule;
 mod spread;
 #[cfg(test)]
@@ -34,6 +35,7 @@ use self::packs::Packs;
 pub(super) use self::planning::PreparedPlanning;
 pub(super) use self::prepared::Prepared;
 use self::reach_avoid::ReachAvoid;
+use self::rule::Roles;
 use self::schedule::{Schedule, chunks};
 use self::spread::spread;
 use self::tile::TilePlant;
@@ -135,6 +137,7 @@ impl Cpu {
         task: &ReachAvoidTask<'_>,
         sink: MeasureSink<'_>,
     ) -> Result<()> {
+        let roles = &Roles::of(plant.task, &task.spec);
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
             let schedule = self.schedule(chunk.count, plant.widest());
@@ -142,7 +145,7 @@ impl Cpu {
             spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
                 let first = chunk.first + (unit * schedule.unit) as u64;
                 let width = schedule.width;
-                run(self.instructions, ReachAvoid { plant, task, width, first, out });
+                run(self.instructions, ReachAvoid { plant, task, roles, width, first, out });
             });
             sink(chunk.first, &measures)?;
         }
@@ -156,6 +159,7 @@ impl Cpu {
         task: &DeviationTask<'_>,
         sink: PairSink<'_>,
     ) -> Result<Vec<Farthest>> {
+        let roles = &Roles::of(plant.task, &task.spec);
         let mut farthest = vec![Farthest::NONE; task.spec.horizon as usize + 1];
         let mut measures = Vec::new();
         for chunk in chunks(&task.range) {
@@ -164,7 +168,7 @@ impl Cpu {
             let found = spread(&self.pool, measures.chunks_mut(schedule.unit), |unit, out| {
                 let first = chunk.first + (unit * schedule.unit) as u64;
                 let width = schedule.width;
-                run(self.instructions, Deviation { plant, task, width, first, out })
+                run(self.instructions, Deviation { plant, task, roles, width, first, out })
             });
             found.iter().for_each(|found| Farthest::merge_steps(&mut farthest, found));
             sink(chunk.first, &measures)?;

@@ -10,7 +10,7 @@ use super::tile::{Around, TileLaw, TilePlant};
 use crate::backend::{MeasureSink, PairSink};
 use crate::error::Result;
 use crate::formula::Graph;
-use crate::model::{Law, Model, Plant};
+use crate::model::{Law, Model, Plant, Task};
 use crate::policy::Mlp;
 use crate::rollout::{DeviationTask, Farthest, ReachAvoidTask};
 use crate::tile::{Clock, Layout, NativeFormula, NativeSystem};
@@ -19,6 +19,7 @@ use crate::tile::{Clock, Layout, NativeFormula, NativeSystem};
 #[derive(Debug)]
 pub(in crate::backend) struct Prepared {
     system: Arc<dyn NativeSystem>,
+    task: Task,
     law: PreparedLaw,
     layout: Layout,
     clock: Clock,
@@ -70,7 +71,7 @@ impl Cpu {
             }
         };
         let system = needs.system();
-        Ok(Prepared { system, law, layout: needs.layout, clock: needs.clock })
+        Ok(Prepared { system, task: model.task, law, layout: needs.layout, clock: needs.clock })
     }
 }
 
@@ -175,6 +176,7 @@ impl Prepared {
         };
         TilePlant {
             system: &*self.system,
+            task: self.task,
             law,
             layout: self.layout,
             clock: self.clock,

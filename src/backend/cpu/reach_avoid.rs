@@ -2,7 +2,8 @@
 
 use super::kernel::Kernel;
 use super::load::Loader;
-use super::tile::{Loss, Score, TilePlant, TileRunner};
+use super::rule::{Roles, Rule};
+use super::tile::{Score, TilePlant, TileRunner};
 use crate::rollout::ReachAvoidTask;
 
 /// Consecutive starts for one thread; twin: `shaders/reach_avoid.wgsl`.
@@ -11,6 +12,8 @@ pub(super) struct ReachAvoid<'a> {
     pub(super) plant: TilePlant<'a>,
     /// The task.
     pub(super) task: &'a ReachAvoidTask<'a>,
+    /// What each step is to the plant's task.
+    pub(super) roles: &'a Roles,
     /// Most trajectories in lockstep.
     pub(super) width: usize,
     /// Index of the first start.
@@ -38,8 +41,9 @@ pub(super) fn measures<K: Kernel, const N: usize>(
                 runner.step(&mut frame, count);
             }
             runner.at_step(&mut frame, t);
-            let loss = Loss::at(task.tightening, t);
-            let scores = scores.iter_mut().map(|score| (score, loss));
+            let steps = [t as u32; N];
+            let rule = Rule::at(task.tightening, unit.roles, &steps);
+            let scores = scores.iter_mut().map(|score| (score, rule));
             runner.judge(&mut frame, count, task.spec.gamma, scores);
         }
         for (out, score) in out.chunks_mut(N).zip(&scores) {

@@ -2,9 +2,11 @@
 
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
+use super::rule::Rule;
+use crate::model::{Role, Task};
 use crate::real::simd::{Body, Instructions};
 use crate::real::{Lanes, Real, per_lane};
-use crate::rollout::{Effect, Fold, HUGE, NON_FINITE, Tightening};
+use crate::rollout::{Fold, HUGE, NON_FINITE};
 use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem};
 
 /// Exponent bits of an f32: all set for infinities and NaN.
@@ -22,6 +24,8 @@ pub(super) fn is_finite(value: f32) -> bool {
 pub(super) struct TilePlant<'a> {
     /// Dynamics and margins.
     pub(super) system: &'a dyn NativeSystem,
+    /// What its rollouts have to do.
+    pub(super) task: Task,
     /// The controls.
     pub(super) law: TileLaw<'a>,
     /// Rows of a frame.
@@ -152,17 +156,18 @@ impl<'a, K: Kernel> TileRunner<'a, K> {
         }
     }
 
-    /// Adds the first `lanes` states to the scores of their groups, whose margins lose `loss`.
+    /// Adds the first `lanes` states to the scores of their groups, each by its rule.
     pub(super) fn judge<'s, const N: usize>(
         &self,
         frame: &mut Frame,
         lanes: usize,
         gamma: f32,
-        scores: impl Iterator<Item = (&'s mut Score<N>, Loss<N>)>,
+        scores: impl Iterator<Item = (&'s mut Score<N>, Rule<'s, N>)>,
     ) {
         self.plant.system.margins(self.plant.with, frame, lanes);
         let scores = scores.take(lanes.div_ceil(N));
-        self.kernel.call(Judge { frame, scores, gamma });
+        let steps = if self.plant.task.is_plain() { Steps::Alike } else { Steps::Differ };
+        self.kernel.call(Judge { frame, scores, gamma, steps });
     }
 
     /// The kernel, for other bodies.
@@ -179,35 +184,52 @@ pub(super) fn lanes<const N: usize>(frame: &Frame, row: usize, at: usize) -> Lan
     Lanes(lanes)
 }
 
+/// Whether what a step is to the task differs from step to step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Steps {
+    /// All are those of a reach-avoid task without a window, which needs no masks.
+    Alike,
+    /// Each has a role of its own.
+    Differ,
+}
+
 /// The margins of the groups of a tile, folded: one body for all of them.
 struct Judge<'a, I> {
     frame: &'a Frame,
-    /// The score of each group, and what its margins lose.
+    /// The score of each group, and how its margins count.
     scores: I,
     gamma: f32,
+    steps: Steps,
 }
 
 impl<'s, I, const N: usize> Body for Judge<'_, I>
 where
-    I: Iterator<Item = (&'s mut Score<N>, Loss<N>)>,
+    I: Iterator<Item = (&'s mut Score<N>, Rule<'s, N>)>,
 {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { frame, scores, gamma } = self;
+        let Self { frame, scores, gamma, steps } = self;
         let (states, [target_row, constraint_row]) = (frame.states().len(), frame.margins());
-        for (group, (score, loss)) in scores.enumerate() {
+        for (group, (score, rule)) in scores.enumerate() {
             let at = group * N;
-            // Infinite margins are satisfied or violated, only a NaN fails the rollout.
-            let rows = [target_row, constraint_row];
-            let [target, constraint] = loss.act(rows.map(|row| lanes(frame, row, at)));
-            let [target, constraint] = [bounded(target), bounded(constraint)];
+            // Infinite margins are satisfied or violated, only a NaN fails the rollout. Nothing is mapped here:
+            // what a closure returns goes through memory.
+            let rows = [lanes(frame, target_row, at), lanes(frame, constraint_row, at)];
+            let [target, constraint] = rule.act(rows);
+            let [mut target, mut constraint] = [bounded(target), bounded(constraint)];
+            if steps == Steps::Differ {
+                [target, constraint] = rule.seen(target, constraint);
+            }
             let mut largest = with_largest(with_largest([0; N], target), constraint);
             for row in 0..states {
                 largest = with_largest(largest, lanes(frame, row, at));
             }
-            score.add(target, constraint, largest, gamma);
+            match steps {
+                Steps::Alike => score.add(target, constraint, largest, gamma),
+                Steps::Differ => score.add_as(&rule.roles(), [target, constraint], largest, gamma),
+            }
         }
     }
 }
@@ -227,48 +249,7 @@ fn with_largest<const N: usize>(largest: [u32; N], values: Lanes<N>) -> [u32; N]
     per_lane!(N, i => values.0[i].abs().to_bits().max(largest[i]))
 }
 
-/// What both margins lose, per lane: off the target margin, off the constraint margin; or their factors.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Loss<const N: usize> {
-    numbers: [Lanes<N>; 2],
-    effect: Effect,
-}
-
-impl<const N: usize> Loss<N> {
-    /// Nothing.
-    pub(super) const NONE: Self =
-        Self { numbers: [Lanes([0.0; N]); 2], effect: Effect::Subtracted };
-
-    /// At step `t`, the same for all lanes.
-    #[inline(always)]
-    pub(super) fn at(tightening: &Tightening, t: usize) -> Self {
-        let (target, constraint) = (tightening.target[t], tightening.constraint[t]);
-        Self { numbers: [Lanes::lit(target), Lanes::lit(constraint)], effect: tightening.effect }
-    }
-
-    /// At a step of its own for each lane.
-    #[inline(always)]
-    pub(super) fn at_each(tightening: &Tightening, steps: &[u32; N]) -> Self {
-        let Tightening { target, constraint, effect } = tightening;
-        let numbers = [
-            Lanes(per_lane!(N, i => target[steps[i] as usize])),
-            Lanes(per_lane!(N, i => constraint[steps[i] as usize])),
-        ];
-        Self { numbers, effect: *effect }
-    }
-
-    /// The margins `[target, constraint]` with it taken off, or multiplied with it.
-    #[inline(always)]
-    fn act(&self, [target, constraint]: [Lanes<N>; 2]) -> [Lanes<N>; 2] {
-        let [of_target, of_constraint] = self.numbers;
-        match self.effect {
-            Effect::Subtracted => [target - of_target, constraint - of_constraint],
-            Effect::Multiplied => [target * of_target, constraint * of_constraint],
-        }
-    }
-}
-
-/// The reach-avoid measures of a group so far.
+/// The measures of a group so far.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Score<const N: usize> {
     fold: Fold<Lanes<N>>,
@@ -294,7 +275,22 @@ impl<const N: usize> Score<N> {
         self.fold.add(target, constraint, Lanes::lit(gamma));
     }
 
-    /// The measures; [`NON_FINITE`] where the rollout failed before it reached the target.
+    /// The same where steps differ in what they are to the task; once it is over, nothing fails.
+    #[inline(always)]
+    fn add_as(&mut self, roles: &[u32; N], margins: [Lanes<N>; 2], largest: [u32; N], gamma: f32) {
+        self.failed = per_lane!(N, i => {
+            self.failed[i] | (u32::from(largest[i] >= EXPONENT) & roles[i] & Role::LIVE.bits())
+        });
+        // Nothing holds any more where the rollout failed: no chance is left, and nothing concludes.
+        let roles = per_lane!(N, i => {
+            if self.failed[i] != 0 { Role::CONSTRAINT.bits() } else { roles[i] }
+        });
+        let [target, constraint] = margins;
+        let constraint = lost(&self.failed, constraint);
+        self.fold.add_each(&roles, target, constraint, gamma);
+    }
+
+    /// The measures; [`NON_FINITE`] where the rollout failed before it succeeded.
     #[inline(always)]
     pub(super) fn measure(&self) -> Lanes<N> {
         let measure = self.fold.measure().0;
@@ -307,7 +303,7 @@ impl<const N: usize> Score<N> {
         }))
     }
 
-    /// Not 0 where no later state can change the sign of the measure: reached, or unsafe.
+    /// Not 0 where no later state can change the sign of the measure: success, or what had to hold does not.
     #[inline(always)]
     pub(super) fn decided(&self) -> [u32; N] {
         let (measure, safe) = (self.fold.measure().0, self.fold.safe().0);

@@ -5,8 +5,13 @@ use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
 use super::upload::Upload;
+use crate::model::Task;
 use crate::rollout::{Effect, Region, RolloutSpec, Starts, Tightening};
 
+/// In the last number of a row of the schedule: its bit for margins with factors, and where the role of the
+/// step begins; twins in `shaders/judge.wgsl`.
+const MULTIPLIED: u32 = 1;
+const ROLE_SHIFT: u32 = 1;
 /// Bytes of a vector of 4 numbers.
 const VECTOR_BYTES: usize = 16;
 
@@ -67,17 +72,21 @@ impl Inputs {
         self.0.put(VALUES, 0, values);
     }
 
-    /// Sets the schedule, per step: discount, what both margins lose, and 1 where they are multiplied
-    /// with it instead. The discount is multiplied up step by step in f32, as the host's fold does.
-    pub(super) fn set_schedule(&mut self, spec: &RolloutSpec, tightening: &Tightening) {
+    /// Sets the schedule, per step: discount, what both margins lose, and a whole number of two parts:
+    /// whether they are multiplied with it instead, and what the step is to `task`. The discount is
+    /// multiplied up step by step in f32, as the host's fold does.
+    pub(super) fn set_schedule(&mut self, spec: &RolloutSpec, task: Task, tightening: &Tightening) {
         let losses = tightening.target.iter().zip(&tightening.constraint);
         let multiplied = match tightening.effect {
-            Effect::Subtracted => 0.0,
-            Effect::Multiplied => 1.0,
+            Effect::Subtracted => 0,
+            Effect::Multiplied => MULTIPLIED,
         };
         let mut discount = 1.0;
-        for (step, (&target, &constraint)) in losses.enumerate() {
-            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, multiplied]);
+        let roles = task.roles(spec.horizon).into_iter();
+        for (step, (role, (&target, &constraint))) in roles.zip(losses).enumerate() {
+            let marks = multiplied | (role.bits() << ROLE_SHIFT);
+            // Below 64: a whole number that f32 holds.
+            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, marks as f32]);
             discount *= spec.gamma;
         }
     }

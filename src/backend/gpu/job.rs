@@ -12,12 +12,14 @@ use super::source::Source;
 use super::workspace::{Shape, Workspace};
 use crate::backend::sink::Asked;
 use crate::error::Result;
+use crate::model::Task;
 use crate::rollout::{RolloutSpec, Starts, States, Tightening};
 
-/// What a call rolls out: a plant, and the values of its parameters.
+/// What a call rolls out: a plant, its task, and the values of its parameters.
 #[derive(Clone, Copy)]
 pub(super) struct Subject<'a> {
     pub(super) source: &'a Arc<Source>,
+    pub(super) task: Task,
     pub(super) values: &'a [f32],
 }
 
@@ -62,7 +64,7 @@ impl<'a> Job<'a> {
         let shape = Shape { work, asked, listed, horizon: spec.horizon, chunking };
         let mut space = program.take(&flight, shape)?;
         space.inputs.set_values(subject.values);
-        space.inputs.set_schedule(spec, tightening);
+        space.inputs.set_schedule(spec, subject.task, tightening);
         space.inputs.set_region(starts);
         Ok(Self { flight, chunking, space, opened, program })
     }

@@ -61,6 +61,6 @@ impl Prepared<'_> {
 
     /// What calls roll out.
     fn subject(&self) -> Subject<'_> {
-        Subject { source: &self.source, values: &self.values }
+        Subject { source: &self.source, task: self.plant.model.task, values: &self.values }
     }
 }

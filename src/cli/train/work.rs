@@ -119,6 +119,7 @@ impl Training<'_> {
     /// Does the work.
     fn run(self, folder: &Path) -> Result<Trained> {
         let model = Arc::new(self.config.carried_model()?);
+        self.settings.method.check_task(&model.task)?;
         match self.settings.method {
             Method::Analytic => self.analytic(&model),
             Method::Ddpg => self.ddpg(&model),

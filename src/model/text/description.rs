@@ -3,6 +3,7 @@
 use toml::Table;
 
 use super::axes::{self, State};
+use super::bodies;
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
 use super::names::{Scope, Seconds};
@@ -10,7 +11,7 @@ use super::network_file::NetworkFile;
 use super::origin::Origin;
 use super::policy::{self, Policy};
 use super::section::Section;
-use super::task::{self, Task};
+use super::task::{self, WrittenTask};
 use crate::error::Result;
 use crate::formula::text::{LONGEST_TEXT, shown};
 use crate::system::{Axis, Body, Parameter};
@@ -43,8 +44,8 @@ pub struct Description {
     pub period: Option<f32>,
     /// How the state moves on.
     pub dynamics: Dynamics,
-    /// The margins.
-    pub task: Task,
+    /// What a rollout has to do, and the margins.
+    pub task: WrittenTask,
     /// What pictures show.
     pub bodies: Vec<Body>,
     /// What makes the controls, where the text says.
@@ -78,8 +79,12 @@ impl Description {
         let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
         Ok(Self {
             dynamics: dynamics::dynamics(&model, &state_names, time, &scope)?,
-            task: task::task(&model.required("task", "the kind and its margins")?, &scope)?,
-            bodies: task::bodies(model.section("bodies")?, &scope)?,
+            task: task::task(
+                &model.required("task", "the kind and its margins")?,
+                &scope,
+                time.period,
+            )?,
+            bodies: bodies::bodies(model.section("bodies")?, &scope)?,
             policy: policy.transpose()?,
             name,
             states,

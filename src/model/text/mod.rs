@@ -1,6 +1,7 @@
 //! Models from text: sections of a TOML document, checked as they are read.
 
 mod axes;
+mod bodies;
 mod control;
 mod description;
 mod dynamics;
@@ -21,7 +22,7 @@ pub use dynamics::{Dynamics, Integration, Integrator};
 pub use network_file::{MOST_NETWORKS, NetworkFile};
 pub use origin::Origin;
 pub use policy::{NetworkPolicy, Policy};
-pub use task::Task;
+pub use task::WrittenTask;
 pub use written::Written;
 
 use std::path::Path;

@@ -78,7 +78,7 @@ impl Description {
                 [&policy.observe, &policy.act].into_iter().flatten().flatten().collect()
             }
         };
-        let margins = [&self.task.target, &self.task.constraint];
+        let margins = [&self.task.target, &self.task.constraint].into_iter().flatten();
         let all = self.lets.written().iter().chain(moves).chain(margins).chain(law);
         all.flat_map(|written| written.formula.networks().iter().map(move |call| (written, call)))
     }

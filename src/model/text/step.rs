@@ -14,6 +14,11 @@ use crate::system::Axis;
 /// Key of what makes a step of formulas that are small enough too large.
 const SUBSTEPS: &str = "model.time.substeps";
 
+/// The target margin of a task without a target.
+const NOWHERE: f32 = -1.0;
+/// The constraint margin of a task without a constraint.
+const EVERYWHERE: f32 = 1.0;
+
 /// Formulas of a description with the intermediate ones that they need.
 struct Formulas<'a> {
     description: &'a Description,
@@ -30,10 +35,10 @@ impl Description {
     /// [`crate::Error::Invalid`] naming the formulas whose graph is too large, or the call of a network
     /// that cannot be read or does not fit.
     pub fn model(&self) -> Result<Model> {
-        let (target, constraint) = (&self.task.target, &self.task.constraint);
         let networks = self.table()?;
-        let margin = |written: &Written| {
-            self.recorded(&written.key, std::slice::from_ref(written), &networks)
+        let margin = |written: &Option<Written>, absent: f32| match written {
+            Some(written) => self.recorded(&written.key, std::slice::from_ref(written), &networks),
+            None => Ok(record(self.inputs(), |_| vec![Real::lit(absent)])),
         };
         Ok(Model {
             name: self.name.clone(),
@@ -42,8 +47,9 @@ impl Description {
             parameters: self.parameters.clone(),
             period: self.period,
             step: self.step(&networks)?,
-            target: margin(target)?,
-            constraint: margin(constraint)?,
+            task: self.task.task,
+            target: margin(&self.task.target, NOWHERE)?,
+            constraint: margin(&self.task.constraint, EVERYWHERE)?,
             bodies: self.bodies.clone(),
             smallest_feature: None,
             native: None,

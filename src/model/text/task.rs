@@ -1,4 +1,4 @@
-//! The task of a description, and the bodies that pictures show.
+//! The task of a description: its kind, its margins, its times.
 
 use toml::Value;
 
@@ -6,85 +6,156 @@ use super::names::Scope;
 use super::section::{Section, unknown};
 use super::written::{FormulaKind, Written};
 use crate::error::Result;
-use crate::system::Body;
+use crate::model::{Task, Window};
 
-/// Kinds of tasks; all but the first are refused by name.
+/// Kinds of tasks.
 const KINDS: [&str; 5] = ["reach-avoid", "avoid", "reach", "reach-stay", "at-end"];
-/// Keys of tasks that are refused by name.
-const LATER: [&str; 4] = ["by", "from", "to", "between"];
+/// Keys of times.
+const TIMES: [&str; 3] = ["from", "to", "by"];
+/// A part of tasks that is refused by name.
+const LATER: &str = "between";
+/// How far a time may lie from a whole number of periods, in periods for each of them: a period is an f32.
+const WHOLE: f64 = 1e-6;
 
-/// The two margins of a reach-avoid task.
+/// A task with its margins, of which one that it has no use for is not there.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Task {
+pub struct WrittenTask {
+    /// What a rollout has to do.
+    pub task: Task,
     /// Positive inside the target set.
-    pub target: Written,
+    pub target: Option<Written>,
     /// Positive where safe.
-    pub constraint: Written,
+    pub constraint: Option<Written>,
 }
 
-/// Reads `[model.task]`.
-pub(super) fn task(section: &Section<'_>, scope: &Scope) -> Result<Task> {
-    section.only(["kind", "target", "constraint"].into_iter().chain(LATER))?;
-    kind(section)?;
-    if let Some(key) = LATER.into_iter().find(|key| section.has(key)) {
-        return Err(section.refuse(key, "this part of a task does not work yet; leave it out"));
+/// Reads `[model.task]` of a model whose steps last `period` seconds, where that is known.
+pub(super) fn task(
+    section: &Section<'_>,
+    scope: &Scope,
+    period: Option<f32>,
+) -> Result<WrittenTask> {
+    section.only(["kind", "target", "constraint", LATER].into_iter().chain(TIMES))?;
+    let kind = kind(section)?;
+    if section.has(LATER) {
+        return Err(section.refuse(LATER, "this part of a task does not work yet; leave it out"));
     }
+    refuse_unused(section, kind)?;
     let margin = |key: &str| {
-        let value = section.entries().find(|(name, _)| *name == key);
-        let (_, value) = value.ok_or_else(|| {
-            section.refuse(
-                key,
-                "missing; expected a margin, a formula that is positive where it holds",
-            )
-        })?;
-        Written::read(section, key, value, scope, FormulaKind::Task)
+        let needed = used(kind).contains(&key);
+        needed.then(|| margin(section, key, scope)).transpose()
     };
-    Ok(Task { target: margin("target")?, constraint: margin("constraint")? })
-}
-
-fn kind(section: &Section<'_>) -> Result<()> {
-    let missing = || section.refuse("kind", "missing; expected \"reach-avoid\"");
-    let kind = section.text("kind")?.ok_or_else(missing)?;
-    if kind == KINDS[0] {
-        return Ok(());
-    }
-    let problem = if KINDS.contains(&kind) {
-        format!("tasks of the kind \"{kind}\" do not work yet; expected \"reach-avoid\"")
-    } else {
-        unknown("kind of task", kind, KINDS.into_iter())
-    };
-    Err(section.refuse("kind", problem))
-}
-
-/// Reads `[model.bodies]`: each at two states.
-pub(super) fn bodies(section: Option<Section<'_>>, scope: &Scope) -> Result<Vec<Body>> {
-    let Some(section) = section else { return Ok(Vec::new()) };
-    let body = |(name, _): (&str, &Value)| {
-        let entry = section.required(name, "{ at = [\"x\", \"y\"] }")?;
-        entry.only(["at", "size", "joined"].into_iter())?;
-        if let Some(key) = ["size", "joined"].into_iter().find(|key| entry.has(key)) {
-            return Err(entry.refuse(key, "pictures do not show this yet; leave it out"));
-        }
-        let expected = "a list of two states, right and up";
-        let missing = || entry.refuse("at", format!("missing; expected {expected}"));
-        match entry.list("at", expected)?.ok_or_else(missing)? {
-            [x, y] => Ok(Body {
-                name: name.to_owned(),
-                x: coordinate(&entry, x, scope)?,
-                y: coordinate(&entry, y, scope)?,
-            }),
-            other => Err(entry.refuse("at", format!("expected {expected}, found {}", other.len()))),
-        }
-    };
-    section.entries().map(body).collect()
-}
-
-/// The state that a coordinate of a body is.
-fn coordinate(entry: &Section<'_>, value: &Value, scope: &Scope) -> Result<usize> {
-    let written = Written::read(entry, "at", value, scope, FormulaKind::Picture)?;
-    let state = written.formula.only_name().map(|place| place as usize);
-    state.filter(|state| *state < scope.states).ok_or_else(|| {
-        let problem = "a body at a formula cannot be shown yet; expected the name of a state";
-        written.refuse(entry.origin, 0, problem)
+    Ok(WrittenTask {
+        task: timed(section, kind, period)?,
+        target: margin("target")?,
+        constraint: margin("constraint")?,
     })
+}
+
+/// The task of this kind with its times.
+fn timed(section: &Section<'_>, kind: &str, period: Option<f32>) -> Result<Task> {
+    let time = |key| moment(section, key, period);
+    let window =
+        || -> Result<Window> { Ok(Window { from: time("from")?.unwrap_or(0), to: time("to")? }) };
+    Ok(match kind {
+        "avoid" => Task::Avoid,
+        "reach" => Task::Reach(window()?),
+        "reach-stay" => Task::ReachStay { by: time("by")? },
+        "at-end" => Task::AtEnd,
+        _ => Task::ReachAvoid(window()?),
+    })
+}
+
+/// The keys that a kind of task has a use for.
+fn used(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "avoid" => &["constraint"],
+        "reach" => &["target", "from", "to"],
+        "reach-stay" => &["target", "constraint", "by"],
+        "at-end" => &["target", "constraint"],
+        _ => &["target", "constraint", "from", "to"],
+    }
+}
+
+/// Refuses a key that the kind has no use for.
+fn refuse_unused(section: &Section<'_>, kind: &str) -> Result<()> {
+    let used = used(kind);
+    let mut given =
+        ["target", "constraint"].into_iter().chain(TIMES).filter(|key| section.has(key));
+    match given.find(|key| !used.contains(key)) {
+        Some(key) => {
+            let problem = format!(
+                "a task of the kind \"{kind}\" has no use for it, but for {}; leave it \
+                 out or take another kind",
+                used.join(", ")
+            );
+            Err(section.refuse(key, problem))
+        }
+        None => Ok(()),
+    }
+}
+
+fn kind<'a>(section: &Section<'a>) -> Result<&'a str> {
+    let missing = || {
+        let known = KINDS.map(|kind| format!("\"{kind}\"")).join(", ");
+        section.refuse("kind", format!("missing; expected one of {known}"))
+    };
+    let kind = section.text("kind")?.ok_or_else(missing)?;
+    if KINDS.contains(&kind) {
+        return Ok(kind);
+    }
+    Err(section.refuse("kind", unknown("kind of task", kind, KINDS.into_iter())))
+}
+
+fn margin(section: &Section<'_>, key: &str, scope: &Scope) -> Result<Written> {
+    let missing = || {
+        let expected = "a margin, a formula that is positive where it holds";
+        section.refuse(key, format!("missing; expected {expected}"))
+    };
+    let value = section.entries().find(|(name, _)| *name == key);
+    let (_, value) = value.ok_or_else(missing)?;
+    Written::read(section, key, value, scope, FormulaKind::Task)
+}
+
+/// The step at `key`: a whole number of steps, or seconds as text with their unit.
+fn moment(section: &Section<'_>, key: &str, period: Option<f32>) -> Result<Option<u32>> {
+    let Some((_, value)) = section.entries().find(|(name, _)| *name == key) else {
+        return Ok(None);
+    };
+    let expected = "a number of steps, or seconds as text, \"1.5 s\"";
+    let beyond = |step: &dyn std::fmt::Display| {
+        section.refuse(key, format!("{step}; expected {expected}, from 0 to {}", u32::MAX))
+    };
+    match value {
+        Value::Integer(step) => u32::try_from(*step).map(Some).map_err(|_| beyond(step)),
+        Value::String(text) => {
+            let seconds = text.trim().strip_suffix('s').map(|number| number.trim().parse::<f64>());
+            let Some(Ok(seconds)) = seconds else {
+                return Err(section.wrong(key, expected, value));
+            };
+            let step = whole_periods(section, key, seconds, period)?;
+            let steps = 0.0..=f64::from(u32::MAX);
+            if steps.contains(&step) { Ok(Some(step as u32)) } else { Err(beyond(text)) }
+        }
+        other => Err(section.wrong(key, expected, other)),
+    }
+}
+
+/// How many periods `seconds` are.
+fn whole_periods(
+    section: &Section<'_>,
+    key: &str,
+    seconds: f64,
+    period: Option<f32>,
+) -> Result<f64> {
+    let Some(period) = period else {
+        let problem = "seconds need `period` in `[model.time]`; give it, or a number of steps";
+        return Err(section.refuse(key, problem));
+    };
+    let periods = seconds / f64::from(period);
+    let whole = periods.round();
+    if (periods - whole).abs() <= WHOLE * whole.abs() {
+        return Ok(whole);
+    }
+    let problem = format!("{seconds} s is no multiple of the period, {period} s");
+    Err(section.refuse(key, problem))
 }

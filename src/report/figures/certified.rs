@@ -113,12 +113,13 @@ fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
     let set = words::grown(record);
     let verified = growth.outcome == GrowthOutcome::Verified;
     let entry = |swatch: Swatch, name: &str| (swatch, name.to_owned());
-    let mut legend = vec![
-        entry(Swatch::Area("certified"), "certified cells: V_check > 0"),
-        entry(Swatch::Area("target-area target"), "target set in this slice"),
-        entry(Swatch::Area("hatched constraint"), "constraint violated"),
-        entry(Swatch::Mark(diamond()), "state"),
-    ];
+    let task = &record.system.task;
+    let target = entry(Swatch::Area("target-area target"), "target set in this slice");
+    let violated = entry(Swatch::Area("hatched constraint"), "constraint violated");
+    let mut legend = vec![entry(Swatch::Area("certified"), "certified cells: V_check > 0")];
+    legend.extend(task.has_target().then_some(target));
+    legend.extend(task.has_constraint().then_some(violated));
+    legend.push(entry(Swatch::Mark(diamond()), "state"));
     if let Some(ball) = ball {
         let mark = CENTER.to_owned();
         legend.push(if verified {

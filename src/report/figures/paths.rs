@@ -2,6 +2,7 @@
 
 use super::course::{self, only_state};
 use super::plane::{entry, margins, point, same_unit, slice_states, target_area};
+use crate::model::Form;
 use crate::report::figure::{Figure, Swatch, cross, dot};
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::slice::Grid;
@@ -83,7 +84,8 @@ fn legend(record: &Record, bodies: &[Body]) -> Vec<(Swatch, String)> {
         .collect();
     let rollouts = &record.picture.rollouts;
     if rollouts.iter().any(|rollout| rollout.success) {
-        let name = "reached the target safely: solid, ends in a dot".to_owned();
+        let deed = record.system.task.short_words(Form::Past, record.horizon);
+        let name = format!("{deed}: solid, ends in a dot");
         legend.push((Swatch::Marked("body first", end(true)), name));
     }
     if rollouts.iter().any(|rollout| !rollout.success) {
@@ -92,8 +94,11 @@ fn legend(record: &Record, bodies: &[Body]) -> Vec<(Swatch, String)> {
     }
     if overlaid(record, bodies) {
         let (target, violated) = ("target set at the state", "constraint violated at the state");
-        legend.push((Swatch::Area("target-area target"), target.to_owned()));
-        legend.push((Swatch::Area("hatched constraint"), violated.to_owned()));
+        let target = (Swatch::Area("target-area target"), target.to_owned());
+        let violated = (Swatch::Area("hatched constraint"), violated.to_owned());
+        let task = &record.system.task;
+        legend.extend(task.has_target().then_some(target));
+        legend.extend(task.has_constraint().then_some(violated));
     }
     legend
 }
@@ -102,10 +107,9 @@ fn caption(record: &Record, bodies: &[Body]) -> String {
     let rollouts = &record.picture.rollouts;
     let reached = rollouts.iter().filter(|rollout| rollout.success).count();
     let mut caption = format!(
-        "{reached} of {} rollouts reached the target safely within {} steps; an illustration, not \
-         a sample that a claim rests on.",
+        "{reached} of {} rollouts {}; an illustration, not a sample that a claim rests on.",
         rollouts.len(),
-        record.horizon
+        record.system.task.words(Form::Past, record.horizon)
     );
     if overlaid(record, bodies) {
         caption += " Target set and constraint are drawn over the slice";
