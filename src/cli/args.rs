@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 
 use super::falsify::FalsifyArguments;
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
+use crate::config::Registry;
 use crate::files::Existing;
 use crate::policy::{Activation, OutputActivation};
 use crate::studies::StudyCommand;
@@ -23,10 +24,10 @@ pub(super) struct Arguments {
 
 impl Arguments {
     /// The options that are not of one command alone.
-    pub(crate) fn global(&self) -> Global {
+    pub(crate) fn global(&self, registry: &Registry) -> Global {
         let Own { changes, out, replace } = self.command.options();
         let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
-        Global { common: self.common.clone(), changes, out, existing }
+        Global { common: self.common.clone(), changes, out, existing, registry: registry.clone() }
     }
 }
 
@@ -111,7 +112,7 @@ Tiers: 0 in the target set, 1 in the certified set, 2 in the set that local grow
 Prints a line per state (index, tier, check_margin, target_margin); with --out DIR these go to
 DIR/query.csv instead and a summary is printed. More columns where the certificate has what they are of:
   score       the largest lambda at which the state is certified by margin drops
-  measure     its reach-avoid measure, and in
+  measure     the measure of its rollout, and in
   calibrated  whether that is above alpha: in the calibrated set
   radius      of a ball around it that is certified without samples, up to 8 times the one asked for
 

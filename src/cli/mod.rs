@@ -24,6 +24,7 @@ use std::io::Write;
 
 use clap::Parser;
 
+use crate::config::Registry;
 use crate::error::{Error, Result};
 use args::{Arguments, Command, PolicyCommand};
 use output::plain;
@@ -32,6 +33,12 @@ pub(crate) use output::{Outcome, document, folder_of, report};
 /// Runs the command line and returns its exit code: 0 done, 1 failed, 2 wrong usage,
 /// configuration or input, 3 ran but the claim asked for was not obtained.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    run_with(&Registry::new(), arguments)
+}
+
+/// The same for a program with plants of its own, which `[system] name = "..."` asks for: every command
+/// that works for any plant works for them. `examples/program.rs` is such a program.
+pub fn run_with(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
@@ -41,7 +48,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return usage.exit_code() as u8;
         }
     };
-    match dispatch(&arguments) {
+    match dispatch(registry, &arguments) {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NotObtained) => 3,
         Err(error) => {
@@ -66,8 +73,8 @@ fn told(error: &Error) -> String {
 }
 
 /// Runs the command.
-fn dispatch(arguments: &Arguments) -> Result<Outcome> {
-    let global = &arguments.global();
+fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
+    let global = &arguments.global(registry);
     match &arguments.command {
         Command::Certify { config, .. } => certify::run(global, config),
         Command::Rollout { config, starts, measures, .. } => {

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::named_system::NamedSystem;
+use super::registry::Registered;
 use super::section::{Config, FormulaSection};
 use crate::error::{Error, Result};
 use crate::files::{RECORD_BYTES, read};
@@ -79,23 +81,39 @@ impl Config {
         if let Some(model) = &self.model {
             return self.described_plant(model, policy);
         }
-        let system = self.built_in()?;
         match policy {
-            PolicySource::Formula(name) => system.under_formula(name),
+            PolicySource::Formula(name) => match self.registered()? {
+                Some(plant) => plant.under_formula(name),
+                None => self.built_in()?.under_formula(name),
+            },
             PolicySource::Network { path, network, .. } => {
-                let model = system.model();
+                let model = self.carried_model()?;
                 check_network(&model, path, network)?;
                 Ok(Plant::under(&model.into(), network.clone()))
             }
         }
     }
 
-    /// The model of a system that the program carries, its parameters checked.
+    /// The plant of the registry, where the configuration names one.
+    fn registered(&self) -> Result<Option<Registered>> {
+        match &self.system {
+            Some(NamedSystem::Registered(section)) => {
+                let made = self.registry.make(&section.name, &section.numbers)?;
+                Ok(Some(made.plant))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// The model of a system that the program carries or registers, its parameters checked.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a parameter out of range, and for a model that is given as text.
     pub fn carried_model(&self) -> Result<Model> {
-        self.built_in().map(|system| system.model())
+        match self.registered()? {
+            Some(plant) => Ok(Model::clone(plant.model())),
+            None => self.built_in().map(|system| system.model()),
+        }
     }
 
     /// The system, its parameters checked.
@@ -105,7 +123,10 @@ impl Config {
                            `certify`, `rollout`, `query` and `check` do, and `sweep --of certificate`";
             Error::invalid("this command", problem)
         };
-        self.system.as_ref().ok_or_else(carried)?.checked()
+        match &self.system {
+            Some(NamedSystem::Carried(system)) => system.checked(),
+            _ => Err(carried()),
+        }
     }
 }
 

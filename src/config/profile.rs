@@ -2,6 +2,8 @@
 
 use super::deterministic::DeterministicSection;
 use super::drops::{self, CalibrationSection, DropsSection, TighteningSource};
+use super::named_system::NamedSystem;
+use super::registry::Registry;
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
@@ -79,7 +81,7 @@ pub(crate) fn common(
         profile,
         seed: 1,
         attempt: None,
-        system,
+        system: system.map(NamedSystem::Carried),
         model: None,
         networks: Vec::new(),
         policy: PolicySection::default(),
@@ -142,6 +144,7 @@ pub(crate) fn common(
         sequential: SequentialSection::default(),
         study: None,
         train: None,
+        registry: Registry::default(),
         sources: Sources::default(),
     }
 }

@@ -103,7 +103,7 @@ pub fn certify(
         drops,
         sequence,
         calibration,
-        enclosed: enclosure::record(settings),
+        enclosed: enclosure::record(context.model(), settings),
         deterministic,
         state,
         slice,
