@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::effort::USUAL;
 use super::falsify::FalsifyArguments;
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::config::Registry;
@@ -142,6 +143,9 @@ Example:
         /// Seed of the fresh samples, to repeat a check [default: another one each time, which is told]
         #[arg(long, value_name = "N")]
         fresh_seed: Option<u64>,
+        /// Most operations that it may take, for folders of other people: what it takes at most is said first
+        #[arg(long, value_name = "N", default_value_t = USUAL)]
+        effort: f64,
     },
     /// Look for a start that fails: within the box, or where a certificate claims something
     ///

@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod certify;
 pub(crate) mod devices;
+mod effort;
 mod falsified;
 mod falsify;
 pub(crate) mod inputs;
@@ -81,7 +82,9 @@ fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
             rollout::run(global, config, starts, measures)
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
-        Command::Check { folder, fresh_seed } => stored::check(global, folder, *fresh_seed),
+        Command::Check { folder, fresh_seed, effort } => {
+            stored::check(global, folder, *fresh_seed, *effort)
+        }
         Command::Falsify(asked) => falsify::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::inputs::networks;
 use super::progress::Progress;
-use super::{Outcome, devices, document, report};
+use super::{Outcome, devices, document, effort, report};
 use crate::certificate::{CERTIFICATE, POLICY, derived_files};
 use crate::config::{Config, PolicySource, Registry};
 use crate::error::{Error, Result};
@@ -216,9 +216,14 @@ fn others(record: &Record, rows: &[QueryRow]) -> String {
 }
 
 /// Verifies the certificate in the folder again.
-pub(super) fn check(global: &Global, folder: &Path, fresh_seed: Option<u64>) -> Result<Outcome> {
+pub(super) fn check(
+    global: &Global,
+    folder: &Path,
+    fresh_seed: Option<u64>,
+    effort: f64,
+) -> Result<Outcome> {
     let stored = Stored::read(folder, &global.registry)?;
-    let mut found = verify(global, &stored, fresh_seed.unwrap_or_else(another_seed))?;
+    let mut found = verify(global, &stored, fresh_seed.unwrap_or_else(another_seed), effort)?;
     // Of a record that does not hold, a page may not even be made.
     if found.holds {
         found.add(files(folder, &stored.record)?);
@@ -261,10 +266,11 @@ fn another_seed() -> u64 {
 }
 
 /// Computes a certificate again and tries its claims on fresh scenarios.
-fn verify(global: &Global, stored: &Stored, fresh_seed: u64) -> Result<CheckReport> {
+fn verify(global: &Global, stored: &Stored, fresh_seed: u64, effort: f64) -> Result<CheckReport> {
     let Stored { record, config, policy } = stored;
     let plant = config.plant(policy)?;
     let settings = config.settings(&plant.model.states)?;
+    effort::say(global, &plant, &settings, effort)?;
     let backend = devices::open(global)?;
     let progress = Progress::new(global);
     let program = backend.prepare(&plant)?;

@@ -7,7 +7,7 @@ use super::registry::Registered;
 use super::section::{Config, FormulaSection};
 use crate::error::{Error, Result};
 use crate::files::{RECORD_BYTES, read};
-use crate::model::{Model, Plant};
+use crate::model::{Controller, Model, Plant};
 use crate::policy::Mlp;
 use crate::studies::BuiltIn;
 
@@ -88,8 +88,9 @@ impl Config {
             },
             PolicySource::Network { path, network, .. } => {
                 let model = self.carried_model()?;
-                check_network(&model, path, network)?;
-                Ok(Plant::under(&model.into(), network.clone()))
+                let controller = Controller::network_of(&model, network.clone());
+                let controller = controller.map_err(|problem| Error::file(path, problem))?;
+                Ok(Plant::new(model, controller))
             }
         }
     }

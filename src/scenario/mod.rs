@@ -27,6 +27,8 @@ pub mod deviation;
 pub mod drops;
 pub mod drops_record;
 pub mod drops_settings;
+#[cfg(feature = "cli")]
+mod effort;
 mod empty;
 mod enclosed_record;
 pub mod enclosure;
@@ -80,6 +82,8 @@ pub use attempt::{AttemptRecord, attempt_share};
 pub use box_record::BoxRecord;
 pub use box_settings::BoxSettings;
 pub use certify::{certify, check_settings};
+#[cfg(feature = "cli")]
+pub(crate) use effort::most_rollouts_of_check;
 pub use finding::{CheckReport, Figure, Finding};
 pub use key_source::Keys;
 #[cfg(feature = "cli")]

@@ -16,4 +16,5 @@ mod learned;
 mod model_cli;
 mod policy;
 mod query;
+mod registered;
 mod train;
