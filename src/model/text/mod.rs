@@ -11,6 +11,7 @@ mod network;
 mod network_file;
 mod origin;
 mod policy;
+mod recorded_costs;
 mod section;
 mod step;
 mod task;
