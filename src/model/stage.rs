@@ -146,6 +146,20 @@ impl StageCost {
         horizon + usize::from(self.terminal.is_some())
     }
 
+    /// The maps that it charges by and asks, each once: that which charges a stage, those that a stage
+    /// asks, those that the end asks.
+    pub fn maps(&self) -> Vec<Arc<CostMap>> {
+        let terminal = self.terminal.as_ref().and_then(|terminal| terminal.lookups.as_ref());
+        let asked = self.lookups.iter().chain(terminal).flat_map(|lookups| &lookups.maps);
+        let mut maps: Vec<Arc<CostMap>> = Vec::new();
+        for map in self.map.iter().map(|map| &map.map).chain(asked) {
+            if !maps.iter().any(|known| Arc::ptr_eq(known, map)) {
+                maps.push(Arc::clone(map));
+            }
+        }
+        maps
+    }
+
     /// The formulas, those of cells included.
     pub(crate) fn graphs(&self) -> impl Iterator<Item = &Graph> {
         let terminal = self.terminal.iter().flat_map(|terminal| {

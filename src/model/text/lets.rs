@@ -160,7 +160,7 @@ impl Lets {
         let mut names = inputs.to_vec();
         names.resize(self.first + self.formulas.len(), inputs[0]);
         for &i in self.order.iter().filter(|i| needed[**i]) {
-            let values = Values { names: &names, outputs: &[], networks };
+            let values = Values { names: &names, outputs: &[], looked: &[], networks };
             names[self.first + i] = self.formulas[i].formula.value(values);
         }
         names
