@@ -49,6 +49,16 @@ pub(super) struct Terms {
     pub(super) lookups: Option<Lookups>,
 }
 
+impl TermKind {
+    /// Its name in a text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stage => "stage",
+            Self::Terminal => "terminal",
+        }
+    }
+}
+
 impl Terms {
     /// What each comes to at `inputs`, those of the model and the contexts.
     fn values(&self, inputs: &[f32]) -> Vec<f32> {

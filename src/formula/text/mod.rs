@@ -19,7 +19,7 @@ pub use function::Function;
 pub use names::Names;
 pub use networks::Networks;
 pub use term::{Comparison, Operation, Term, Values};
-pub(crate) use token::LONGEST_NAME;
+pub(crate) use token::{LONGEST_NAME, is_name};
 
 use parser::Parser;
 
