@@ -10,6 +10,8 @@ mod falsify;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
+mod plan;
+mod planned;
 mod policy;
 pub(crate) mod progress;
 mod replayed;
@@ -86,6 +88,7 @@ fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
             stored::check(global, folder, *fresh_seed, *effort)
         }
         Command::Falsify(asked) => falsify::run(global, asked),
+        Command::Plan { config, .. } => plan::run(global, config),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

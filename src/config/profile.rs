@@ -12,6 +12,7 @@ use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
+use crate::plan::PlanSettings;
 use crate::rollout::PairControl;
 use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::decimal;
@@ -145,6 +146,7 @@ pub(crate) fn common(
         study: None,
         train: None,
         registry: Registry::default(),
+        plan: Some(PlanSettings::default()),
         sources: Sources::default(),
     }
 }
