@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 
 use super::effort::USUAL;
 use super::falsify::FalsifyArguments;
+use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::config::Registry;
 use crate::files::Existing;
@@ -35,6 +36,7 @@ impl Arguments {
 /// Shown after the help of the program.
 const EXAMPLES: &str = "\
 Examples:
+  reachcast init plant.toml
   reachcast certify configs/race.toml
   reachcast certify configs/race.toml --profile study --set growth.rounds=10 --out study
   reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures measures.npy
@@ -58,6 +60,9 @@ Exit codes:
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    /// Write a starting configuration with comments: a plant as text, to be changed
+    #[command(after_help = format!("Plants to start from:\n{}\nExample:\n  reachcast init car.toml --from dubins", init::names()))]
+    Init(InitArguments),
     /// Certify a policy: deviation bound, certified set, and a locally grown ball
     ///
     /// Writes certificate.json, deviation.csv (step, bound, largest, exact), slice.npy (f32,
@@ -264,6 +269,7 @@ impl Command {
             Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
             Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
+            Self::Init(asked) => asked.own(),
             Self::Falsify(asked) => own(asked.changes.clone(), &asked.out, asked.replace),
             Self::Plan { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Study(asked) => asked.options(),

@@ -7,6 +7,7 @@ pub(crate) mod devices;
 mod effort;
 mod falsified;
 mod falsify;
+mod init;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
@@ -89,6 +90,7 @@ fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
         }
         Command::Falsify(asked) => falsify::run(global, asked),
         Command::Plan { config, .. } => plan::run(global, config),
+        Command::Init(asked) => init::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

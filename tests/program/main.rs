@@ -10,6 +10,7 @@ mod disk;
 mod earlier;
 mod endless;
 mod faults;
+mod init;
 mod kept;
 mod killed;
 mod learned;
