@@ -98,7 +98,14 @@ impl WrittenReference {
             })),
             WrittenSource::File(path) => ReferenceSource::Rows(self.rows(path, origin)?),
         };
-        Ok(Reference { name: self.name.clone(), source })
+        let reference = Reference { name: self.name.clone(), source };
+        match reference.at(0, 0.0) {
+            first if first.is_finite() => Ok(reference),
+            first => {
+                let problem = format!("{first} at step 0; expected a finite number at each step");
+                Err(origin.refuse(&self.key, problem))
+            }
+        }
     }
 
     /// The rows of the file at `path`.
