@@ -1,6 +1,6 @@
 //! The command `plan`: a model steered in closed loop by plans, what came of it, and its pictures.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::options::Global;
@@ -69,6 +69,8 @@ struct Asked<'a> {
     config: &'a Config,
     model: Arc<Model>,
     costs: Costs,
+    /// Files of references and maps.
+    files: Vec<PathBuf>,
     /// The policy that first plans are rollouts of.
     policy: Option<Steering>,
     settings: PlanSettings,
@@ -88,7 +90,7 @@ impl<'a> Asked<'a> {
     fn read(config: &'a Config, path: &Path) -> Result<Self> {
         let (folder, settings) = (folder_of(path), config.plan_settings());
         let model = config.planned_model()?;
-        let costs = config.planned_costs(folder)?;
+        let (costs, files) = (config.planned_costs(folder)?, config.planned_files(folder)?);
         let spec = config.plan_spec()?;
         model.task.check(spec.horizon).map_err(|error| config.placed(error))?;
         settings.spec(&model.controls).map_err(|error| config.placed(error))?;
@@ -100,7 +102,17 @@ impl<'a> Asked<'a> {
             }
         };
         let (state, bounds) = (config.plan_start(&model.states)?, config.plan_box(&model.states)?);
-        Ok(Self { config, model: Arc::new(model), costs, policy, settings, spec, state, bounds })
+        Ok(Self {
+            config,
+            model: Arc::new(model),
+            costs,
+            files,
+            policy,
+            settings,
+            spec,
+            state,
+            bounds,
+        })
     }
 
     /// The files that are read.
@@ -110,7 +122,8 @@ impl<'a> Asked<'a> {
             PolicySource::Formula(_) => None,
         });
         let called = self.config.networks.iter().map(|file| file.path.clone());
-        Inputs::new([path.to_owned()].into_iter().chain(network).chain(called))
+        let own = [path.to_owned()].into_iter().chain(self.files.iter().cloned());
+        Inputs::new(own.chain(network).chain(called))
     }
 
     /// What the folder says that it holds.

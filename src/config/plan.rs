@@ -1,12 +1,12 @@
 //! Plans in closed loop as a configuration asks for them: the section `[plan]`, the model, its costs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::section::{Config, PolicySection};
+use super::section::Config;
 use super::settings::{finite_interval, in_order};
 use super::sources::UNNAMED;
 use crate::error::{Error, Result};
-use crate::model::text::Origin;
+use crate::model::text::{Origin, WrittenSource};
 use crate::model::{Costs, Model};
 use crate::plan::PlanSettings;
 use crate::rollout::RolloutSpec;
@@ -49,7 +49,7 @@ impl Config {
     pub fn planned_model(&self) -> Result<Model> {
         let Some(model) = &self.model else { return Err(self.carried()) };
         let origin = Origin::new(UNNAMED, Path::new(""));
-        let described = self.description(model, &PolicySection::default(), &origin);
+        let described = self.description(model, &self.policy, &origin);
         let described = described.map(|found| found.with_networks(self.networks.clone()));
         described.and_then(|found| found.model()).map_err(|error| self.placed(error))
     }
@@ -62,6 +62,23 @@ impl Config {
     pub fn planned_costs(&self, folder: &Path) -> Result<Costs> {
         let missing = || self.placed(Error::invalid("model.costs", EXAMPLE));
         self.costs(folder)?.ok_or_else(missing)
+    }
+
+    /// The files of references and maps that the costs name, relative to `folder`.
+    ///
+    /// # Errors
+    /// Those of the description.
+    pub fn planned_files(&self, folder: &Path) -> Result<Vec<PathBuf>> {
+        let Some(model) = &self.model else { return Ok(Vec::new()) };
+        let described = self.description(model, &self.policy, &Origin::new(UNNAMED, folder));
+        let costs = described.map_err(|error| self.placed(error))?.costs;
+        let (references, maps) =
+            costs.map_or_else(Default::default, |all| (all.references, all.maps));
+        let rows = references.into_iter().filter_map(|reference| match reference.source {
+            WrittenSource::File(file) => Some(file),
+            WrittenSource::Value(_) | WrittenSource::Formula(_) => None,
+        });
+        Ok(rows.chain(maps.into_iter().map(|map| map.file)).collect())
     }
 
     /// The state that a single run starts at, `[states]`.

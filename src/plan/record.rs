@@ -163,21 +163,13 @@ impl CostRecord {
 
 /// A kind of term by its name.
 fn kind<S: serde::Serializer>(kind: &TermKind, to: S) -> Result<S::Ok, S::Error> {
-    to.serialize_str(word(*kind))
+    to.serialize_str(kind.name())
 }
 
 impl TermRecord {
     /// Its name with its kind in front, as a text has it.
     pub fn key(&self) -> String {
-        format!("{}.{}", word(self.kind), self.name)
-    }
-}
-
-/// The name of a kind of term.
-pub(super) fn word(kind: TermKind) -> &'static str {
-    match kind {
-        TermKind::Stage => "stage",
-        TermKind::Terminal => "terminal",
+        format!("{}.{}", self.kind.name(), self.name)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::closed_loop::{Flown, Trajectory};
 use super::judged::Judged;
-use super::record::word;
 use crate::error::Result;
 use crate::files::{Array, Column, Data, Table, npz_bytes};
 use crate::model::{Costs, Model, TermKind};
@@ -67,7 +66,7 @@ fn add_costs(table: &mut Table, costs: &Costs, rows: &Rows<'_>) {
             let paid = term.kind == TermKind::Terminal || step < run.controls.len();
             run.shares.get(step).filter(|_| paid).map(|shares| shares[i])
         };
-        table.add(&format!("{}.{}", word(term.kind), term.name), rows.singles(share));
+        table.add(&format!("{}.{}", term.kind.name(), term.name), rows.singles(share));
     }
 }
 
