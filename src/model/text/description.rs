@@ -4,6 +4,7 @@ use toml::Table;
 
 use super::axes::{self, State};
 use super::bodies;
+use super::costs::{self, WrittenCosts};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
 use super::names::{Scope, Seconds};
@@ -17,15 +18,25 @@ use crate::formula::text::{LONGEST_TEXT, shown};
 use crate::system::{Axis, Body, Parameter};
 
 /// Keys of `[model]`.
-const KEYS: [&str; 10] =
-    ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task", "bodies"];
+const KEYS: [&str; 13] = [
+    "name",
+    "states",
+    "controls",
+    "parameters",
+    "let",
+    "next",
+    "flow",
+    "time",
+    "task",
+    "bodies",
+    "costs",
+    "references",
+    "maps",
+];
 /// Sections of `[model]` that are refused by name, and what they would be.
-const LATER: [(&str, &str); 6] = [
+const LATER: [(&str, &str); 3] = [
     ("disturbances", "numbers that are drawn at every step do"),
     ("noise", "measurement noise does"),
-    ("costs", "costs of plans do"),
-    ("references", "references of costs do"),
-    ("maps", "maps of costs do"),
     ("shapes", "shapes of pictures do"),
 ];
 
@@ -46,6 +57,8 @@ pub struct Description {
     pub dynamics: Dynamics,
     /// What a rollout has to do, and the margins.
     pub task: WrittenTask,
+    /// What plans cost, where the text says; no part of the plant and its task.
+    pub costs: Option<WrittenCosts>,
     /// What pictures show.
     pub bodies: Vec<Body>,
     /// What makes the controls, where the text says.
@@ -84,6 +97,7 @@ impl Description {
                 &scope,
                 time.period,
             )?,
+            costs: costs::costs(&model, &scope)?,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
             policy: policy.transpose()?,
             name,
