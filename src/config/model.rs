@@ -103,7 +103,7 @@ impl Config {
     }
 
     /// The description in the sections `model` and `policy`.
-    fn description(
+    pub(super) fn description(
         &self,
         model: &Table,
         policy: &PolicySection,

@@ -44,7 +44,11 @@ impl Config {
     /// Those of [`PolicySource::read`], of a model with the key that names the file, as
     /// [`Error::Invalid`]; [`Error::Invalid`] without file and formula.
     pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
-        let missing = || self.placed(Error::invalid("policy", "neither `file` nor `formula`"));
+        let missing = || {
+            let problem = "no policy; give `file`, a safetensors file, or `formula`; `reachcast train` \
+                           makes the file";
+            self.placed(Error::invalid("policy", problem))
+        };
         match (&self.policy.file, &self.policy.formula) {
             (Some(file), _) => PolicySource::read(folder.join(file)).map_err(|e| self.of_key(e)),
             (None, Some(FormulaSection::Name(name))) => Ok(PolicySource::Formula(name.clone())),
@@ -90,19 +94,22 @@ impl Config {
         }
     }
 
-    /// The model of a system that the program carries, its parameters checked.
+    /// The model by itself, its parameters checked.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a parameter out of range, and for a model that is given as text.
-    pub fn carried_model(&self) -> Result<Model> {
-        self.built_in().map(|system| system.model())
+    /// [`Error::Invalid`] for a parameter out of range, and those of a description.
+    pub fn plain_model(&self) -> Result<Model> {
+        match self.described_model() {
+            Some(model) => model.map_err(|error| self.placed(error)),
+            None => self.built_in().map(|system| system.model()),
+        }
     }
 
     /// The system, its parameters checked.
     pub(crate) fn built_in(&self) -> Result<BuiltIn> {
         let carried = || {
             let problem = "works for the systems that the program carries, not yet for a model; \
-                           `certify`, `rollout`, `query` and `check` do, and `sweep --of certificate`";
+                           `certify`, `rollout`, `train`, `query` and `check` do, and `sweep --of certificate`";
             Error::invalid("this command", problem)
         };
         self.system.as_ref().ok_or_else(carried)?.checked()

@@ -2,6 +2,7 @@
 
 use super::deterministic::DeterministicSection;
 use super::drops::{self, CalibrationSection, DropsSection, TighteningSource};
+use super::learning;
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
@@ -60,6 +61,7 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     let mut config = common(profile, None, states, &state, SliceSection { x, y });
     config.deviation.radius = narrowest / 50.0;
     config.growth.radius = narrowest / 4.0;
+    config.train = Some(learning::described());
     config
 }
 

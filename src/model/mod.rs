@@ -4,6 +4,7 @@ mod compiled;
 mod controller;
 mod fit;
 mod identity;
+mod interface;
 mod plant;
 mod recorded;
 mod role;
@@ -15,6 +16,7 @@ pub mod text;
 use std::sync::Arc;
 
 pub use controller::{Controller, Law};
+pub use interface::Interface;
 pub use plant::Plant;
 pub use role::Role;
 pub use stage::{MapCost, StageCost};

@@ -1,19 +1,43 @@
-//! A model as tapes: its step, and the softened measures of a whole rollout.
+//! A model as tapes: its step, what a network sees of it, and the softened measures of a whole rollout.
 
 use super::tape::Tape;
 use crate::formula::{Expr, record};
-use crate::model::Model;
+use crate::model::{Interface, Model};
 use crate::real::Real;
 use crate::rollout::{RolloutSpec, Tightening, measure_as};
 
-/// The step: states, controls and the number of the step to the next states.
-pub fn step_tape(model: &Model) -> Tape {
-    let (states, controls) = (model.states.len(), model.controls.len());
-    Tape::hard(&record(states + controls + 1, |inputs| {
+/// The step: states, outputs of the network behind `interface` and the number of the step to the next
+/// states.
+pub fn step_tape(model: &Model, interface: &Interface) -> Tape {
+    let (states, outputs) = (model.states.len(), interface.outputs);
+    Tape::hard(&record(states + outputs + 1, |inputs| {
         let (x, rest) = inputs.split_at(states);
-        let (u, step) = rest.split_at(controls);
-        model.step.eval(&model.arguments_at(x, u, step[0]))
+        let (out, step) = rest.split_at(outputs);
+        match &interface.act {
+            None => model.step.recorded_at(&model.arguments_at(x, out, step[0])),
+            Some(act) => {
+                let u = act.recorded_at(&[at_state(model, x, step[0]), out.to_vec()].concat());
+                model.step.recorded_at(&model.arguments_at(x, &u, step[0]))
+            }
+        }
     }))
+}
+
+/// What the network behind `interface` sees: states and the number of the step to its inputs; none where
+/// it sees the states.
+pub fn observe_tape(model: &Model, interface: &Interface) -> Option<Tape> {
+    let states = model.states.len();
+    interface.observe.as_ref().map(|observe| {
+        Tape::hard(&record(states + 1, |inputs| {
+            let (x, step) = inputs.split_at(states);
+            observe.recorded_at(&at_state(model, x, step[0]))
+        }))
+    })
+}
+
+/// The inputs of the formulas at a state, where no formula reads a control.
+fn at_state(model: &Model, x: &[Expr], step: Expr) -> Vec<Expr> {
+    model.arguments_at(x, &vec![Real::lit(0.0); model.controls.len()], step)
 }
 
 /// The measures of a rollout: its states `[T + 1, states]` to the softened G and, where the margins are

@@ -4,6 +4,7 @@ use toml::Table;
 
 use super::axes::{self, State};
 use super::bodies;
+use super::disturbances::{self, Disturbance};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
 use super::names::{Scope, Seconds};
@@ -17,11 +18,21 @@ use crate::formula::text::{LONGEST_TEXT, shown};
 use crate::system::{Axis, Body, Parameter};
 
 /// Keys of `[model]`.
-const KEYS: [&str; 10] =
-    ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task", "bodies"];
+const KEYS: [&str; 11] = [
+    "name",
+    "states",
+    "controls",
+    "parameters",
+    "disturbances",
+    "let",
+    "next",
+    "flow",
+    "time",
+    "task",
+    "bodies",
+];
 /// Sections of `[model]` that are refused by name, and what they would be.
-const LATER: [(&str, &str); 6] = [
-    ("disturbances", "numbers that are drawn at every step do"),
+const LATER: [(&str, &str); 5] = [
     ("noise", "measurement noise does"),
     ("costs", "costs of plans do"),
     ("references", "references of costs do"),
@@ -40,6 +51,8 @@ pub struct Description {
     pub controls: Vec<Axis>,
     /// Numbers that are fixed for a rollout.
     pub parameters: Vec<Parameter>,
+    /// Numbers that act at every step where a policy is trained against them.
+    pub disturbances: Vec<Disturbance>,
     /// Seconds between two steps, where the text says.
     pub period: Option<f32>,
     /// How the state moves on.
@@ -72,11 +85,13 @@ impl Description {
         let parameters = axes::parameters(model.section("parameters")?, &mut scope)?;
         let time = dynamics::time(model.section("time")?.as_ref())?;
         scope.declare_time(if time.period.is_some() { Seconds::Known } else { Seconds::Unknown });
+        let disturbances = disturbances::disturbances(model.section("disturbances")?, &mut scope)?;
         let lets = Lets::read(model.section("let")?, &mut scope)?;
         let state_names: Vec<&str> = states.iter().map(|state| state.axis.name.as_str()).collect();
         let control_names: Vec<&str> = controls.iter().map(|axis| axis.name.as_str()).collect();
         let policy = root.section("policy")?;
         let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
+        let policy = policy.transpose()?.flatten();
         Ok(Self {
             dynamics: dynamics::dynamics(&model, &state_names, time, &scope)?,
             task: task::task(
@@ -85,11 +100,12 @@ impl Description {
                 time.period,
             )?,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
-            policy: policy.transpose()?,
+            policy,
             name,
             states,
             controls,
             parameters,
+            disturbances,
             period: time.period,
             lets,
             networks: None,

@@ -4,7 +4,9 @@ mod axes;
 mod bodies;
 mod control;
 mod description;
+mod disturbances;
 mod dynamics;
+mod interface;
 mod lets;
 mod names;
 mod network;
@@ -18,6 +20,7 @@ mod written;
 
 pub use axes::{MOST_CONTROLS, MOST_PARAMETERS, MOST_STATES, State, Topology};
 pub use description::Description;
+pub use disturbances::{Disturbance, MOST_DISTURBANCES};
 pub use dynamics::{Dynamics, Integration, Integrator};
 pub use network_file::{MOST_NETWORKS, NetworkFile};
 pub use origin::Origin;

@@ -38,7 +38,7 @@ impl FormulaKind {
     /// What a formula may use, for an error about one that uses more.
     fn allowed(self) -> &'static str {
         match self {
-            Self::Dynamics => "dynamics know states, controls, parameters and time",
+            Self::Dynamics => "dynamics know states, controls, parameters, disturbances and time",
             Self::Task => "a margin knows states, parameters and time",
             Self::Picture => "a body stands where states say",
             Self::Policy | Self::Act => {
@@ -78,20 +78,21 @@ impl Written {
             return Err(self.refuse(origin, output.at, problem));
         }
         if kind != FormulaKind::Dynamics {
-            self.check_controls(origin, scope, kind)?;
+            self.check_deeds(origin, scope, kind)?;
         }
         Ok(())
     }
 
-    /// Refuses controls, whether used here or by an intermediate formula.
-    fn check_controls(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
+    /// Refuses controls and disturbances, whether used here or by an intermediate formula.
+    fn check_deeds(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
         for Use { number, at } in self.formula.names() {
-            let Some(control) = scope.control_behind(number) else { continue };
-            let (name, control) = (scope.names.at(number), scope.names.at(control));
-            let what = if name == control {
-                format!("`{name}` is a control")
+            let Some(deed) = scope.deed_behind(number) else { continue };
+            let kind_of = if scope.is_control(deed) { "control" } else { "disturbance" };
+            let (name, deed) = (scope.names.at(number), scope.names.at(deed));
+            let what = if name == deed {
+                format!("`{name}` is a {kind_of}")
             } else {
-                format!("`{name}` uses the control `{control}`")
+                format!("`{name}` uses the {kind_of} `{deed}`")
             };
             return Err(self.refuse(origin, at, format!("{what}; {}", kind.allowed())));
         }
