@@ -34,6 +34,7 @@ pub(super) fn described() -> TrainSettings {
             scale: 1.0,
             certified: 0.0,
             unit: Some(Unit::Found(Found::Margins)),
+            stepwise: Some(1.0),
             gamma: Some(1.0),
             optimiser: Optimiser { rate: 4e-3, ..plain.analytic.optimiser },
             ..plain.analytic

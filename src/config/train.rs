@@ -44,6 +44,7 @@ pub(crate) fn common(hidden: Vec<usize>) -> TrainSettings {
             slope: 0.05,
             certified: 0.5,
             unit: None,
+            stepwise: None,
             gamma: None,
             optimiser,
         },

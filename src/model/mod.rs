@@ -5,6 +5,7 @@ mod controller;
 mod fit;
 mod identity;
 mod interface;
+mod picture;
 mod plant;
 mod recorded;
 mod role;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 
 pub use controller::{Controller, Law};
 pub use interface::Interface;
+pub use picture::{Outline, Picture, PlacedBody, Shape, ShapeKind};
 pub use plant::Plant;
 pub use role::Role;
 pub use stage::{MapCost, StageCost};
@@ -55,6 +57,8 @@ pub struct Model {
     pub constraint: Graph,
     /// The bodies that a picture shows.
     pub bodies: Vec<Body>,
+    /// What else a picture shows.
+    pub picture: Picture,
     /// The narrowest thing that the margins know of, where it is known.
     pub smallest_feature: Option<Feature>,
     /// The system as compiled, where it is written in Rust.
@@ -76,6 +80,7 @@ impl PartialEq for Model {
             && same_data
             && same_formulas
             && self.bodies == other.bodies
+            && self.picture == other.picture
     }
 }
 

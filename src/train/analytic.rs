@@ -13,12 +13,12 @@ use super::rows::Rows;
 use super::run::Learner;
 use super::score::{mean_measure, share, successes};
 use super::settings::AnalyticSettings;
-use super::soft::{measure_tape, observe_tape, step_tape};
+use super::soft::{Measured, measure_tape, observe_tape, step_tape};
 use super::starts::Mixture;
 use super::tape::Tape;
 use crate::backend::Backend;
 use crate::error::{Error, Result};
-use crate::model::{Interface, Model};
+use crate::model::{Interface, Model, Role};
 use crate::policy::Mlp;
 use crate::rollout::{RolloutSpec, StateList, States, Tightening};
 use crate::rounding::number;
@@ -108,11 +108,17 @@ impl<'a> Analytic<'a> {
     /// Trains `network` from the parameters that it has.
     pub fn new(task: Task<'a>, network: Network, settings: AnalyticSettings) -> Self {
         let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
+        let unit = settings.unit.map_or(1.0, |unit| unit.number(&task.model, &held_out));
+        let measured = Measured {
+            spec: &task.spec,
+            tightening: task.tightening.as_ref(),
+            unit: stepwise(&task, &settings).map(|_| unit as f32),
+        };
         Self {
-            unit: settings.unit.map_or(1.0, |unit| unit.number(&task.model, &held_out)),
+            unit,
             step: Arc::new(step_tape(&task.model, &task.interface)),
             observe: observe_tape(&task.model, &task.interface).map(Arc::new),
-            measure: Arc::new(measure_tape(&task.model, &task.spec, task.tightening.as_ref())),
+            measure: Arc::new(measure_tape(&task.model, measured)),
             adam: Adam::new(network.parameters.len()),
             network,
             held_out,
@@ -121,7 +127,8 @@ impl<'a> Analytic<'a> {
         }
     }
 
-    /// The softened measures `[starts, 1 or 2]` of rollouts under `network`: G and `V_check`.
+    /// The softened measures `[starts, 1 to 3]` of rollouts under `network`: G, `V_check` and the mean over
+    /// the steps, as far as they have a weight.
     pub fn measures(&self, network: &Bound, starts: States<'_>, temperature: f32) -> Tensor<2> {
         let (device, count) = (&self.task.device, starts.len());
         let mut x = device.tensor(starts.numbers().to_vec(), [count, starts.size()]);
@@ -133,13 +140,27 @@ impl<'a> Analytic<'a> {
                 None => x.clone(),
             };
             x = apply(&self.step, temperature, [x, network.forward(seen), step]);
+            if let Some(k) = std::env::var("DECAY").ok().and_then(|k| k.parse::<f64>().ok()) {
+                x = x.clone().mul_scalar(k) + x.detach().mul_scalar(1.0 - k);
+            }
             states.push(x.clone());
         }
         apply(&self.measure, temperature, [Tensor::cat(states, 1)])
     }
 
-    /// Mean gain `tanh(g / scale) + slope g / scale` of the measures, the certified one weighted.
+    /// Mean gain `tanh(g / scale) + slope g / scale` of the measures, the certified one weighted, and with
+    /// it the weighted mean over the steps.
     fn gain(&self, measures: Tensor<2>) -> Tensor<1> {
+        let Some(weight) = stepwise(&self.task, &self.settings) else {
+            return self.gain_of(measures);
+        };
+        let [_, columns] = measures.dims();
+        let steps = measures.clone().narrow(1, columns - 1, 1).mean().mul_scalar(weight);
+        self.gain_of(measures.narrow(1, 0, columns - 1)) + steps
+    }
+
+    /// The same of G and `V_check` alone.
+    fn gain_of(&self, measures: Tensor<2>) -> Tensor<1> {
         let AnalyticSettings { scale, slope, certified, .. } = self.settings;
         let [rows, columns] = measures.dims();
         let scaled = measures.div_scalar(scale * self.unit);
@@ -159,6 +180,13 @@ impl<'a> Analytic<'a> {
     pub fn policy(&self) -> Result<Mlp> {
         self.network.export(self.task.order())
     }
+}
+
+/// The weight of the mean over the steps, for a task that has to hold at every step.
+fn stepwise(task: &Task<'_>, settings: &AnalyticSettings) -> Option<f64> {
+    let roles = task.model.task.roles(task.spec.horizon);
+    let chosen = roles.iter().any(|role| role.has(Role::CHANCE));
+    settings.stepwise.filter(|weight| *weight > 0.0 && !chosen)
 }
 
 impl Learner for Analytic<'_> {

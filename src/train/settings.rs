@@ -117,6 +117,10 @@ pub struct AnalyticSettings {
     /// by their success, and where that is equal by their mean measure in this unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// Weight of the mean over the steps of `tanh(margin / unit)` of what has to hold at each, beside G; for
+    /// tasks that have to hold at every step. A rollout that ends badly says little by its worst moment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stepwise: Option<f64>,
     /// Discount of the measure that is trained on, in (0, 1]; that of the rollouts if nothing is said. It
     /// changes no success.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -247,6 +251,7 @@ impl AnalyticSettings {
         if let Some(Unit::Given(unit)) = self.unit {
             positive("train.analytic.unit", unit)?;
         }
+        not_negative("train.analytic.stepwise", self.stepwise.unwrap_or(0.0))?;
         if let Some(gamma) = self.gamma {
             positive("train.analytic.gamma", gamma)?;
             share("train.analytic.gamma", gamma)?;

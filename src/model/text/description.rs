@@ -3,7 +3,7 @@
 use toml::Table;
 
 use super::axes::{self, State};
-use super::bodies;
+use super::bodies::{self, Bodies};
 use super::disturbances::{self, Disturbance};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
@@ -12,13 +12,15 @@ use super::network_file::NetworkFile;
 use super::origin::Origin;
 use super::policy::{self, Policy};
 use super::section::Section;
+use super::shapes;
 use super::task::{self, WrittenTask};
 use crate::error::Result;
 use crate::formula::text::{LONGEST_TEXT, shown};
-use crate::system::{Axis, Body, Parameter};
+use crate::model::Shape;
+use crate::system::{Axis, Parameter};
 
 /// Keys of `[model]`.
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 12] = [
     "name",
     "states",
     "controls",
@@ -30,14 +32,14 @@ const KEYS: [&str; 11] = [
     "time",
     "task",
     "bodies",
+    "shapes",
 ];
 /// Sections of `[model]` that are refused by name, and what they would be.
-const LATER: [(&str, &str); 5] = [
+const LATER: [(&str, &str); 4] = [
     ("noise", "measurement noise does"),
     ("costs", "costs of plans do"),
     ("references", "references of costs do"),
     ("maps", "maps of costs do"),
-    ("shapes", "shapes of pictures do"),
 ];
 
 /// A model and its policy as a text describes them: every name known, every formula parsed.
@@ -59,8 +61,10 @@ pub struct Description {
     pub dynamics: Dynamics,
     /// What a rollout has to do, and the margins.
     pub task: WrittenTask,
-    /// What pictures show.
-    pub bodies: Vec<Body>,
+    /// The bodies that pictures show.
+    pub bodies: Bodies,
+    /// The shapes that pictures show.
+    pub shapes: Vec<Shape>,
     /// What makes the controls, where the text says.
     pub policy: Option<Policy>,
     pub(super) lets: Lets,
@@ -100,6 +104,7 @@ impl Description {
                 time.period,
             )?,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
+            shapes: shapes::shapes(model.section("shapes")?)?,
             policy,
             name,
             states,

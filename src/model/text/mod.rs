@@ -14,10 +14,12 @@ mod network_file;
 mod origin;
 mod policy;
 mod section;
+mod shapes;
 mod step;
 mod task;
 mod written;
 
+pub use bodies::{Bodies, WrittenBody};
 pub use axes::{MOST_CONTROLS, MOST_PARAMETERS, MOST_STATES, State, Topology};
 pub use description::Description;
 pub use disturbances::{Disturbance, MOST_DISTURBANCES};

@@ -8,7 +8,7 @@ use super::written::Written;
 use crate::error::Result;
 use crate::formula::text::{MOST_NODES, Networks, Values};
 use crate::formula::{Graph, Scalar, record};
-use crate::model::Model;
+use crate::model::{Model, Picture};
 use crate::real::Real;
 use crate::system::Axis;
 
@@ -51,7 +51,11 @@ impl Description {
             task: self.task.task,
             target: margin(&self.task.target, NOWHERE)?,
             constraint: margin(&self.task.constraint, EVERYWHERE)?,
-            bodies: self.bodies.clone(),
+            bodies: self.bodies.at_states.clone(),
+            picture: Picture {
+                bodies: self.placed_bodies(&networks)?,
+                shapes: self.shapes.clone(),
+            },
             smallest_feature: None,
             native: None,
         })

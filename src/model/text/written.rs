@@ -40,7 +40,7 @@ impl FormulaKind {
         match self {
             Self::Dynamics => "dynamics know states, controls, parameters, disturbances and time",
             Self::Task => "a margin knows states, parameters and time",
-            Self::Picture => "a body stands where states say",
+            Self::Picture => "a body stands where states, parameters and time say",
             Self::Policy | Self::Act => {
                 "a policy knows states, parameters and time, and makes the controls"
             }
