@@ -127,13 +127,6 @@ impl Layers {
         self.given(&|_| true).contains_key("train")
     }
 
-    /// Whether the file or a set has the section `plan`, or costs of plans.
-    pub(super) fn plans(&self) -> bool {
-        let given = self.given(&|_| true);
-        let costs = given.get("model").is_some_and(|model| model.get("costs").is_some());
-        costs || given.contains_key("plan")
-    }
-
     /// The defaults of the profile and the system that the table `given` names.
     fn defaults(&self, given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
         let profile = profile(given, origin)?;

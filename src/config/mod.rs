@@ -9,6 +9,7 @@ mod drops;
 mod enclosed;
 mod keys;
 mod layers;
+mod learning;
 mod model;
 mod named_system;
 mod open;
@@ -110,8 +111,8 @@ impl Config {
         config.registry = overrides.registry.clone();
         config.networks = config.networks_beside(&place)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
-        // What is about to be trained is not there yet.
-        let checked = config.policy.check(layers.trains() || layers.plans());
+        // What is about to be trained is not there yet, and a model may be given before its policy.
+        let checked = config.policy.check(layers.trains() || config.model.is_some());
         config.sources = layers.sources();
         let profile = ProfileOf::of(overrides.profile, &overrides.set);
         let checked = checked.and_then(|()| unused::check(&config, &config.sources, profile));

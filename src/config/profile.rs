@@ -2,6 +2,7 @@
 
 use super::deterministic::DeterministicSection;
 use super::drops::{self, CalibrationSection, DropsSection, TighteningSource};
+use super::learning;
 use super::named_system::NamedSystem;
 use super::registry::Registry;
 use super::section::{
@@ -63,6 +64,7 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     let mut config = common(profile, None, states, &state, SliceSection { x, y });
     config.deviation.radius = narrowest / 50.0;
     config.growth.radius = narrowest / 4.0;
+    config.train = Some(learning::described());
     config
 }
 
