@@ -18,7 +18,7 @@ fn bounds_that_no_plan_can_use() {
     says(
         &open,
         &[],
-        &["model.toml:8", "model.controls.u.bounds", "is open", "[-10.0, 10.0]", "plan.sigma"],
+        &["model.toml:7", "model.controls.u.bounds", "is open", "[-10.0, 10.0]", "plan.sigma"],
     );
     let fixed = LINE.replace("[-4.0, 4.0]", "[1.0, 1.0]");
     says(&fixed, &[], &["model.controls", "nothing to plan"]);
