@@ -9,10 +9,10 @@ use super::enclosure::{self, Enclosure};
 use super::fit::check_sizes;
 use super::growth_plan::Around;
 use super::origin::{provenance, system_record};
+use super::purpose;
 use super::record::{
     GrowthRecord, Provenance, Record, SCHEMA, StateRecord, Timing, decimal, finite_margin,
 };
-use super::purpose;
 use super::sets;
 use super::settings::Settings;
 use super::tier::tier;

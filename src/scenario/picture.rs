@@ -77,7 +77,9 @@ fn plane(model: &Model, settings: &Settings) -> Option<[usize; 2]> {
     match (body, placed) {
         (Some(body), _) => Some([body.x, body.y]),
         (None, Some(_)) => None,
-        (None, None) => settings.slice.as_ref().map(|slice| slice.each_ref().map(|axis| axis.state)),
+        (None, None) => {
+            settings.slice.as_ref().map(|slice| slice.each_ref().map(|axis| axis.state))
+        }
     }
     .filter(|[x, y]| x != y)
 }

@@ -19,8 +19,8 @@ mod step;
 mod task;
 mod written;
 
-pub use bodies::{Bodies, WrittenBody};
 pub use axes::{MOST_CONTROLS, MOST_PARAMETERS, MOST_STATES, State, Topology};
+pub use bodies::{Bodies, WrittenBody};
 pub use description::Description;
 pub use disturbances::{Disturbance, MOST_DISTURBANCES};
 pub use dynamics::{Dynamics, Integration, Integrator};

@@ -27,7 +27,9 @@ fn outline(entry: &Section<'_>) -> Result<Outline> {
         (Some(ends), None) => {
             let [left, lower, right, upper] = ends;
             if left >= right || lower >= upper {
-                return Err(entry.refuse("box", "empty; expected left below right, lower below upper"));
+                return Err(
+                    entry.refuse("box", "empty; expected left below right, lower below upper")
+                );
             }
             Ok(Outline::Box(ends))
         }

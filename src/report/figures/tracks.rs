@@ -65,9 +65,10 @@ fn of_states(record: &Record, body: &Body) -> Track {
 
 /// A body at formulas.
 fn of_formulas(record: &Record, body: &DrawnBody) -> Track {
-    let paths = body.right.iter().zip(&body.up).map(|(right, up)| {
-        right.iter().zip(up).map(|(x, y)| [*x, *y].map(f64::from)).collect()
-    });
+    let paths =
+        body.right.iter().zip(&body.up).map(|(right, up)| {
+            right.iter().zip(up).map(|(x, y)| [*x, *y].map(f64::from)).collect()
+        });
     let plain = record.system.bodies.iter().find(|plain| plain.name == body.name);
     Track {
         name: body.name.clone(),
@@ -152,7 +153,8 @@ pub(super) fn shape_legend(shapes: &[Shape]) -> impl Iterator<Item = (Swatch, St
 /// Draws the bodies of the first rollout as large as they are, with the lines that join them, at its first
 /// and its last state.
 pub(super) fn draw_bodies(plot: &mut Plot, tracks: &[Track]) {
-    let ends: [fn(&Vec<[f64; 2]>) -> Option<&[f64; 2]>; 2] = [|path| path.first(), |path| path.last()];
+    let ends: [fn(&Vec<[f64; 2]>) -> Option<&[f64; 2]>; 2] =
+        [|path| path.first(), |path| path.last()];
     for end in ends {
         let place = |track: &Track| track.paths.first().and_then(end).copied();
         for track in tracks {
