@@ -1,5 +1,6 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
+mod costs;
 mod counts;
 mod deterministic;
 mod deterministic_settings;

@@ -16,6 +16,7 @@ mod made;
 mod npz;
 pub(crate) mod number;
 mod plain;
+mod sheet;
 mod states;
 #[cfg(feature = "cli")]
 mod table;
@@ -39,6 +40,7 @@ pub(crate) use plain::ARCHIVE_BYTES;
 #[cfg(feature = "gpu")]
 pub(crate) use plain::is_denied;
 pub(crate) use plain::{CONFIG_BYTES, RECORD_BYTES, open, read, read_text};
+pub use sheet::Sheet;
 pub use states::StateReader;
 #[cfg(feature = "cli")]
 pub use table::{Column, Table};

@@ -2,28 +2,36 @@
 
 mod compiled;
 mod controller;
+mod costs;
 mod fit;
 mod identity;
 mod interface;
+mod lookups;
 mod picture;
 mod plant;
 mod recorded;
+mod reference;
 mod role;
 mod stage;
 mod task;
 mod task_words;
+mod terminal;
 pub mod text;
 
 use std::sync::Arc;
 
 pub use controller::{Controller, Law};
+pub use costs::{Costs, Term, TermKind};
 pub use interface::Interface;
+pub use lookups::Lookups;
 pub use picture::{Outline, Picture, PlacedBody, Shape, ShapeKind};
 pub use plant::Plant;
+pub use reference::{Reference, ReferenceSource};
 pub use role::Role;
 pub use stage::{MapCost, StageCost};
 pub use task::{Task, Window};
 pub use task_words::Form;
+pub use terminal::TerminalCost;
 
 use self::compiled::CompiledForm;
 use crate::formula::Graph;

@@ -1,6 +1,7 @@
 //! Models from text: against the same plants in Rust, against loops in f64, and what is refused.
 
 mod carried;
+mod costs;
 mod formulas;
 mod integrators;
 #[path = "../learned/mod.rs"]

@@ -184,7 +184,7 @@ fn what_does_not_work_yet_is_refused_by_name() {
         "draw = \"uniform\"",
         &["model.parameters.mass.draw", "not work yet"],
     );
-    for section in ["disturbances", "noise", "costs", "references", "maps", "shapes"] {
+    for section in ["disturbances", "noise", "shapes"] {
         let text = format!("[model.{section}]\n[model.time]");
         let place = format!("model.{section}: ");
         assert_refused("[model.time]", &text, &[&place, "not work yet; leave the section out"]);

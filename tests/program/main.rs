@@ -6,6 +6,7 @@ mod command;
 mod common;
 
 mod asked;
+mod costs;
 mod disk;
 mod earlier;
 mod endless;

@@ -6,10 +6,12 @@ mod dispatch;
 mod early_exit;
 mod interpreted;
 mod interpreted_stages;
+mod interpreted_terminal;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;
 mod load;
+mod lookups;
 mod mlp;
 mod mppi;
 mod mppi_rollout;

@@ -153,7 +153,7 @@ impl Description {
         let graph = record(self.inputs() + outputs, |inputs| {
             let (inputs, outputs) = inputs.split_at(self.inputs());
             let names = self.lets.values(inputs, &needed, networks);
-            let values = Values { names: &names, outputs, networks };
+            let values = Values { names: &names, outputs, looked: &[], networks };
             formulas.iter().map(|written| written.formula.value(values)).collect()
         });
         self.check_size("policy.act", graph.nodes.len())?;

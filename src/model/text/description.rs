@@ -4,6 +4,7 @@ use toml::Table;
 
 use super::axes::{self, State};
 use super::bodies::{self, Bodies};
+use super::costs::{self, WrittenCosts};
 use super::disturbances::{self, Disturbance};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
@@ -20,7 +21,7 @@ use crate::model::Shape;
 use crate::system::{Axis, Parameter};
 
 /// Keys of `[model]`.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 15] = [
     "name",
     "states",
     "controls",
@@ -33,14 +34,12 @@ const KEYS: [&str; 12] = [
     "task",
     "bodies",
     "shapes",
+    "costs",
+    "references",
+    "maps",
 ];
 /// Sections of `[model]` that are refused by name, and what they would be.
-const LATER: [(&str, &str); 4] = [
-    ("noise", "measurement noise does"),
-    ("costs", "costs of plans do"),
-    ("references", "references of costs do"),
-    ("maps", "maps of costs do"),
-];
+const LATER: [(&str, &str); 1] = [("noise", "measurement noise does")];
 
 /// A model and its policy as a text describes them: every name known, every formula parsed.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,6 +60,8 @@ pub struct Description {
     pub dynamics: Dynamics,
     /// What a rollout has to do, and the margins.
     pub task: WrittenTask,
+    /// What plans cost, where the text says; no part of the plant and its task.
+    pub costs: Option<WrittenCosts>,
     /// The bodies that pictures show.
     pub bodies: Bodies,
     /// The shapes that pictures show.
@@ -103,6 +104,7 @@ impl Description {
                 &scope,
                 time.period,
             )?,
+            costs: costs::costs(&model, &scope)?,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
             shapes: shapes::shapes(model.section("shapes")?)?,
             policy,

@@ -61,7 +61,9 @@ impl Lets {
     /// Those of `uses` that are intermediate formulas, by their numbers.
     fn among(&self, uses: impl Iterator<Item = Use>) -> Vec<Use> {
         let first = self.first as u32;
-        uses.filter(|found| found.number >= first)
+        // Behind them are the references of costs.
+        let own = first..first + self.formulas.len() as u32;
+        uses.filter(|found| own.contains(&found.number))
             .map(|found| Use { number: found.number - first, ..found })
             .collect()
     }
@@ -124,7 +126,7 @@ impl Lets {
     }
 
     /// Which of them `formulas` need, directly or through others.
-    pub(super) fn needed(&self, formulas: &[Written]) -> Vec<bool> {
+    pub(super) fn needed<'a>(&self, formulas: impl IntoIterator<Item = &'a Written>) -> Vec<bool> {
         let mut needed = vec![false; self.formulas.len()];
         let mark = |needed: &mut Vec<bool>, uses: Vec<Use>| {
             uses.iter().for_each(|found| needed[found.number as usize] = true);
@@ -162,7 +164,7 @@ impl Lets {
         names.resize(self.first, R::lit(0.0));
         names.resize(self.first + self.formulas.len(), inputs[0]);
         for &i in self.order.iter().filter(|i| needed[**i]) {
-            let values = Values { names: &names, outputs: &[], networks };
+            let values = Values { names: &names, outputs: &[], looked: &[], networks };
             names[self.first + i] = self.formulas[i].formula.value(values);
         }
         names

@@ -190,7 +190,7 @@ impl<'a> Formulas<'a> {
 
     /// The value of `written` for the values of all names.
     fn value<R: Scalar>(&self, written: &Written, names: &[R]) -> R {
-        written.formula.value(Values { names, outputs: &[], networks: self.networks })
+        written.formula.value(Values { names, outputs: &[], looked: &[], networks: self.networks })
     }
 
     /// The state a period after `inputs`, the formulas being derivatives.
