@@ -209,6 +209,8 @@ pub mod error;
 pub mod files;
 pub mod formula;
 pub mod model;
+#[cfg(feature = "cli")]
+pub mod plan;
 pub mod policy;
 pub mod race;
 pub mod real;

@@ -10,7 +10,7 @@ use modules::{Import, Modules};
 /// Layer of each top-level module; a file may name its own layer and those below it.
 ///
 /// The study goes through all of them; its parts that stand elsewhere than with the experiments are named.
-const LAYERS: [(&str, u32); 28] = [
+const LAYERS: [(&str, u32); 29] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
@@ -27,6 +27,7 @@ const LAYERS: [(&str, u32); 28] = [
     ("backend", 4),
     ("scenario", 5),
     ("control", 5),
+    ("plan", 6),
     ("race", 8),
     ("race::system", 2),
     ("race::cost", 2),

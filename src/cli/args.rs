@@ -39,6 +39,7 @@ Examples:
   reachcast query reachcast-out --states configs/race_starts_500.csv
   reachcast check reachcast-out
   reachcast falsify configs/models/dubins.toml
+  reachcast plan configs/models/double_integrator.toml
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
   reachcast train configs/train/race.toml
@@ -160,6 +161,28 @@ Examples:
   reachcast falsify configs/race.toml --radius 0.1 --starts configs/race_starts_500.csv
   reachcast falsify --around reachcast-out --within ball")]
     Falsify(FalsifyArguments),
+    /// Steer a model in closed loop by sampled plans (MPPI) that cost little
+    ///
+    /// For a model as text with [model.costs]: what a plan pays at each stage and at its end. Section [plan]
+    /// says how plans are made; a run starts at [state], several start in the box. Writes plan.json, steps.csv
+    /// (a row for each step: states, controls, margins, what each term costs, effective samples,
+    /// milliseconds), trajectories.npz and report.html to the folder of --out.
+    #[command(after_help = "\
+Examples:
+  reachcast plan configs/models/double_integrator.toml
+  reachcast plan configs/models/double_integrator.toml --set plan.runs=100 --out plan100
+  reachcast plan configs/models/double_integrator.toml --set plan.samples=4096 --backend gpu --json")]
+    Plan {
+        /// Configuration (TOML)
+        config: PathBuf,
+        /// Folder of the results [default: reachcast-plan]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        replace: Replace,
+        #[command(flatten, next_help_heading = "Configuration")]
+        changes: Changes,
+    },
     #[command(flatten)]
     Study(StudyCommand),
     /// Train a policy, or a network that tells its value
@@ -237,6 +260,7 @@ impl Command {
             Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
             Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
             Self::Falsify(asked) => own(asked.changes.clone(), &asked.out, asked.replace),
+            Self::Plan { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Study(asked) => asked.options(),
             Self::Policy(PolicyCommand::Import(asked)) => {
                 own(no_seed(&asked.keys), &asked.out, asked.replace)

@@ -9,6 +9,8 @@ mod falsify;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
+mod plan;
+mod planned;
 mod policy;
 pub(crate) mod progress;
 mod replayed;
@@ -76,6 +78,7 @@ fn dispatch(arguments: &Arguments) -> Result<Outcome> {
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
         Command::Check { folder, fresh_seed } => stored::check(global, folder, *fresh_seed),
         Command::Falsify(asked) => falsify::run(global, asked),
+        Command::Plan { config, .. } => plan::run(global, config),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

@@ -84,6 +84,10 @@ pub(super) fn with_optional(defaults: &Table) -> Table {
             global.insert(key.to_owned(), Value::Float(0.0));
         }
     }
+    if let Some(Value::Table(plan)) = valid.get_mut("plan") {
+        plan.insert("sigma".to_owned(), Value::Float(0.0));
+        plan.insert("steps".to_owned(), Value::Integer(0));
+    }
     with_states(&mut valid);
     with_tagged(&mut valid);
     valid

@@ -68,7 +68,7 @@ impl Layers {
             keys::check_known(&valid, set, name)?;
         }
         keys::overlay(&mut merged, given);
-        for section in ["race", "train"] {
+        for section in ["race", "train", "plan"] {
             let checked = merged.get(section).map(|keys| keys::check_finite(section, keys));
             checked.unwrap_or(Ok(())).map_err(|error| self.placed(error, origin))?;
         }
@@ -122,6 +122,13 @@ impl Layers {
     /// Whether the file or a set has the section `train`.
     pub(super) fn trains(&self) -> bool {
         self.given(&|_| true).contains_key("train")
+    }
+
+    /// Whether the file or a set has the section `plan`, or costs of plans.
+    pub(super) fn plans(&self) -> bool {
+        let given = self.given(&|_| true);
+        let costs = given.get("model").is_some_and(|model| model.get("costs").is_some());
+        costs || given.contains_key("plan")
     }
 }
 

@@ -12,6 +12,7 @@ mod layers;
 mod learning;
 mod model;
 mod open;
+mod plan;
 mod plant;
 pub(crate) mod profile;
 mod section;
@@ -102,8 +103,10 @@ impl Config {
         let mut config = layers.config()?;
         config.networks = config.networks_beside(&place)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
-        // What is about to be trained is not there yet, and a model may be given before its policy.
-        let checked = config.policy.check(layers.trains() || config.model.is_some());
+        // What is about to be trained is not there yet, a plan needs none, and a model may be given before its
+        // policy.
+        let optional = layers.trains() || layers.plans() || config.model.is_some();
+        let checked = config.policy.check(optional);
         config.sources = layers.sources();
         let profile = ProfileOf::of(overrides.profile, &overrides.set);
         let checked = checked.and_then(|()| unused::check(&config, &config.sources, profile));
@@ -118,20 +121,21 @@ impl Config {
     }
 
     /// The configuration as a certificate or a race stores it, every default filled in, without the
-    /// section `train`, which they do not depend on.
+    /// sections `train` and `plan`, which they do not depend on.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_json(&self) -> Result<serde_json::Value> {
-        stored(Self { train: None, ..self.clone() })
+        stored(Self { train: None, plan: None, ..self.clone() })
     }
 
-    /// The configuration as training stores it, every default filled in, without the section `race`.
+    /// The configuration as training stores it, every default filled in, without the sections `race` and
+    /// `plan`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_train_json(&self) -> Result<serde_json::Value> {
-        stored(Self { study: None, ..self.clone() })
+        stored(Self { study: None, plan: None, ..self.clone() })
     }
 
     /// The configuration that a certificate stores.

@@ -11,6 +11,7 @@ use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
+use crate::plan::PlanSettings;
 use crate::rollout::PairControl;
 use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::decimal;
@@ -144,6 +145,7 @@ pub(crate) fn common(
         sequential: SequentialSection::default(),
         study: None,
         train: None,
+        plan: Some(PlanSettings::default()),
         sources: Sources::default(),
     }
 }

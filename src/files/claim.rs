@@ -20,9 +20,14 @@ struct Kind {
 }
 
 /// Every kind of results that has a folder for itself.
-const KINDS: [Kind; 5] = [
+const KINDS: [Kind; 6] = [
     Kind { words: "a certificate", files: &CERTIFICATE, folder: None },
     Kind { words: "a search for failures", files: &["falsify.json"], folder: None },
+    Kind {
+        words: "plans in closed loop",
+        files: &["plan.json", "steps.csv", "trajectories.npz"],
+        folder: None,
+    },
     Kind {
         words: "races",
         files: &["results.json", "timing.json"],

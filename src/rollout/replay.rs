@@ -138,7 +138,7 @@ fn driven(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Driven> {
 }
 
 /// The margins at each of `states`, of rollouts of `horizon` steps.
-fn margins<'a>(
+pub(crate) fn margins<'a>(
     model: &Model,
     horizon: u32,
     states: impl Iterator<Item = &'a [f64]>,
