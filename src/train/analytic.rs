@@ -140,9 +140,6 @@ impl<'a> Analytic<'a> {
                 None => x.clone(),
             };
             x = apply(&self.step, temperature, [x, network.forward(seen), step]);
-            if let Some(k) = std::env::var("DECAY").ok().and_then(|k| k.parse::<f64>().ok()) {
-                x = x.clone().mul_scalar(k) + x.detach().mul_scalar(1.0 - k);
-            }
             states.push(x.clone());
         }
         apply(&self.measure, temperature, [Tensor::cat(states, 1)])

@@ -2,13 +2,10 @@
 
 use toml::Value;
 
-use super::description::Description;
 use super::names::Scope;
 use super::section::{Section, unknown};
 use super::written::{FormulaKind, Written};
 use crate::error::Result;
-use crate::formula::text::Networks;
-use crate::model::PlacedBody;
 use crate::system::Body;
 
 /// The bodies of a description.
@@ -97,21 +94,5 @@ impl WrittenBody {
         };
         let [x, y] = &self.at;
         Some(Body { name: self.name.clone(), x: state(x)?, y: state(y)? })
-    }
-}
-
-impl Description {
-    /// The bodies at formulas, recorded.
-    pub(super) fn placed_bodies(&self, networks: &Networks) -> Result<Vec<PlacedBody>> {
-        let placed = |body: &WrittenBody| {
-            Ok(PlacedBody {
-                name: body.name.clone(),
-                at: self.recorded(&body.at[0].key, &body.at, networks)?,
-                written: body.at.clone().map(|written| written.text),
-                size: body.size,
-                joined: body.joined,
-            })
-        };
-        self.bodies.placed.iter().map(placed).collect()
     }
 }

@@ -14,6 +14,7 @@ mod names;
 mod network;
 mod network_file;
 mod origin;
+mod placed;
 mod policy;
 mod recorded_costs;
 mod references;

@@ -121,6 +121,9 @@ fn caption(record: &Record, tracks: &[Track], ground: Option<&GroundOf<'_>>) -> 
         rollouts.len(),
         record.system.task.words(Form::Past, record.horizon)
     );
+    if tracks.iter().any(|track| track.size.is_some() || track.joined.is_some()) {
+        caption += " Bodies stand where the first rollout begins and where it ends.";
+    }
     let bodiless = record.system.bodies.is_empty() && tracks::drawn(record).is_some();
     if let ([Track { states: Some(states), .. }], true) = (tracks, bodiless) {
         let [x, y] = states.map(|state| words::name(record, state));
