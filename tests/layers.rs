@@ -10,7 +10,7 @@ use modules::{Import, Modules};
 /// Layer of each top-level module; a file may name its own layer and those below it.
 ///
 /// The study goes through all of them; its parts that stand elsewhere than with the experiments are named.
-const LAYERS: [(&str, u32); 29] = [
+const LAYERS: [(&str, u32); 30] = [
     ("real", 1),
     ("error", 1),
     ("digest", 1),
