@@ -11,9 +11,11 @@ use common::cpu;
 use reachcast::config::{Config, Overrides};
 use reachcast::rollout::{RolloutSpec, Stream};
 use reachcast::train::analytic::{Analytic, Task};
+use reachcast::train::backup::Margins;
 use reachcast::train::device::{Device, floats};
 use reachcast::train::network::{Architecture, Network};
 use reachcast::train::purpose;
+use reachcast::train::reward::{Reward, Visited};
 use reachcast::{Error, policy};
 use std::sync::Arc;
 use training::settings;
@@ -238,6 +240,30 @@ fn what_cannot_be_trained_is_refused_by_name() {
         let found = problem(&CART.replace("unit = \"N\", bound = 0.3", wrong), &[]);
         assert!(found.contains(part), "no `{part}` in: {found}");
     }
+}
+
+/// Without a goal larger target margins are nearer; a violation out of the target costs nothing only where a
+/// rollout is over in the target.
+#[test]
+fn a_reward_follows_from_margins_and_task() {
+    let weights = || settings(&config(CART, &[]).unwrap()).ppo.reward.clone();
+    let visited = |target: f32, constraint: f32| Visited {
+        state: &[0.0, 0.0],
+        margins: Margins { target, constraint },
+    };
+    let reward = |task: reachcast::model::Task, from: [f32; 2], to: [f32; 2]| {
+        let reward = Reward { task, goal: Vec::new(), weights: weights() };
+        reward.of(visited(from[0], from[1]), visited(to[0], to[1]))
+    };
+    let plain = reachcast::model::Task::default();
+    assert!((reward(plain, [-1.0, 1.0], [-0.375, 1.0]) - 0.625).abs() < 1e-6);
+    assert_eq!(reward(plain, [-1.0, 1.0], [-1.0, -0.5]), -2.0);
+    assert_eq!(reward(plain, [0.5, 1.0], [0.5, -0.5]), 0.0);
+    let avoid = reachcast::model::Task::Avoid;
+    assert_eq!(reward(avoid, [0.5, 1.0], [0.5, -0.5]), -2.0);
+    assert_eq!(reward(avoid, [-1.0, 1.0], [-1.0, 1.0]), 0.0);
+    // A margin that is infinite gets no larger.
+    assert_eq!(reward(plain, [f32::NEG_INFINITY, 1.0], [f32::NEG_INFINITY, 1.0]), 0.0);
 }
 
 /// From a file without a policy to a certificate: the last words of `train` are the section that is missing.

@@ -14,7 +14,7 @@ use crate::rounding::as_written;
 use crate::system::Axis;
 use crate::train::adam::Optimiser;
 use crate::train::contest::Contest;
-use crate::train::settings::{AnalyticSettings, TrainSettings, ValueSettings};
+use crate::train::settings::{AnalyticSettings, DdpgSettings, TrainSettings, ValueSettings};
 use crate::train::unit::{Found, Unit};
 
 /// Name of the network that stands for the one that is to be trained.
@@ -25,10 +25,11 @@ pub(super) fn described() -> TrainSettings {
     let plain = common(vec![64; 2]);
     TrainSettings {
         held_out: 2048,
-        interval: 25,
-        patience: 12,
+        interval: 50,
+        // Minutes at most, and reinforcement hardly gets better at first.
+        patience: 0,
         analytic: AnalyticSettings {
-            iterations: 600,
+            iterations: 1500,
             batch: 128,
             temperature: [0.5, 0.05],
             scale: 1.0,
@@ -39,6 +40,7 @@ pub(super) fn described() -> TrainSettings {
             optimiser: Optimiser { rate: 4e-3, ..plain.analytic.optimiser },
             ..plain.analytic
         },
+        ddpg: DdpgSettings { iterations: 20_000, ..plain.ddpg.clone() },
         value: ValueSettings { iterations: 4000, states: 50_000, ..plain.value },
         ..plain
     }

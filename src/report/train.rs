@@ -40,7 +40,7 @@ fn policy(record: &TrainRecord) -> String {
         format!(
             "<section aria-labelledby=\"use\"><h2 id=\"use\">Using the policy</h2>\n\
              <p>The configuration of the model uses it with this section, the file beside it:</p>\n\
-             <pre>{}</pre></section>\n",
+             <pre tabindex=\"0\">{}</pre></section>\n",
             escape(section)
         )
     })

@@ -124,9 +124,7 @@ impl<'a> GroundOf<'a> {
     pub(super) fn words(&self) -> &'static str {
         match self {
             Self::Slice(_) => " Target set and constraint are drawn over the slice",
-            Self::Picture(..) => {
-                " Target set and constraint are drawn as they are at the first step"
-            }
+            Self::Picture(..) => " The margins are drawn as they are at the first step",
         }
     }
 }
