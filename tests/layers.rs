@@ -37,6 +37,7 @@ const LAYERS: [(&str, u32); 29] = [
     ("train", 7),
     ("report", 8),
     ("studies", 9),
+    ("certificate", 9),
     ("cli", 9),
     ("config", 9),
     ("lib", 9),

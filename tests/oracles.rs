@@ -8,7 +8,7 @@ use common::{
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::backend::{Backend, Program};
-use reachcast::model::Plant;
+use reachcast::model::{Controller, Model, Plant};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
@@ -18,7 +18,7 @@ use reachcast::rollout::{
 };
 use reachcast::scenario::settings::{Joint, Settings};
 use reachcast::scenario::{Context, Unwatched, certify, deviation, global};
-use reachcast::system::{BangBang, DoubleIntegrator, System};
+use reachcast::system::{Axis, BangBang, DoubleIntegrator, System};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::array::from_fn;
 
@@ -594,4 +594,56 @@ fn every_f32_path_is_near_its_f64_loop() {
             compare(backend, (&integrator, &Damped), &settings(&integrator, 30), control);
         }
     }
+}
+
+/// A network whose file names a part of the states, in another order, has the measures of the one that sees
+/// them all and weighs the others with zero, to the rounding of one sum.
+#[test]
+fn a_network_of_some_states_runs_as_one_that_ignores_the_others() {
+    let model = || Model::of(DroneRace::default());
+    let names: Vec<String> = model().states.iter().map(|axis| axis.name.clone()).collect();
+    let seen = [2, 0, 9];
+    let layers = random_policy(5).layers().to_vec();
+    let few = |layer: &Layer| {
+        let rows = layer.weight.chunks(layer.inputs);
+        let weight = rows.flat_map(|row| seen.map(|place| row[place])).collect();
+        Layer { weight, inputs: seen.len(), ..layer.clone() }
+    };
+    let zeros = |layer: &Layer| {
+        let mut layer = layer.clone();
+        for row in layer.weight.chunks_mut(12) {
+            (0..12).filter(|place| !seen.contains(place)).for_each(|place| row[place] = 0.0);
+        }
+        layer
+    };
+    let network = |first: Layer| {
+        let layers = vec![first, layers[1].clone()];
+        Mlp::new(layers, Activation::Tanh, OutputActivation::Tanh).expect("network")
+    };
+    let named = network(few(&layers[0]))
+        .with_state_order(seen.map(|place| names[place].clone()).to_vec())
+        .expect("names");
+    let whole = network(zeros(&layers[0]));
+    let plants = [named, whole].map(|network| {
+        let controller = Controller::network_of(&model(), network).expect("a controller");
+        Plant::new(model(), controller)
+    });
+    let spec = RolloutSpec::new(30, 0.95).expect("a horizon");
+    let mut starts = StateList::new(12);
+    (0..64).for_each(|seed| starts.push(&random_start(seed, &model().states)));
+    for backend in backends() {
+        let measures = plants.each_ref().map(|plant| {
+            program(&backend, plant).measures(starts.view(), &spec).expect("measures")
+        });
+        let distance = measures[0].iter().zip(&measures[1]).map(|(a, b)| (a - b).abs());
+        let largest = distance.fold(0.0, f32::max);
+        assert!(largest < 2e-4, "{}: {largest}", backend.name());
+        assert!(measures[0].iter().any(|measure| *measure > -0.5), "{:?}", measures[0]);
+    }
+}
+
+/// A start in the box of `axes`.
+fn random_start(seed: u64, axes: &[Axis]) -> Vec<f32> {
+    let mut rng = StdRng::seed_from_u64(seed);
+    axes.iter().map(|axis| rng.random_range(axis.low..axis.high)).collect()
 }

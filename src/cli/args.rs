@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::effort::USUAL;
 use super::falsify::FalsifyArguments;
+use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
+use crate::config::Registry;
 use crate::files::Existing;
 use crate::policy::{Activation, OutputActivation};
 use crate::studies::StudyCommand;
@@ -23,16 +26,17 @@ pub(super) struct Arguments {
 
 impl Arguments {
     /// The options that are not of one command alone.
-    pub(crate) fn global(&self) -> Global {
+    pub(crate) fn global(&self, registry: &Registry) -> Global {
         let Own { changes, out, replace } = self.command.options();
         let existing = if replace.overwrite { Existing::Replaced } else { Existing::Kept };
-        Global { common: self.common.clone(), changes, out, existing }
+        Global { common: self.common.clone(), changes, out, existing, registry: registry.clone() }
     }
 }
 
 /// Shown after the help of the program.
 const EXAMPLES: &str = "\
 Examples:
+  reachcast init plant.toml
   reachcast certify configs/race.toml
   reachcast certify configs/race.toml --profile study --set growth.rounds=10 --out study
   reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures measures.npy
@@ -56,6 +60,9 @@ Exit codes:
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    /// Write a starting configuration with comments: a plant as text, to be changed
+    #[command(after_help = format!("Plants to start from:\n{}\nExample:\n  reachcast init car.toml --from dubins", init::names()))]
+    Init(InitArguments),
     /// Certify a policy: deviation bound, certified set, and a locally grown ball
     ///
     /// Writes certificate.json, deviation.csv (step, bound, largest, exact), slice.npy (f32,
@@ -112,7 +119,7 @@ Tiers: 0 in the target set, 1 in the certified set, 2 in the set that local grow
 Prints a line per state (index, tier, check_margin, target_margin); with --out DIR these go to
 DIR/query.csv instead and a summary is printed. More columns where the certificate has what they are of:
   score       the largest lambda at which the state is certified by margin drops
-  measure     its reach-avoid measure, and in
+  measure     the measure of its rollout, and in
   calibrated  whether that is above alpha: in the calibrated set
   radius      of a ball around it that is certified without samples, up to 8 times the one asked for
 
@@ -142,6 +149,9 @@ Example:
         /// Seed of the fresh samples, to repeat a check [default: another one each time, which is told]
         #[arg(long, value_name = "N")]
         fresh_seed: Option<u64>,
+        /// Most operations that it may take, for folders of other people: what it takes at most is said first
+        #[arg(long, value_name = "N", default_value_t = USUAL)]
+        effort: f64,
     },
     /// Look for a start that fails: within the box, or where a certificate claims something
     ///
@@ -259,6 +269,7 @@ impl Command {
             Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
             Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
+            Self::Init(asked) => asked.own(),
             Self::Falsify(asked) => own(asked.changes.clone(), &asked.out, asked.replace),
             Self::Plan { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Study(asked) => asked.options(),

@@ -76,7 +76,7 @@ pub(super) enum Within {
 pub(super) fn run(global: &Global, asked: &FalsifyArguments) -> Result<Outcome> {
     match (&asked.around, &asked.config) {
         (Some(folder), _) => {
-            let stored = Stored::read(folder)?;
+            let stored = Stored::read(folder, &global.registry)?;
             let plant = stored.config.plant(&stored.policy)?;
             let within = asked.within;
             let mut config = stored.config.clone();

@@ -4,8 +4,10 @@ mod args;
 mod bench;
 mod certify;
 pub(crate) mod devices;
+mod effort;
 mod falsified;
 mod falsify;
+mod init;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
@@ -26,6 +28,7 @@ use std::io::Write;
 
 use clap::Parser;
 
+use crate::config::Registry;
 use crate::error::{Error, Result};
 use args::{Arguments, Command, PolicyCommand};
 use output::plain;
@@ -34,6 +37,12 @@ pub(crate) use output::{Outcome, document, folder_of, report};
 /// Runs the command line and returns its exit code: 0 done, 1 failed, 2 wrong usage,
 /// configuration or input, 3 ran but the claim asked for was not obtained.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    run_with(&Registry::new(), arguments)
+}
+
+/// The same for a program with plants of its own, which `[system] name = "..."` asks for: every command
+/// that works for any plant works for them. `examples/program.rs` is such a program.
+pub fn run_with(registry: &Registry, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
@@ -43,7 +52,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return usage.exit_code() as u8;
         }
     };
-    match dispatch(&arguments) {
+    match dispatch(registry, &arguments) {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NotObtained) => 3,
         Err(error) => {
@@ -68,17 +77,20 @@ fn told(error: &Error) -> String {
 }
 
 /// Runs the command.
-fn dispatch(arguments: &Arguments) -> Result<Outcome> {
-    let global = &arguments.global();
+fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
+    let global = &arguments.global(registry);
     match &arguments.command {
         Command::Certify { config, .. } => certify::run(global, config),
         Command::Rollout { config, starts, measures, .. } => {
             rollout::run(global, config, starts, measures)
         }
         Command::Query { folder, states, .. } => stored::query(global, folder, states),
-        Command::Check { folder, fresh_seed } => stored::check(global, folder, *fresh_seed),
+        Command::Check { folder, fresh_seed, effort } => {
+            stored::check(global, folder, *fresh_seed, *effort)
+        }
         Command::Falsify(asked) => falsify::run(global, asked),
         Command::Plan { config, .. } => plan::run(global, config),
+        Command::Init(asked) => init::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

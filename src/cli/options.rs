@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use crate::config::{Overrides, Profile};
+use crate::config::{Overrides, Profile, Registry};
 use crate::files::Existing;
 
 /// Most threads: beyond what any processor runs at once they only cost.
@@ -84,13 +84,15 @@ pub(crate) struct Global {
     pub(crate) out: Option<PathBuf>,
     /// What becomes of results that are there.
     pub(crate) existing: Existing,
+    /// Plants of the program beside the carried ones.
+    pub(crate) registry: Registry,
 }
 
 impl Global {
     /// What lies over a configuration file.
     pub(crate) fn overrides(&self) -> Overrides {
         let Changes { seed, keys: Keys { profile, set } } = self.changes.clone();
-        Overrides { profile, seed, set }
+        Overrides { profile, seed, set, registry: self.registry.clone() }
     }
 
     /// The folder of the results, `usual` unless another one was named.

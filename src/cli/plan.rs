@@ -85,6 +85,19 @@ struct Steering {
     plant: Plant,
 }
 
+impl Steering {
+    /// The policy of `config`, which lies in `folder`, where first plans are rollouts of it.
+    fn read(config: &Config, folder: &Path, first: FirstPlan) -> Result<Option<Self>> {
+        match first {
+            FirstPlan::Middle => Ok(None),
+            FirstPlan::Policy => {
+                let source = config.policy_source(folder)?;
+                Ok(Some(Self { plant: config.plant(&source)?, source }))
+            }
+        }
+    }
+}
+
 impl<'a> Asked<'a> {
     /// Reads what `config`, the configuration at `path`, asks for.
     fn read(config: &'a Config, path: &Path) -> Result<Self> {
@@ -94,13 +107,7 @@ impl<'a> Asked<'a> {
         let spec = config.plan_spec()?;
         model.task.check(spec.horizon).map_err(|error| config.placed(error))?;
         settings.spec(&model.controls).map_err(|error| config.placed(error))?;
-        let policy = match settings.first_plan {
-            FirstPlan::Middle => None,
-            FirstPlan::Policy => {
-                let source = config.policy_source(folder)?;
-                Some(Steering { plant: config.plant(&source)?, source })
-            }
-        };
+        let policy = Steering::read(config, folder, settings.first_plan)?;
         let (state, bounds) = (config.plan_start(&model.states)?, config.plan_box(&model.states)?);
         Ok(Self {
             config,

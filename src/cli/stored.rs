@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use super::options::Global;
 use serde::Serialize;
 
-use super::certify::{CERTIFICATE, POLICY, derived_files};
 use super::inputs::networks;
 use super::progress::Progress;
-use super::{Outcome, devices, document, report};
-use crate::config::{Config, PolicySource};
+use super::{Outcome, devices, document, effort, report};
+use crate::certificate::{CERTIFICATE, POLICY, derived_files};
+use crate::config::{Config, PolicySource, Registry};
 use crate::error::{Error, Result};
 use crate::files::{Existing, Inputs, RECORD_BYTES, Staged, StateReader, read, read_text};
 use crate::rollout::States;
@@ -38,11 +38,12 @@ pub(super) struct Stored {
 
 impl Stored {
     /// Reads what `certify` wrote to `folder`.
-    pub(super) fn read(folder: &Path) -> Result<Self> {
+    pub(super) fn read(folder: &Path, registry: &Registry) -> Result<Self> {
         let path = folder.join(CERTIFICATE);
         let text = read_text(&path, RECORD_BYTES).map_err(|e| Error::file(&path, e))?;
         let record = Record::read(&text).map_err(|error| at(&path, error))?;
-        let config = Config::from_json(&record.provenance.config)?.with_copies(folder)?;
+        let config =
+            Config::from_json_of(&record.provenance.config, registry)?.with_copies(folder)?;
         let policy = match &config.policy.file {
             Some(_) => PolicySource::read(folder.join(POLICY))?,
             None => config.policy_source(folder)?,
@@ -61,7 +62,7 @@ fn at(path: &Path, error: Error) -> Error {
 
 /// Tells tier and margins of each state of the file.
 pub(super) fn query(global: &Global, folder: &Path, states: &Path) -> Result<Outcome> {
-    let stored = Stored::read(folder)?;
+    let stored = Stored::read(folder, &global.registry)?;
     if let Some(out) = &global.out {
         let read = [states.to_owned(), folder.join(CERTIFICATE), folder.join(POLICY)];
         Inputs::new(read.into_iter().chain(networks(&stored.config)))
@@ -189,7 +190,7 @@ fn counts(record: &Record, rows: &[QueryRow], path: &Path) -> String {
     };
     let lines: String = names.into_iter().enumerate().map(line).collect();
     let words =
-        "V_check: the reach-avoid measure with its margins tightened, certified where positive";
+        "V_check: the measure of the task with its margins tightened, certified where positive";
     let others = others(record, rows);
     format!("{lines}{words}\n{others}rows: {}\n", path.display())
 }
@@ -215,9 +216,14 @@ fn others(record: &Record, rows: &[QueryRow]) -> String {
 }
 
 /// Verifies the certificate in the folder again.
-pub(super) fn check(global: &Global, folder: &Path, fresh_seed: Option<u64>) -> Result<Outcome> {
-    let stored = Stored::read(folder)?;
-    let mut found = verify(global, &stored, fresh_seed.unwrap_or_else(another_seed))?;
+pub(super) fn check(
+    global: &Global,
+    folder: &Path,
+    fresh_seed: Option<u64>,
+    effort: f64,
+) -> Result<Outcome> {
+    let stored = Stored::read(folder, &global.registry)?;
+    let mut found = verify(global, &stored, fresh_seed.unwrap_or_else(another_seed), effort)?;
     // Of a record that does not hold, a page may not even be made.
     if found.holds {
         found.add(files(folder, &stored.record)?);
@@ -260,10 +266,11 @@ fn another_seed() -> u64 {
 }
 
 /// Computes a certificate again and tries its claims on fresh scenarios.
-fn verify(global: &Global, stored: &Stored, fresh_seed: u64) -> Result<CheckReport> {
+fn verify(global: &Global, stored: &Stored, fresh_seed: u64, effort: f64) -> Result<CheckReport> {
     let Stored { record, config, policy } = stored;
     let plant = config.plant(policy)?;
     let settings = config.settings(&plant.model.states)?;
+    effort::say(global, &plant, &settings, effort)?;
     let backend = devices::open(global)?;
     let progress = Progress::new(global);
     let program = backend.prepare(&plant)?;

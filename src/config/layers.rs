@@ -6,12 +6,13 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::counts;
+use super::registry::Registry;
 use super::section::{Config, Profile};
 use super::sources::{Layer, Sources};
-use super::{keys, model};
+use super::{keys, model, registered};
 use crate::error::{Error, Result};
 use crate::model::text::Origin;
-use crate::studies::{self, SYSTEMS};
+use crate::studies;
 
 /// What a configuration is made of, but for the defaults.
 pub(super) struct Layers {
@@ -23,6 +24,8 @@ pub(super) struct Layers {
     pub(super) sets: Vec<Layer>,
     /// Profile instead of the file's.
     pub(super) profile: Option<Profile>,
+    /// Plants that it may name beside the carried ones.
+    pub(super) registry: Registry,
 }
 
 impl Layers {
@@ -58,7 +61,7 @@ impl Layers {
         self.name_profile(&mut given);
         // Of a setting, the file does not know the line.
         let text = self.text.as_deref().filter(|_| origin == self.file.0);
-        let mut merged = defaults(&given, origin, text)?;
+        let mut merged = self.defaults(&given, origin, text)?;
         let mut valid = keys::with_optional(&merged);
         keys::check_known(&valid, &self.file.1, &self.file.0)?;
         if model::is_described(&self.file.1) {
@@ -100,7 +103,7 @@ impl Layers {
     fn plain(&self) -> Result<Config> {
         let mut given = self.given(&|_| true);
         self.name_profile(&mut given);
-        let plain = defaults(&given, &self.file.0, self.text.as_deref())?;
+        let plain = self.defaults(&given, &self.file.0, self.text.as_deref())?;
         plain.try_into().map_err(|e| Error::invalid("defaults", format!("{e}")))
     }
 
@@ -124,44 +127,48 @@ impl Layers {
         self.given(&|_| true).contains_key("train")
     }
 
-    /// Whether the file or a set has the section `plan`, or costs of plans.
-    pub(super) fn plans(&self) -> bool {
-        let given = self.given(&|_| true);
-        let costs = given.get("model").is_some_and(|model| model.get("costs").is_some());
-        costs || given.contains_key("plan")
+    /// The defaults of the profile and the system that the table `given` names.
+    fn defaults(&self, given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
+        let profile = profile(given, origin)?;
+        if model::is_described(given) {
+            let place = Origin::new(origin, Path::new(""));
+            let place = text.map_or(place.clone(), |text| place.with_text(text));
+            return model::defaults(profile, given, place);
+        }
+        let name = given.get("system").and_then(|system| system.get("name"));
+        let word = name.and_then(Value::as_str);
+        if let Some(name) = word.filter(|name| self.registry.has(name)) {
+            return registered::defaults(&self.registry, profile, name, given, origin);
+        }
+        let config = word.and_then(|name| studies::defaults(profile, name)).ok_or_else(|| {
+            let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
+            let systems = self.registry.all_names().join("\" or \"");
+            let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
+            refused(origin, "system.name", format!("{found}; {expected}"))
+        })?;
+        Table::try_from(config).map_err(|e| refused(origin, "defaults", e.to_string()))
     }
 }
 
-/// The defaults of the profile and the system that the table `given` names.
-fn defaults(given: &Table, origin: &str, text: Option<&str>) -> Result<Table> {
-    let refused = |key: &str, problem: String| Error::invalid(format!("{origin}: {key}"), problem);
+/// The refusal of a key of the layer `origin`.
+fn refused(origin: &str, key: &str, problem: String) -> Error {
+    Error::invalid(format!("{origin}: {key}"), problem)
+}
+
+/// The profile that `given` names; refuses a section of the system that is none.
+fn profile(given: &Table, origin: &str) -> Result<Profile> {
     if let Some(section) = given.get("system").filter(|section| !section.is_table()) {
         let problem = format!("{section} is no section; give a section [system] with a `name`");
-        return Err(refused("system", problem));
+        return Err(refused(origin, "system", problem));
     }
-    let profile = match given.get("profile").cloned() {
+    match given.get("profile").cloned() {
         Some(other) if !other.is_str() => {
             let problem =
                 format!("{other} is no text; expected \"paper\", \"study\" or \"rigorous\"");
-            return Err(refused("profile", problem));
+            Err(refused(origin, "profile", problem))
         }
-        Some(name) => {
-            Profile::deserialize(name).map_err(|e| refused("profile", e.message().to_owned()))?
-        }
-        None => Profile::default(),
-    };
-    if model::is_described(given) {
-        let place = Origin::new(origin, Path::new(""));
-        let place = text.map_or(place.clone(), |text| place.with_text(text));
-        return model::defaults(profile, given, place);
+        Some(name) => Profile::deserialize(name)
+            .map_err(|e| refused(origin, "profile", e.message().to_owned())),
+        None => Ok(Profile::default()),
     }
-    let systems = SYSTEMS.join("\" or \"");
-    let expected = format!("expected \"{systems}\", or a section `model` (docs/models.md)");
-    let name = given.get("system").and_then(|system| system.get("name"));
-    let known = name.and_then(Value::as_str).and_then(|name| studies::defaults(profile, name));
-    let config = known.ok_or_else(|| {
-        let found = name.map_or("missing".to_owned(), |name| format!("{name} is unknown"));
-        refused("system.name", format!("{found}; {expected}"))
-    })?;
-    Table::try_from(config).map_err(|e| refused("defaults", e.to_string()))
 }

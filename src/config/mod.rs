@@ -9,11 +9,15 @@ mod drops;
 mod enclosed;
 mod keys;
 mod layers;
+mod learning;
 mod model;
+mod named_system;
 mod open;
 mod plan;
 mod plant;
 pub(crate) mod profile;
+mod registered;
+mod registry;
 mod section;
 mod sequential;
 mod settings;
@@ -28,7 +32,9 @@ pub use crate::studies::SystemSection;
 pub use deterministic::{AsDeviation, DeterministicSection, Driving, Enclosing, Radius};
 pub use drops::{CalibrationSection, Count, DropsSection, TighteningSource};
 pub use model::copy_name;
+pub use named_system::{NamedSystem, RegisteredSection};
 pub use plant::PolicySource;
+pub use registry::{Numbers, Registered, Registry};
 pub use section::{
     BoxSection, Config, ConstantsSection, DeviationSection, FormulaSection, GlobalSection,
     GrowthSection, PolicySection, Profile, RolloutSection, SliceAxisSection, SliceSection,
@@ -47,7 +53,6 @@ use toml::Table;
 use crate::error::{Error, Result};
 use crate::files::{CONFIG_BYTES, read_text};
 use crate::model::text::Origin;
-use crate::studies::SYSTEMS;
 use layers::Layers;
 use unused::ProfileOf;
 
@@ -60,6 +65,8 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// `section.key=value` each; the value in TOML, or else a string.
     pub set: Vec<String>,
+    /// Plants that it may name beside the carried ones.
+    pub registry: Registry,
 }
 
 impl Config {
@@ -98,12 +105,14 @@ impl Config {
         let sets = sets.collect::<Result<Vec<_>>>()?;
         let file = (origin.to_owned(), table);
         let place = text.iter().fold(Origin::new(origin, folder), |at, text| at.with_text(text));
-        let layers = Layers { file, text, sets, profile: overrides.profile };
+        let registry = overrides.registry.clone();
+        let layers = Layers { file, text, sets, profile: overrides.profile, registry };
         let mut config = layers.config()?;
+        config.registry = overrides.registry.clone();
         config.networks = config.networks_beside(&place)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
-        // What is about to be trained is not there yet.
-        let checked = config.policy.check(layers.trains() || layers.plans());
+        // What is about to be trained is not there yet, and a model may be given before its policy.
+        let checked = config.policy.check(layers.trains() || config.model.is_some());
         config.sources = layers.sources();
         let profile = ProfileOf::of(overrides.profile, &overrides.set);
         let checked = checked.and_then(|()| unused::check(&config, &config.sources, profile));
@@ -135,27 +144,37 @@ impl Config {
         stored(Self { study: None, plan: None, ..self.clone() })
     }
 
-    /// The configuration that a certificate stores.
+    /// The configuration that a certificate stores, of a plant that is carried or given as text.
     ///
     /// # Errors
-    /// [`Error::Refused`] if it is not complete or not of this version.
+    /// [`Error::Refused`] if it is not complete, not of this version, or of a plant of another program.
     pub fn from_json(value: &serde_json::Value) -> Result<Self> {
+        Self::from_json_of(value, &Registry::default())
+    }
+
+    /// The same where the plant may be one of `registry`.
+    ///
+    /// # Errors
+    /// Those of [`Config::from_json`].
+    pub fn from_json_of(value: &serde_json::Value, registry: &Registry) -> Result<Self> {
         let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("provenance.config: {e}"));
-        unknown_plant(value).map_or(Ok(()), Err)?;
+        unknown_plant(value, registry).map_or(Ok(()), Err)?;
         let mut value = value.clone();
         open::of_nulls(&mut value);
         let mut config = Self::deserialize(&value).map_err(|e| refused(&e))?;
         config.model.iter_mut().for_each(open::of_words);
+        config.registry = registry.clone();
         config.policy.check(config.train.is_some()).map_err(|e| refused(&e))?;
         Ok(config)
     }
 }
 
 /// The refusal of what is no configuration of a system that this program knows.
-fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
+fn unknown_plant(value: &serde_json::Value, registry: &Registry) -> Option<Error> {
+    let known = registry.all_names();
     let system = value.pointer("/system/name").and_then(serde_json::Value::as_str);
     if value.get("model").is_some_and(serde_json::Value::is_object)
-        || system.is_some_and(|name| SYSTEMS.contains(&name))
+        || system.is_some_and(|name| known.contains(&name))
     {
         return None;
     }
@@ -167,7 +186,7 @@ fn unknown_plant(value: &serde_json::Value) -> Option<Error> {
     Some(Error::Refused(format!(
         "the certificate is of {plant}, which another program defines; this one knows {}. Its numbers \
          can be read, and the program that made it can check it (`reachcast::scenario::check`)",
-        SYSTEMS.join(" and ")
+        known.join(" and ")
     )))
 }
 

@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use super::named_system::NamedSystem;
+use super::registry::Registered;
 use super::section::{Config, FormulaSection};
 use crate::error::{Error, Result};
 use crate::files::{RECORD_BYTES, read};
-use crate::model::{Model, Plant};
+use crate::model::{Controller, Model, Plant};
 use crate::policy::Mlp;
 use crate::studies::BuiltIn;
 
@@ -44,7 +46,11 @@ impl Config {
     /// Those of [`PolicySource::read`], of a model with the key that names the file, as
     /// [`Error::Invalid`]; [`Error::Invalid`] without file and formula.
     pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
-        let missing = || self.placed(Error::invalid("policy", "neither `file` nor `formula`"));
+        let missing = || {
+            let problem = "no policy; give `file`, a safetensors file, or `formula`; `reachcast train` \
+                           makes the file";
+            self.placed(Error::invalid("policy", problem))
+        };
         match (&self.policy.file, &self.policy.formula) {
             (Some(file), _) => PolicySource::read(folder.join(file)).map_err(|e| self.of_key(e)),
             (None, Some(FormulaSection::Name(name))) => Ok(PolicySource::Formula(name.clone())),
@@ -79,33 +85,56 @@ impl Config {
         if let Some(model) = &self.model {
             return self.described_plant(model, policy);
         }
-        let system = self.built_in()?;
         match policy {
-            PolicySource::Formula(name) => system.under_formula(name),
+            PolicySource::Formula(name) => match self.registered()? {
+                Some(plant) => plant.under_formula(name),
+                None => self.built_in()?.under_formula(name),
+            },
             PolicySource::Network { path, network, .. } => {
-                let model = system.model();
-                check_network(&model, path, network)?;
-                Ok(Plant::under(&model.into(), network.clone()))
+                let model = self.plain_model()?;
+                let controller = Controller::network_of(&model, network.clone());
+                let controller = controller.map_err(|problem| Error::file(path, problem))?;
+                Ok(Plant::new(model, controller))
             }
         }
     }
 
-    /// The model of a system that the program carries, its parameters checked.
+    /// The plant of the registry, where the configuration names one.
+    fn registered(&self) -> Result<Option<Registered>> {
+        match &self.system {
+            Some(NamedSystem::Registered(section)) => {
+                let made = self.registry.make(&section.name, &section.numbers)?;
+                Ok(Some(made.plant))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// The model by itself, its parameters checked.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a parameter out of range, and for a model that is given as text.
-    pub fn carried_model(&self) -> Result<Model> {
-        self.built_in().map(|system| system.model())
+    /// [`Error::Invalid`] for a parameter out of range, and those of a description.
+    pub fn plain_model(&self) -> Result<Model> {
+        if let Some(model) = self.described_model() {
+            return model.map_err(|error| self.placed(error));
+        }
+        match self.registered()? {
+            Some(plant) => Ok(Model::clone(plant.model())),
+            None => self.built_in().map(|system| system.model()),
+        }
     }
 
     /// The system, its parameters checked.
     pub(crate) fn built_in(&self) -> Result<BuiltIn> {
         let carried = || {
             let problem = "works for the systems that the program carries, not yet for a model; \
-                           `certify`, `rollout`, `query` and `check` do, and `sweep --of certificate`";
+                           `certify`, `rollout`, `train`, `query` and `check` do, and `sweep --of certificate`";
             Error::invalid("this command", problem)
         };
-        self.system.as_ref().ok_or_else(carried)?.checked()
+        match &self.system {
+            Some(NamedSystem::Carried(system)) => system.checked(),
+            _ => Err(carried()),
+        }
     }
 }
 

@@ -2,6 +2,9 @@
 
 use super::deterministic::DeterministicSection;
 use super::drops::{self, CalibrationSection, DropsSection, TighteningSource};
+use super::learning;
+use super::named_system::NamedSystem;
+use super::registry::Registry;
 use super::section::{
     Config, ConstantsSection, DeviationSection, GlobalSection, GrowthSection, PolicySection,
     Profile, RolloutSection, SliceAxisSection, SliceSection,
@@ -61,6 +64,7 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     let mut config = common(profile, None, states, &state, SliceSection { x, y });
     config.deviation.radius = narrowest / 50.0;
     config.growth.radius = narrowest / 4.0;
+    config.train = Some(learning::described());
     config
 }
 
@@ -80,7 +84,7 @@ pub(crate) fn common(
         profile,
         seed: 1,
         attempt: None,
-        system,
+        system: system.map(NamedSystem::Carried),
         model: None,
         networks: Vec::new(),
         policy: PolicySection::default(),
@@ -143,6 +147,7 @@ pub(crate) fn common(
         sequential: SequentialSection::default(),
         study: None,
         train: None,
+        registry: Registry::default(),
         plan: Some(PlanSettings::default()),
         sources: Sources::default(),
     }

@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::deterministic::DeterministicSection;
 use super::drops::{CalibrationSection, DropsSection, TighteningSource, share_draws};
+use super::named_system::NamedSystem;
+use super::registry::Registry;
 use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
@@ -14,7 +16,7 @@ use crate::rollout::PairControl;
 use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::Assumption;
 use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
-use crate::studies::{StudySettings, SystemSection};
+use crate::studies::StudySettings;
 use crate::train::settings::TrainSettings;
 
 /// Intervals by state name, in state order.
@@ -33,9 +35,9 @@ pub struct Config {
     /// Number of the attempt at these claims, from 1; none of a certificate that counts as the only one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attempt: Option<u32>,
-    /// The system and its parameters, where it is one that the program carries.
+    /// The system and its parameters, where it is one that the program carries or registers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub system: Option<SystemSection>,
+    pub system: Option<NamedSystem>,
     /// The plant and its task as text (`docs/models.md`), where it is one of the user's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<toml::Table>,
@@ -79,6 +81,9 @@ pub struct Config {
     /// Training; what a certificate or race stores of its configuration has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train: Option<TrainSettings>,
+    /// Plants that `system` may name beside the carried ones; no part of what is stored.
+    #[serde(skip)]
+    pub(super) registry: Registry,
     /// Plans in closed loop; what a certificate, a race or a training stores of its configuration has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<PlanSettings>,

@@ -36,8 +36,12 @@ fn refusal(set: &[&str]) -> String {
 #[test]
 fn rigorous_is_the_default_profile() {
     let config = load(RACE, &[]).unwrap();
-    let Some(SystemSection::DroneRace { cone, ego_gain, opponent_gain, speed_limit }) =
-        config.system
+    let Some(NamedSystem::Carried(SystemSection::DroneRace {
+        cone,
+        ego_gain,
+        opponent_gain,
+        speed_limit,
+    })) = config.system
     else {
         panic!("{:?}", config.system)
     };
@@ -72,11 +76,14 @@ fn study_and_paper_are_the_published_experiments() {
     assert_eq!(paper.growth.varies, [true; 12]);
     assert_eq!(paper.growth.boundary, BoundarySearch::Rays);
     let system = |profile: &str| load(RACE, &[profile]).unwrap().system;
-    let race = |cone, ego_gain, speed_limit| SystemSection::DroneRace {
-        cone,
-        ego_gain,
-        opponent_gain: 1.0,
-        speed_limit,
+    let race = |cone, ego_gain, speed_limit| {
+        let opponent_gain = 1.0;
+        NamedSystem::Carried(SystemSection::DroneRace {
+            cone,
+            ego_gain,
+            opponent_gain,
+            speed_limit,
+        })
     };
     assert_eq!(system("profile=paper"), Some(race(Cone::Squared, 1.0, false)));
     assert_eq!(system("profile=study"), Some(race(Cone::Distance, 0.5, true)));

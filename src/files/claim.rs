@@ -21,7 +21,11 @@ struct Kind {
 
 /// Every kind of results that has a folder for itself.
 const KINDS: [Kind; 6] = [
-    Kind { words: "a certificate", files: &CERTIFICATE, folder: None },
+    Kind {
+        words: "a certificate",
+        files: &CERTIFICATE,
+        folder: Some((COST_COPIES, &[".csv", ".npy", ".safetensors"])),
+    },
     Kind { words: "a search for failures", files: &["falsify.json"], folder: None },
     Kind {
         words: "plans in closed loop",
@@ -63,6 +67,9 @@ pub(crate) const NETWORK_COPIES: [&str; 8] = [
     "network_7.safetensors",
     "network_8.safetensors",
 ];
+
+/// Folder of the copies of what costs of a certified model name, in the order of its text.
+pub(crate) const COST_COPIES: &str = "costs";
 
 /// Files of a certificate.
 const CERTIFICATE: [&str; 12] = {

@@ -26,7 +26,9 @@ mod temporary;
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
 #[cfg(feature = "cli")]
-pub(crate) use claim::{Claim, MANIFEST, NETWORK_COPIES, is_free, make_way, spare_results};
+pub(crate) use claim::{
+    COST_COPIES, Claim, MANIFEST, NETWORK_COPIES, is_free, make_way, spare_results,
+};
 pub use disk::check_room;
 pub use existing::Existing;
 #[cfg(feature = "cli")]

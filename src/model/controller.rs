@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::formula::Graph;
+use crate::formula::{Graph, record};
 use crate::policy::{Mlp, Policy};
 use crate::system::System;
 use crate::tile::{CompiledPolicy, NativeFormula};
 
+use super::Model;
 use super::compiled::CompiledForm;
 use super::recorded::recorded;
 
@@ -43,6 +44,43 @@ impl Controller {
     pub fn network_alone(network: impl Into<Arc<Mlp>>) -> Self {
         let network = network.into();
         Self::new(network.in_words(), Law::Network { observe: None, network, act: None })
+    }
+
+    /// A network that says the controls of `model` and sees the states that its file names in `state_order`,
+    /// in that order; all states in order where it names none.
+    ///
+    /// ```
+    /// use reachcast::model::{Controller, Model};
+    /// use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+    /// use reachcast::system::DoubleIntegrator;
+    /// let layer = Layer { weight: vec![-2.0], bias: vec![0.0], inputs: 1, outputs: 1 };
+    /// let network = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity)?;
+    /// let damper = network.with_state_order(vec!["velocity".to_owned()])?;
+    /// let model = Model::of(DoubleIntegrator::default());
+    /// let controller = Controller::network_of(&model, damper).map_err(|e| reachcast::Error::invalid("policy", e))?;
+    /// let plant = reachcast::model::Plant::new(model, controller);
+    /// assert_eq!(plant.control(&[0.5_f32, 0.25], 0), [-0.5]);
+    /// # Ok::<(), reachcast::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// What is wrong, in words: inputs or outputs that do not fit, a name that is no state.
+    pub fn network_of(
+        model: &Model,
+        network: impl Into<Arc<Mlp>>,
+    ) -> std::result::Result<Self, String> {
+        let network = network.into();
+        let (outputs, controls) = (network.widths().last().copied(), model.controls.len());
+        if outputs != Some(controls) {
+            let outputs = outputs.unwrap_or(0);
+            return Err(format!(
+                "the network has {outputs} outputs, the system {controls} controls"
+            ));
+        }
+        let names: Vec<&str> = model.states.iter().map(|axis| axis.name.as_str()).collect();
+        let places = network.places_among(&names)?;
+        let observe = places.map(|places| picked(model.inputs(), &places));
+        Ok(Self::new(network.in_words(), Law::Network { observe, network, act: None }))
     }
 
     /// A policy as data, without anything compiled.
@@ -110,4 +148,9 @@ impl Controller {
             Law::Network { .. } => None,
         }
     }
+}
+
+/// The formulas that hand on the inputs at `places`, of a model with as many `inputs`.
+pub(crate) fn picked(inputs: usize, places: &[usize]) -> Graph {
+    record(inputs, |x| places.iter().map(|place| x[*place]).collect())
 }

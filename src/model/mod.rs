@@ -5,7 +5,9 @@ mod controller;
 mod costs;
 mod fit;
 mod identity;
+mod interface;
 mod lookups;
+mod picture;
 mod plant;
 mod recorded;
 mod reference;
@@ -20,7 +22,9 @@ use std::sync::Arc;
 
 pub use controller::{Controller, Law};
 pub use costs::{Costs, Term, TermKind};
+pub use interface::Interface;
 pub use lookups::Lookups;
+pub use picture::{Outline, Picture, PlacedBody, Shape, ShapeKind};
 pub use plant::Plant;
 pub use reference::{Reference, ReferenceSource};
 pub use role::Role;
@@ -61,6 +65,8 @@ pub struct Model {
     pub constraint: Graph,
     /// The bodies that a picture shows.
     pub bodies: Vec<Body>,
+    /// What else a picture shows.
+    pub picture: Picture,
     /// The narrowest thing that the margins know of, where it is known.
     pub smallest_feature: Option<Feature>,
     /// The system as compiled, where it is written in Rust.
@@ -82,6 +88,7 @@ impl PartialEq for Model {
             && same_data
             && same_formulas
             && self.bodies == other.bodies
+            && self.picture == other.picture
     }
 }
 

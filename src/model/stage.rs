@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use super::Model;
 use super::compiled::CompiledForm;
-use super::lookups::Lookups;
+use super::lookups::{Lookups, fits};
 use super::recorded::recorded_with;
 use super::terminal::TerminalCost;
 use crate::cost::{Cost, CostMap, Lookup};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formula::{Expr, Graph};
 use crate::system::System;
 use crate::tile::{CompiledStages, NativeStages};
@@ -252,21 +252,6 @@ impl StageCost {
             terminal.check(model)?;
         }
         let terminal = self.terminal.as_ref().and_then(|terminal| terminal.lookups.as_ref());
-        self.lookups.iter().chain(terminal).try_for_each(|lookups| {
-            fits("place on the maps", &lookups.cells, [own, lookups.maps.len()])
-        })
+        self.lookups.iter().chain(terminal).try_for_each(|lookups| lookups.check(own))
     }
-}
-
-/// Refuses a formula of other than `[inputs, outputs]`.
-fn fits(name: &str, graph: &Graph, [inputs, outputs]: [usize; 2]) -> Result<()> {
-    let has = [graph.inputs, graph.outputs.len()];
-    if has == [inputs, outputs] {
-        return Ok(());
-    }
-    let text = format!(
-        "the {name} takes {} inputs and gives {} numbers; {inputs} and {outputs} are needed",
-        has[0], has[1]
-    );
-    Err(Error::invalid("cost", text))
 }

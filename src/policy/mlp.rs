@@ -197,6 +197,33 @@ impl Mlp {
         }
     }
 
+    /// The places of its inputs among `states`, where the file names a part of them or another order; none
+    /// where it sees all in order.
+    ///
+    /// # Errors
+    /// What is wrong, in words: a name that is no state, or inputs without names that are not as many.
+    pub fn places_among(&self, states: &[&str]) -> std::result::Result<Option<Vec<usize>>, String> {
+        let Some(order) = &self.state_order else {
+            let (inputs, count) = (self.widths()[0], states.len());
+            let problem = || {
+                format!(
+                    "the network takes {inputs} inputs, the model has {count} states, {}; `state_order` in \
+                     the file names those that it sees",
+                    states.join(", ")
+                )
+            };
+            return (inputs == count).then_some(None).ok_or_else(problem);
+        };
+        let place = |name: &String| {
+            states.iter().position(|state| state == name).ok_or_else(|| {
+                format!("its input `{name}` is none of the states `{}`", states.join(","))
+            })
+        };
+        let places = order.iter().map(place).collect::<std::result::Result<Vec<_>, _>>()?;
+        let all = places.iter().copied().eq(0..states.len());
+        Ok((!all).then_some(places))
+    }
+
     /// The output for `input`, one neuron after the other: the reference for the backends.
     ///
     /// # Panics

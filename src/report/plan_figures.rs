@@ -224,11 +224,21 @@ fn figure(
     }
 }
 
+/// A span that is not thinner than what a reader takes for a change.
+fn open(span: Span) -> Span {
+    let least = (0.02 * span.low.abs().max(span.high.abs())).max(1e-6);
+    match span.width() < least {
+        true => Span { low: span.low - 0.5 * least, high: span.high + 0.5 * least },
+        false => span,
+    }
+}
+
 impl Panel {
     fn drawing(&self, id: &str, record: &PlanRecord) -> String {
         let values = self.lines.iter().flat_map(|line| line.points.iter().map(|point| point[1]));
         let zero = (self.zero == Zero::Marked).then_some(0.0);
-        let Some(span) = Span::of(values.chain(self.bounds.iter().copied()).chain(zero)) else {
+        let Some(span) = Span::of(values.chain(self.bounds.iter().copied()).chain(zero)).map(open)
+        else {
             return "<p class=\"empty\">No number of it can be drawn.</p>".to_owned();
         };
         let end = f64::from(record.steps) * seconds(record).unwrap_or(1.0);

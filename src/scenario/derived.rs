@@ -37,7 +37,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     }
     record.whole_box =
         whole_box::derived(model, settings, &record.global, stored.whole_box.as_ref())?;
-    record.enclosed = enclosure::record(settings);
+    record.enclosed = enclosure::record(model, settings);
     record.deterministic =
         deterministic_set::derived(model, settings, stored.deterministic.as_ref());
     record.growth = growth::derived(model, settings, &stored.growth)?;

@@ -22,18 +22,18 @@ pub struct EnclosedRecord {
 }
 
 impl EnclosedRecord {
-    /// The record of an enclosure.
-    pub(super) fn new(kind: Kind, control: PairControl, radius: f64) -> Self {
+    /// The record of an enclosure whose starts do `deed`: *reaches the target safely*.
+    pub(super) fn new(kind: Kind, control: PairControl, radius: f64, deed: &str) -> Self {
         let record = Self { statement: String::new(), kind, control, radius };
-        Self { statement: record.sentence(), ..record }
+        Self { statement: record.sentence(deed), ..record }
     }
 
     /// What is claimed of the set.
-    fn sentence(&self) -> String {
+    fn sentence(&self, deed: &str) -> String {
         format!(
-            "The certified set is deterministic: every start within {} of a state of it reaches the target \
-             safely {}, {}. No risk, no confidence and no Lipschitz constant: it holds in real arithmetic \
-             with the f32 parameters of model and policy; f32 rollouts round.",
+            "The certified set is deterministic: every start within {} of a state of it {deed} {}, {}. No \
+             risk, no confidence and no Lipschitz constant: it holds in real arithmetic with the f32 \
+             parameters of model and policy; f32 rollouts round.",
             lower(self.radius),
             self.driven(),
             self.how()

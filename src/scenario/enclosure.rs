@@ -6,7 +6,7 @@ use super::enclosed_record::EnclosedRecord;
 use super::margins::check_margins;
 use super::settings::Settings;
 use crate::error::{Error, Result};
-use crate::model::Plant;
+use crate::model::{Form, Model, Plant};
 use crate::rollout::{
     DeviationTask, PairMeasure, Query, RolloutSpec, StateList, States, Tightening,
 };
@@ -104,11 +104,12 @@ impl<'a> Enclosure<'a> {
 }
 
 /// What `settings` ask of the certified set; none where margins decide.
-pub(super) fn record(settings: &Settings) -> Option<EnclosedRecord> {
+pub(super) fn record(model: &Model, settings: &Settings) -> Option<EnclosedRecord> {
     let asked = &settings.deviation;
     // As it was written: 0.1, not 0.10000000149.
     let radius = as_written(asked.radius);
-    settings.enclosed.map(|kind| EnclosedRecord::new(kind, asked.control, radius))
+    let deed = model.task.short_words(Form::One, settings.spec.horizon);
+    settings.enclosed.map(|kind| EnclosedRecord::new(kind, asked.control, radius, &deed))
 }
 
 /// Places of the measures that are not below zero by more than `band`, or by the rounding of f32.

@@ -24,9 +24,12 @@ mod deterministic_record;
 mod deterministic_set;
 pub mod deterministic_settings;
 pub mod deviation;
+pub mod drawn_record;
 pub mod drops;
 pub mod drops_record;
 pub mod drops_settings;
+#[cfg(feature = "cli")]
+mod effort;
 mod empty;
 mod enclosed_record;
 pub mod enclosure;
@@ -52,6 +55,7 @@ mod margins;
 mod membership;
 mod origin;
 mod pairs_f64;
+mod picture;
 mod probe;
 pub mod purpose;
 pub mod record;
@@ -80,6 +84,8 @@ pub use attempt::{AttemptRecord, attempt_share};
 pub use box_record::BoxRecord;
 pub use box_settings::BoxSettings;
 pub use certify::{certify, check_settings};
+#[cfg(feature = "cli")]
+pub(crate) use effort::most_rollouts_of_check;
 pub use finding::{CheckReport, Figure, Finding};
 pub use key_source::Keys;
 #[cfg(feature = "cli")]

@@ -138,7 +138,7 @@ fn conclude(
     let risk_interval = [low, high];
     Ok(BoxRecord {
         claim: claim(model, settings, asked, failures, risk_interval)?,
-        verdict: verdict(global, enclosure::record(settings).as_ref(), risk_interval),
+        verdict: verdict(global, enclosure::record(model, settings).as_ref(), risk_interval),
         draws,
         failures,
         non_finite: count.non_finite,

@@ -7,6 +7,7 @@ mod integrators;
 #[path = "../learned/mod.rs"]
 mod learned;
 mod networks;
+mod pictures;
 mod policies;
 mod refused;
 

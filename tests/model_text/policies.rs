@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use reachcast::model::text::{Description, read};
-use reachcast::model::{Controller, Law};
+use reachcast::model::{Controller, Law, Plant};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
 
 use super::{cart_with, refusal};
@@ -80,11 +80,34 @@ fn a_bare_network_sees_the_states_and_is_the_control() {
         fits.clone().with_state_order(names.map(str::to_owned).to_vec()).expect("names")
     };
     with_network(&named(["x", "speed"]), file).expect("the states in order");
-    let problem = problem(&named(["speed", "x"]), file);
+    let problem = problem(&named(["speed", "y"]), file);
     assert!(
-        problem.contains("its inputs are `speed,x`") && problem.contains("`observe`"),
+        problem.contains("its input `y` is none of the states `x,speed`")
+            && problem.contains("`observe`"),
         "{problem}"
     );
+}
+
+/// A file that names other states than all in order sees those that it names.
+#[test]
+fn a_network_sees_the_states_that_its_file_names() {
+    let layer = |weight: Vec<f32>| {
+        let inputs = weight.len();
+        let layer = Layer { weight, bias: vec![0.0], inputs, outputs: 1 };
+        Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity).expect("a network")
+    };
+    let file = "file = \"net.safetensors\"";
+    for (weight, names, expected) in [
+        (vec![1.0, 2.0], &["speed", "x"][..], INPUTS[1] + 2.0 * INPUTS[0]),
+        (vec![3.0], &["speed"][..], 3.0 * INPUTS[1]),
+        (vec![3.0], &["x"][..], 3.0 * INPUTS[0]),
+    ] {
+        let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+        let network = layer(weight).with_state_order(names).expect("names");
+        let (description, controller) = with_network(&network, file).expect("a controller");
+        let plant = Plant::new(description.model().expect("a model"), controller);
+        assert_eq!(plant.control(&INPUTS[..2], 0), [expected]);
+    }
 }
 
 #[test]

@@ -60,3 +60,35 @@ fn the_first_plan_may_be_the_policy_s() {
     let middle = first(&[]);
     assert!(middle.abs() < 1e-3, "{middle}");
 }
+
+/// A goal that moves by half a metre a step, as a reference and as a formula of the step: the state after
+/// a control is at the goal of that step, neither of the one before nor of the plan's own first.
+#[test]
+fn a_goal_that_moves_is_met_at_its_step() {
+    let reference = LINE
+        .replace("(x - 1)^2", "(x - goal)^2")
+        .replace("[plan]", "[model.references]\ngoal = { formula = \"0.5 * step\" }\n[plan]");
+    let formula = LINE.replace("(x - 1)^2", "(x - 0.5 * step)^2");
+    for text in [reference, formula] {
+        for backend in ["cpu", "gpu"] {
+            let planned = planned(&text, &["--backend", backend]);
+            for (step, x) in planned.column("x.x").iter().enumerate().skip(1) {
+                let off = (x - 0.5 * step as f64).abs();
+                assert!(off < 0.06, "{backend}, step {step}: {x}");
+            }
+        }
+    }
+}
+
+/// Noise of a fifth of the way takes several improvements to the optimum.
+#[test]
+fn improvements_add_up_within_a_step() {
+    let after = |iterations: &str| {
+        let set = format!("plan.iterations={iterations}");
+        let options = ["--set", "plan.sigma=0.1", "--set", "plan.steps=1", "--set", &set];
+        let planned = planned(LINE, &[&options[..], &["--backend", "cpu"]].concat());
+        (planned.column("x.x")[1] - 1.0).abs()
+    };
+    let [one, many] = ["1", "12"].map(after);
+    assert!(one > 0.4 && many < 0.1, "{one} {many}");
+}

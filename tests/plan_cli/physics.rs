@@ -104,3 +104,20 @@ fn references_move_with_the_steps() {
         assert!((place[step] - expected).abs() < 1e-4, "step {step}: {} {expected}", place[step]);
     }
 }
+
+/// A reference of three rows is held from its last one on, which is said.
+#[test]
+fn a_reference_that_ends_early_is_held() {
+    let folder = crate::command::Folder::new();
+    let goal = folder.path("goal.csv");
+    std::fs::write(&goal, "0.25\n0.5\n0.75\n").unwrap();
+    let text = PENDULUM.replace("{ value = 1.0 }", &format!("{{ file = \"{goal}\" }}"));
+    let planned = planned(&text, &["--set", "plan.steps=6", "--backend", "cpu"]);
+    let (angle, place) = (planned.column("x.angle"), planned.column("stage.place"));
+    for (step, goal) in [0.25, 0.5, 0.75, 0.75, 0.75, 0.75].into_iter().enumerate() {
+        let expected = 10.0 * (angle[step] - goal).powi(2);
+        assert!((place[step] - expected).abs() < 1e-4, "step {step}: {} {expected}", place[step]);
+    }
+    let notes = planned.notes();
+    assert!(notes.contains("`goal` has 3 rows, and plans look up to step 20"), "{notes}");
+}

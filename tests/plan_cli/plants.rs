@@ -93,8 +93,14 @@ pub(crate) fn written(folder: &Folder, text: &str) -> String {
 /// Plans `text` with `more` options, in a folder of its own.
 pub(crate) fn planned(text: &str, more: &[&str]) -> Planned {
     let folder = Folder::new();
-    let (config, out) = (written(&folder, text), folder.path("out"));
-    let arguments = [&["plan", &config, "--out", &out], more].concat();
+    read(&written(&folder, text), more)
+}
+
+/// Plans the configuration at `config` with `more` options.
+pub(crate) fn read(config: &str, more: &[&str]) -> Planned {
+    let folder = Folder::new();
+    let out = folder.path("out");
+    let arguments = [&["plan", config, "--out", &out], more].concat();
     let record = document(&arguments);
     let read = |name: &str| std::fs::read(format!("{out}/{name}")).unwrap();
     let stored: Value = serde_json::from_slice(&read("plan.json")).unwrap();

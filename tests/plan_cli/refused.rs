@@ -18,7 +18,7 @@ fn bounds_that_no_plan_can_use() {
     says(
         &open,
         &[],
-        &["model.toml:8", "model.controls.u.bounds", "is open", "[-10.0, 10.0]", "plan.sigma"],
+        &["model.toml:7", "model.controls.u.bounds", "is open", "[-10.0, 10.0]", "plan.sigma"],
     );
     let fixed = LINE.replace("[-4.0, 4.0]", "[1.0, 1.0]");
     says(&fixed, &[], &["model.controls", "nothing to plan"]);
@@ -44,8 +44,11 @@ fn costs_that_are_never_a_number() {
         &[],
         &["no run takes a step", "cost of every sample", "the term `place` is NaN", "x 0"],
     );
-    let reference = PENDULUM.replace("{ value = 1.0 }", "{ formula = \"log(0 - 1 - t)\" }");
-    says(&reference, &[], &["no run takes a step", "reference `goal` is NaN at stage 0"]);
+    // It is there at first, and gone three steps on.
+    let reference = PENDULUM.replace("{ value = 1.0 }", "{ formula = \"log(2.5 - step)\" }");
+    says(&reference, &[], &["no run takes a step", "reference `goal` is NaN at stage 3"]);
+    let cost = PENDULUM.replace("torque^2", "log(0.5 - step - torque^2 * 0)");
+    says(&cost, &[], &["no run takes a step", "the term `effort` is NaN at stage 1"]);
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn a_run_whose_costs_are_lost_stops_alone() {
 /// A state that is not finite ends a run, which has failed.
 #[test]
 fn a_state_that_is_not_finite_ends_a_run() {
-    let text = LINE.replace("x = \"x + u\"", "x = \"if(step < 2, x + u, log(0 - 1))\"");
+    let text = LINE.replace("x = \"x + u\"", "x = \"if(step < 2, x + u, log(x - 100))\"");
     let planned = planned(&text, &["--set", "model.task.target=0 - 1", "--backend", "cpu"]);
     let run = &planned.record["runs"][0];
     assert_eq!((run["success"].as_bool(), run["stopped"]["step"].as_u64()), (Some(false), Some(2)));

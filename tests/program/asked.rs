@@ -358,7 +358,7 @@ fn plans_whose_weights_say_little_are_told() {
 fn configured(lines: &str, sets: &[&str], profile: Option<Profile>) -> Result<Config, String> {
     let text = format!("system.name = 'double-integrator'\npolicy.formula = 'bang-bang'\n{lines}");
     let set = sets.iter().map(|set| (*set).to_owned()).collect();
-    let overrides = Overrides { profile, seed: None, set };
+    let overrides = Overrides { profile, set, ..Default::default() };
     let table = toml::from_str(&text).unwrap();
     Config::from_table(table, "mine.toml", &overrides).map_err(|error| error.to_string())
 }

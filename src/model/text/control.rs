@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::formula::text::{Networks, Values};
 use crate::formula::{Graph, record};
 use crate::model::Plant;
-use crate::model::controller::{Controller, Law};
+use crate::model::controller::{Controller, Law, picked};
 use crate::policy::Mlp;
 
 impl Description {
@@ -29,7 +29,8 @@ impl Description {
     /// the network does not have, or calls a network that cannot be read or does not fit, or if the
     /// policy's network cannot be read or has another width.
     pub fn controller(&self) -> Result<Controller> {
-        let missing = || self.origin.refuse("policy", "missing; expected a section with a policy");
+        let missing =
+            || self.origin.refuse("policy", "no policy; expected `file`, a network, or `formula`");
         match self.policy.as_ref().ok_or_else(missing)? {
             Policy::Formulas(formulas) => {
                 let networks = self.table()?;
@@ -66,49 +67,37 @@ impl Description {
         self.check_inputs(policy, &network)?;
         self.check_outputs(policy, &network)?;
         let networks = self.table()?;
-        let observe = policy.observe.as_deref();
-        let observe = observe.map(|formulas| self.recorded("policy.observe", formulas, &networks));
+        let observe = match policy.observe.as_deref() {
+            Some(formulas) => Some(self.recorded("policy.observe", formulas, &networks)?),
+            None => self.places(policy, &network)?.map(|places| picked(self.inputs(), &places)),
+        };
         let (name, outputs) = (network.in_words(), outputs(&network));
         let act = policy.act.as_deref().map(|formulas| self.act(formulas, outputs, &networks));
-        let law = Law::Network {
-            observe: observe.transpose()?,
-            network: Arc::new(network),
-            act: act.transpose()?,
-        };
+        let law = Law::Network { observe, network: Arc::new(network), act: act.transpose()? };
         Ok(Controller::new(name, law))
     }
 
     /// Refuses a network that does not take what it would be given.
     fn check_inputs(&self, policy: &NetworkPolicy, network: &Mlp) -> Result<()> {
-        let inputs = network.widths()[0];
-        let (given, what) = match &policy.observe {
-            Some(observe) => (observe.len(), "formulas in `observe`"),
-            None => (self.states.len(), "states; `observe` gives a network other inputs"),
+        let Some(observe) = &policy.observe else {
+            return self.places(policy, network).map(|_| ());
         };
+        let (inputs, given) = (network.widths()[0], observe.len());
         if given != inputs {
-            let problem =
-                format!("the network takes {inputs} inputs, the model has {given} {what}");
+            let problem = format!(
+                "the network takes {inputs} inputs, the model has {given} formulas in `observe`"
+            );
             return Err(self.refuse_file(&policy.file, &problem));
         }
-        match network.state_order() {
-            Some(order) if policy.observe.is_none() => self.check_order(&policy.file, order),
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
-    /// Refuses a network whose inputs have other names than the states.
-    fn check_order(&self, file: &Path, order: &[String]) -> Result<()> {
+    /// The places of the network's inputs among the states, where it names a part of them or another order.
+    fn places(&self, policy: &NetworkPolicy, network: &Mlp) -> Result<Option<Vec<usize>>> {
         let states: Vec<&str> = self.states.iter().map(|state| state.axis.name.as_str()).collect();
-        if order.iter().eq(&states) {
-            return Ok(());
-        }
-        let problem = format!(
-            "its inputs are `{}`, the states of the model are `{}`; `observe` gives a network its \
-             inputs by name",
-            order.join(","),
-            states.join(",")
-        );
-        Err(self.refuse_file(file, &problem))
+        let named = |problem: String| format!("{problem}; `observe` gives a network other inputs");
+        let places = network.places_among(&states).map_err(named);
+        places.map_err(|problem| self.refuse_file(&policy.file, &problem))
     }
 
     /// Refuses a network that does not give what is asked for.
@@ -140,7 +129,12 @@ impl Description {
     }
 
     /// The controls over the inputs of the model and the `outputs` of the network behind them.
-    fn act(&self, formulas: &[Written], outputs: usize, networks: &Networks) -> Result<Graph> {
+    pub(super) fn act(
+        &self,
+        formulas: &[Written],
+        outputs: usize,
+        networks: &Networks,
+    ) -> Result<Graph> {
         let needed = self.lets.needed(formulas);
         let own: usize = formulas.iter().map(|written| written.formula.operations()).sum();
         self.check_size("policy.act", own + self.lets.operations(&needed))?;

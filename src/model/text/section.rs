@@ -129,6 +129,18 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// The list of `N` finite numbers at `key`.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        key: &str,
+        expected: &str,
+    ) -> Result<Option<[f32; N]>> {
+        self.value(key, expected, |value| {
+            let list = value.as_array()?.iter().map(number).collect::<Option<Vec<f32>>>()?;
+            <[f32; N]>::try_from(list).ok().filter(|list| list.iter().all(|x| x.is_finite()))
+        })
+    }
+
     /// The list of values at `key`.
     pub(super) fn list(&self, key: &str, expected: &str) -> Result<Option<&'a [Value]>> {
         self.value(key, expected, |value| value.as_array().map(Vec::as_slice))

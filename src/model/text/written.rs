@@ -44,9 +44,9 @@ impl FormulaKind {
     /// What a formula may use, for an error about one that uses more.
     fn allowed(self) -> &'static str {
         match self {
-            Self::Dynamics => "dynamics know states, controls, parameters and time",
+            Self::Dynamics => "dynamics know states, controls, parameters, disturbances and time",
             Self::Task => "a margin knows states, parameters and time",
-            Self::Picture => "a body stands where states say",
+            Self::Picture => "a body stands where states, parameters and time say",
             Self::Stage => "the cost of a stage knows states, controls, references and time",
             Self::Terminal => {
                 "a terminal cost is of the state after the last control, and knows states, \
@@ -103,7 +103,7 @@ impl Written {
         match kind {
             FormulaKind::Dynamics | FormulaKind::Stage => Ok(()),
             FormulaKind::Reference => self.check_time(origin, scope),
-            _ => self.check_controls(origin, scope, kind),
+            _ => self.check_deeds(origin, scope, kind),
         }
     }
 
@@ -123,15 +123,16 @@ impl Written {
         }
     }
 
-    /// Refuses controls, whether used here or by an intermediate formula.
-    fn check_controls(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
+    /// Refuses controls and disturbances, whether used here or by an intermediate formula.
+    fn check_deeds(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
         for Use { number, at } in self.formula.names() {
-            let Some(control) = scope.control_behind(number) else { continue };
-            let (name, control) = (scope.names.at(number), scope.names.at(control));
-            let what = if name == control {
-                format!("`{name}` is a control")
+            let Some(deed) = scope.deed_behind(number) else { continue };
+            let kind_of = if scope.is_control(deed) { "control" } else { "disturbance" };
+            let (name, deed) = (scope.names.at(number), scope.names.at(deed));
+            let what = if name == deed {
+                format!("`{name}` is a {kind_of}")
             } else {
-                format!("`{name}` uses the control `{control}`")
+                format!("`{name}` uses the {kind_of} `{deed}`")
             };
             return Err(self.refuse(origin, at, format!("{what}; {}", kind.allowed())));
         }
