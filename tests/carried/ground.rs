@@ -77,6 +77,13 @@ pub(crate) fn bicycle() -> Truth {
 /// Centres and radii of the pillars, m.
 const PILLARS: [[f64; 3]; 3] = [[2.6, 1.3, 0.3], [2.8, 2.9, 0.3], [4.2, 2.0, 0.35]];
 
+/// How far the drive is from pillars and walls, m.
+pub(crate) fn clearance([x, y]: [f64; 2]) -> f64 {
+    let room = x.min(6.0 - x).min(y).min(4.0 - y);
+    let pillar = |[a, b, radius]: [f64; 3]| (x - a).hypot(y - b) - radius;
+    PILLARS.map(pillar).into_iter().fold(room, f64::min) - 0.22
+}
+
 /// The unit vector to the dock, bent by the pillars.
 fn way([x, y]: [f64; 2]) -> [f64; 2] {
     let (dx, dy) = (5.3 - x, 2.0 - y);
@@ -114,11 +121,7 @@ pub(crate) fn diff_drive() -> Truth {
         bounds: vec![[-7.8, 7.8]; 2],
         policy: Box::new(policy),
         target: |x, _| 0.3 - (x[0] - 5.3).hypot(x[1] - 2.0),
-        constraint: |x, _| {
-            let room = x[0].min(6.0 - x[0]).min(x[1]).min(4.0 - x[1]);
-            let pillar = |[a, b, radius]: [f64; 3]| (x[0] - a).hypot(x[1] - b) - radius;
-            PILLARS.map(pillar).into_iter().fold(room, f64::min) - 0.22
-        },
+        constraint: |x, _| clearance([x[0], x[1]]),
         goal: Goal::ReachAvoid,
     }
 }

@@ -1,4 +1,5 @@
-//! Every plant under `configs/models` against its mathematics: formulas, rollouts on each backend, certificates.
+//! Every plant under `configs/models` against its mathematics: formulas, rollouts on each backend,
+//! certificates, plans.
 
 mod backends;
 mod certificates;
@@ -10,6 +11,7 @@ mod flying;
 mod formulas;
 mod ground;
 mod network;
+mod plans;
 mod poles;
 mod truth;
 
