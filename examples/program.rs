@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use reachcast::Result;
 use reachcast::config::{Registered, Registry};
-use reachcast::model::{Controller, Model};
+use reachcast::cost::Cost;
+use reachcast::model::{Controller, Costs, Model, StageCost};
 use reachcast::policy::Policy;
 use reachcast::real::Real;
 use reachcast::system::{Axis, Clipped, Parameter, System};
@@ -61,12 +62,25 @@ impl Policy<2, 1> for Push {
     }
 }
 
+/// What a plan pays: the distance from rest in the middle, and the force.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Near;
+
+impl Cost<2, 1, 0> for Near {
+    #[inline(always)]
+    fn stage<R: Real>(&self, [x, v]: [R; 2], [force]: [R; 1], _: [R; 0]) -> R {
+        x * x + R::lit(0.3) * v * v + R::lit(0.01) * force * force
+    }
+}
+
 /// What `[system] name = "sled"` and its key `drag` stand for.
 pub(crate) fn registry() -> Result<Registry> {
     Registry::new().with("sled", |numbers| {
         let sled = Clipped::new(Sled { drag: numbers.number("drag", 0.2) as f32 });
-        let push = Controller::of(&sled, Push);
-        Ok(Registered::new(Model::of(sled)).formula("push", push))
+        let (push, near) = (Controller::of(&sled, Push), StageCost::of(sled, Near));
+        let model = Model::of(sled);
+        let costs = Costs::of(&model, near, Vec::new())?;
+        Ok(Registered::new(model).formula("push", push).costs(costs))
     })
 }
 

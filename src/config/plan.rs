@@ -47,6 +47,9 @@ impl Config {
     /// [`Error::Invalid`] for a system that the program carries, whose costs are no text, and those of the
     /// description.
     pub fn planned_model(&self) -> Result<Model> {
+        if let Some(plant) = self.registered()? {
+            return Ok(Model::clone(plant.model()));
+        }
         let Some(model) = &self.model else { return Err(self.carried()) };
         let origin = Origin::new(UNNAMED, Path::new(""));
         let described = self.description(model, &self.policy, &origin);
@@ -60,6 +63,12 @@ impl Config {
     /// [`Error::Invalid`] for a model without costs, with an example of them, and those of
     /// [`Config::costs`].
     pub fn planned_costs(&self, folder: &Path) -> Result<Costs> {
+        if let Some(plant) = self.registered()? {
+            let problem =
+                "has no costs, and plans are made to cost little: `Registered::costs` gives them";
+            let missing = || self.placed(Error::invalid("system.name", problem));
+            return plant.planned().cloned().ok_or_else(missing);
+        }
         let missing = || self.placed(Error::invalid("model.costs", EXAMPLE));
         self.costs(folder)?.ok_or_else(missing)
     }

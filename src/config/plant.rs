@@ -100,7 +100,7 @@ impl Config {
     }
 
     /// The plant of the registry, where the configuration names one.
-    fn registered(&self) -> Result<Option<Registered>> {
+    pub(super) fn registered(&self) -> Result<Option<Registered>> {
         match &self.system {
             Some(NamedSystem::Registered(section)) => {
                 let made = self.registry.make(&section.name, &section.numbers)?;

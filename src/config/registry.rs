@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::plant::no_formula;
 use crate::error::{Error, Result};
-use crate::model::{Controller, Model, Plant};
+use crate::model::{Controller, Costs, Model, Plant};
 use crate::studies::SYSTEMS;
 
 /// Plants that are written in Rust, by the names that configurations have for them.
@@ -62,12 +62,13 @@ impl Numbers {
 pub struct Registered {
     model: Arc<Model>,
     formulas: Vec<(String, Arc<Controller>)>,
+    costs: Option<Costs>,
 }
 
 impl Registered {
     /// The model, which a network of a file may drive.
     pub fn new(model: Model) -> Self {
-        Self { model: Arc::new(model), formulas: Vec::new() }
+        Self { model: Arc::new(model), formulas: Vec::new(), costs: None }
     }
 
     /// The same with a policy that `policy.formula = "name"` asks for.
@@ -75,6 +76,17 @@ impl Registered {
     pub fn formula(mut self, name: impl Into<String>, controller: Controller) -> Self {
         self.formulas.push((name.into(), Arc::new(controller)));
         self
+    }
+
+    /// The same with what plans in closed loop cost, for the command `plan`.
+    #[must_use]
+    pub fn costs(self, costs: Costs) -> Self {
+        Self { costs: Some(costs), ..self }
+    }
+
+    /// What plans cost, where somebody said so.
+    pub(super) fn planned(&self) -> Option<&Costs> {
+        self.costs.as_ref()
     }
 
     /// The model.

@@ -1,9 +1,11 @@
 //! The costs of a plan by name: what they are together, and what each of them comes to.
 
+use super::Model;
 use super::lookups::Lookups;
 use super::reference::Reference;
 use super::stage::StageCost;
-use crate::formula::Graph;
+use crate::error::{Error, Result};
+use crate::formula::{Graph, record};
 
 /// The costs of a plan, each with its name.
 #[derive(Clone, Debug)]
@@ -68,6 +70,59 @@ impl Terms {
 }
 
 impl Costs {
+    /// The cost `stage` of plans for `model`, as one that is written in Rust: its terms are `stage`, `map` where
+    /// it charges by one, and `end` where the end costs; its contexts are the `references`.
+    ///
+    /// ```
+    /// use reachcast::cost::Quadratic;
+    /// use reachcast::model::{Costs, Model, Reference, ReferenceSource, StageCost};
+    /// use reachcast::system::DoubleIntegrator;
+    /// let system = DoubleIntegrator::default();
+    /// let weights = Quadratic { state: [1.0, 0.1], control: [0.0], last: [1.0, 0.1], obstacle: None };
+    /// // Where to be, and that no stage is the last.
+    /// let fixed = |name: &str| Reference { name: name.into(), source: ReferenceSource::Fixed(0.0) };
+    /// let references = ["position", "velocity", "last"].map(fixed).to_vec();
+    /// let stage = StageCost::of::<_, _, 2, 1, 3>(system, weights);
+    /// let costs = Costs::of(&Model::of(system), stage, references)?;
+    /// assert_eq!(costs.shares(&[0.5, 0.0], &[1.0], 0), [0.25]);
+    /// # Ok::<(), reachcast::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a cost of another model, and for other than a reference for each context.
+    pub fn of(model: &Model, stage: StageCost, references: Vec<Reference>) -> Result<Self> {
+        stage.check(model)?;
+        if references.len() != stage.contexts {
+            let problem = format!(
+                "{} references for a cost that wants to know {} numbers at each stage",
+                references.len(),
+                stage.contexts
+            );
+            return Err(Error::invalid("costs", problem));
+        }
+        let end = stage.terminal.as_ref().map_or_else(
+            || Terms {
+                formulas: record(model.inputs() + stage.contexts, |_| Vec::new()),
+                lookups: None,
+            },
+            |end| Terms { formulas: end.formula.clone(), lookups: end.lookups.clone() },
+        );
+        let term = |name: &str, kind| Term { name: name.to_owned(), kind };
+        let map = stage.map.as_ref().map(|_| term("map", TermKind::Stage));
+        let ended = stage.terminal.as_ref().map(|_| term("end", TermKind::Terminal));
+        Ok(Self {
+            terms: [Some(term("stage", TermKind::Stage)), map, ended]
+                .into_iter()
+                .flatten()
+                .collect(),
+            parts: [charged(model, &stage), end],
+            stage,
+            references,
+            parameters: model.parameters.iter().map(|parameter| parameter.value).collect(),
+            period: model.period.unwrap_or(0.0),
+        })
+    }
+
     /// The contexts of a plan that starts at `first_step`, `[rows, references]`: a row for each of its
     /// `horizon` stages, and one for the end where there is a terminal cost. What
     /// [`crate::rollout::MppiProblem::context`] is.
@@ -87,5 +142,27 @@ impl Costs {
     /// The references at a step.
     fn row(&self, step: u32) -> Vec<f32> {
         self.references.iter().map(|reference| reference.at(step, self.period)).collect()
+    }
+}
+
+/// The terms of a stage: its formula, and what its map charges besides.
+fn charged(model: &Model, stage: &StageCost) -> Terms {
+    let Some(map) = &stage.map else {
+        return Terms { formulas: stage.stage.clone(), lookups: stage.lookups.clone() };
+    };
+    let (own, known) = (model.inputs(), model.inputs() + stage.contexts);
+    let asked = stage.lookups.as_ref().map_or(0, |lookups| lookups.maps.len());
+    let formulas = record(known + asked + 1, |x| {
+        let paid = stage.stage.eval(&x[..known + asked]);
+        vec![paid[0], x[known + asked]]
+    });
+    let cells = record(known, |x| {
+        let asked = stage.lookups.as_ref().map(|lookups| lookups.cells.eval(x));
+        [asked.unwrap_or_default(), map.cell.eval(&x[..own])].concat()
+    });
+    let maps = stage.lookups.iter().flat_map(|lookups| lookups.maps.clone());
+    Terms {
+        formulas,
+        lookups: Some(Lookups { maps: maps.chain([map.map.clone()]).collect(), cells }),
     }
 }

@@ -139,3 +139,16 @@ fn a_certificate_writes_the_folder_that_the_command_writes() {
     let other = program(&["certify", SLED, "--out", &out, "--set", "global.draws=2001"]);
     assert_eq!(other, 2, "other work");
 }
+
+/// Plans by the cost in Rust bring the sled to rest in the middle.
+#[test]
+fn a_plant_of_ones_own_is_planned_for() {
+    let folder = Folder::new();
+    let out = folder.path("planned");
+    let set = ["plan.runs=4", "plan.samples=256", "plan.temperature=0.05", "plan.steps=60"];
+    let set: Vec<&str> = set.iter().flat_map(|key| ["--set", key]).collect();
+    assert_eq!(program(&[&["plan", SLED, "--out", &out], &set[..]].concat()), 0);
+    let record = fs::read_to_string(format!("{out}/plan.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_str(&record).unwrap();
+    assert_eq!(record["success"]["successes"], 4, "{record}");
+}
