@@ -12,7 +12,7 @@ use super::purpose;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::AnalyticSettings;
-use super::soft::{measure_tape, step_tape};
+use super::soft::{measure_tape, part_tapes};
 use super::starts::Mixture;
 use super::tape::Tape;
 use crate::backend::Backend;
@@ -50,7 +50,8 @@ pub struct Task<'a> {
 pub struct Analytic<'a> {
     task: Task<'a>,
     settings: AnalyticSettings,
-    step: Arc<Tape>,
+    /// The parts of a step.
+    parts: Vec<Arc<Tape>>,
     measure: Arc<Tape>,
     network: Network,
     adam: Adam,
@@ -78,7 +79,7 @@ impl<'a> Analytic<'a> {
     pub fn new(task: Task<'a>, network: Network, settings: AnalyticSettings) -> Self {
         let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
         Self {
-            step: Arc::new(step_tape(&task.model)),
+            parts: part_tapes(&task.model).into_iter().map(Arc::new).collect(),
             measure: Arc::new(measure_tape(&task.model, &task.spec, task.tightening.as_ref())),
             adam: Adam::new(network.parameters.len()),
             network,
@@ -96,8 +97,10 @@ impl<'a> Analytic<'a> {
         for step in 0..self.task.spec.horizon {
             let u = network.forward(x.clone());
             let step = device.tensor(vec![step as f32; count], [count, 1]);
-            x = apply(&self.step, temperature, [x, u, step]);
-            states.push(x.clone());
+            for part in &self.parts {
+                x = apply(part, temperature, [x, u.clone(), step.clone()]);
+                states.push(x.clone());
+            }
         }
         apply(&self.measure, temperature, [Tensor::cat(states, 1)])
     }

@@ -21,6 +21,7 @@ pub fn pushed<R: Real>(x: &mut [R], entries: &[(usize, f32)], d: &[R]) {
 /// If the network has not an input for each state and an output for each of `entries`.
 pub fn disturbed(model: &Model, network: &Arc<Mlp>, entries: &[(usize, f32)]) -> Model {
     assert_eq!(network.widths().last(), Some(&entries.len()), "outputs of the disturbance");
+    let model = &*model.sampled();
     let step = record(model.inputs(), |inputs| {
         let mut x = model.step.recorded_at(inputs);
         pushed(&mut x, entries, &Expr::call(network, &inputs[..model.states.len()]));

@@ -31,27 +31,36 @@ impl<'a> Rows<'a> {
 
     /// The next states under `controls`, row by row like them.
     pub fn next(&self, controls: &[f32]) -> Vec<f32> {
-        self.each(&self.model.step, controls)
+        self.each(self.model.states.len(), controls, |x, u, step| self.model.next_at(x, u, step))
     }
 
     /// The margins of each state.
     pub fn margins(&self) -> Vec<Margins<f32>> {
-        let [targets, constraints] =
-            [&self.model.target, &self.model.constraint].map(|margin| self.each(margin, &[]));
+        let of = |margin: &Graph| {
+            self.each(1, &[], |x, u, step| {
+                margin.eval(&self.model.arguments_at(x, u, [step, step]))
+            })
+        };
+        let [targets, constraints] = [of(&self.model.target), of(&self.model.constraint)];
         let pairs = targets.into_iter().zip(constraints);
         pairs.map(|(target, constraint)| Margins { target, constraint }).collect()
     }
 
-    /// What `graph` makes of each, row by row; a control that is not given is 0.
-    fn each(&self, graph: &Graph, controls: &[f32]) -> Vec<f32> {
-        let (states, outputs) = (self.states.size(), graph.outputs.len());
+    /// The `outputs` numbers that `of` makes of the state, the controls and the step of each, row by row; a
+    /// control that is not given is 0.
+    fn each(
+        &self,
+        outputs: usize,
+        controls: &[f32],
+        of: impl Fn(&[Lanes<WIDTH>], &[Lanes<WIDTH>], Lanes<WIDTH>) -> Vec<Lanes<WIDTH>>,
+    ) -> Vec<f32> {
+        let states = self.states.size();
         let mut found = vec![0.0; self.states.len() * outputs];
         for (tile, found) in found.chunks_mut(WIDTH * outputs).enumerate() {
             let x = columns(self.states.numbers(), states, tile);
             let u = columns(controls, self.model.controls.len(), tile);
             let step = columns(self.steps, 1, tile);
-            let inputs = self.model.arguments_at(&x, &u, step[0]);
-            store(graph.eval(&inputs).into_iter(), found, outputs);
+            store(of(&x, &u, step[0]).into_iter(), found, outputs);
         }
         found
     }

@@ -77,13 +77,15 @@ impl Description {
         let control_names: Vec<&str> = controls.iter().map(|axis| axis.name.as_str()).collect();
         let policy = root.section("policy")?;
         let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
+        let dynamics = dynamics::dynamics(&model, &state_names, time, &scope)?;
         Ok(Self {
-            dynamics: dynamics::dynamics(&model, &state_names, time, &scope)?,
             task: task::task(
                 &model.required("task", "the kind and its margins")?,
                 &scope,
+                &dynamics,
                 time.period,
             )?,
+            dynamics,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
             policy: policy.transpose()?,
             name,

@@ -46,6 +46,7 @@ impl Description {
             controls: self.controls.clone(),
             parameters: self.parameters.clone(),
             period: self.period,
+            points: self.task.between + 1,
             step: self.step(&networks)?,
             task: self.task.task,
             target: margin(&self.task.target, NOWHERE)?,
@@ -89,7 +90,7 @@ impl Description {
         Ok(())
     }
 
-    /// The graph of the next state.
+    /// The graph of the state after one part of a period: the next one where nothing is looked at between.
     fn step(&self, networks: &Networks) -> Result<Graph> {
         let (path, formulas, stages) = match &self.dynamics {
             Dynamics::Next(formulas) => ("model.next", formulas, 1),
@@ -104,7 +105,10 @@ impl Description {
             let inputs = self.clipped(inputs);
             match &self.dynamics {
                 Dynamics::Next(_) => formulas.values(&inputs),
-                Dynamics::Flow(_, rule) => formulas.integrated(&inputs, *rule),
+                Dynamics::Flow(_, rule) => {
+                    let substeps = rule.substeps / (self.task.between + 1);
+                    formulas.integrated(&inputs, *rule, substeps)
+                }
             }
         });
         self.check_size(path, graph.nodes.len())?;
@@ -184,11 +188,11 @@ impl<'a> Formulas<'a> {
         written.formula.value(Values { names, outputs: &[], networks: self.networks })
     }
 
-    /// The state a period after `inputs`, the formulas being derivatives.
-    fn integrated<R: Scalar>(&self, inputs: &[R], rule: Integration) -> Vec<R> {
+    /// The state `substeps` substeps after `inputs`, the formulas being derivatives.
+    fn integrated<R: Scalar>(&self, inputs: &[R], rule: Integration, substeps: u32) -> Vec<R> {
         let count = self.description.states.len();
         let mut moment = inputs.to_vec();
-        for substep in 0..rule.substeps {
+        for substep in 0..substeps {
             let begin = f64::from(substep) * rule.seconds();
             self.at_time(&mut moment, inputs, begin);
             let next = match rule.integrator {
