@@ -72,7 +72,7 @@ pub fn replayed_pair(plant: &Plant, steps: f64) -> f64 {
 /// Of an MPPI sample without networks, its noise independent over steps and controls, and of its part
 /// in the new plan.
 pub fn sample(planning: &Planning) -> f64 {
-    let Planning { model, cost, spec, .. } = planning;
+    let Planning { model, cost, spec, .. } = &planning.sampled();
     let horizon = spec.horizon();
     let stage = record(cost.stage.inputs, |inputs| {
         let own = &inputs[..model.inputs()];

@@ -18,6 +18,8 @@ use std::sync::Arc;
 pub use controller::{Controller, Law};
 pub use plant::Plant;
 pub use points::Moment;
+#[cfg(feature = "gpu")]
+pub(crate) use points::share;
 pub use role::Role;
 pub use stage::{MapCost, StageCost};
 pub use task::{Task, Window};

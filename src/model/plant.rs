@@ -78,7 +78,12 @@ impl Model {
     }
 
     /// The same where each lane may be at a time of its own: periods since the start, and the step.
-    pub(crate) fn arguments_at<R: Real>(&self, x: &[R], u: &[R], [elapsed, step]: [R; 2]) -> Vec<R> {
+    pub(crate) fn arguments_at<R: Real>(
+        &self,
+        x: &[R],
+        u: &[R],
+        [elapsed, step]: [R; 2],
+    ) -> Vec<R> {
         let parameters = self.parameters.iter().map(|parameter| R::lit(parameter.value));
         let time = elapsed * R::lit(self.period.unwrap_or(0.0));
         x.iter().chain(u).copied().chain(parameters).chain([time, step]).collect()

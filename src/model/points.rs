@@ -57,7 +57,7 @@ impl Moment {
 }
 
 /// The part of a period before its point number `point`.
-fn share(point: u32, points: u32) -> f32 {
+pub(crate) fn share(point: u32, points: u32) -> f32 {
     point as f32 / points as f32
 }
 
@@ -163,7 +163,10 @@ mod tests {
         let safe = Role::LIVE.with(Role::CONSTRAINT);
         let between = |task: Task| (0..=3).map(|t| task.role_between(t, 3)).collect::<Vec<Role>>();
         let over = Role::OVER;
-        assert_eq!(between(Task::default()), [Role::REACH_AVOID; 3].into_iter().chain([over]).collect::<Vec<_>>());
+        assert_eq!(
+            between(Task::default()),
+            [Role::REACH_AVOID; 3].into_iter().chain([over]).collect::<Vec<_>>()
+        );
         assert_eq!(between(Task::Avoid), [safe, safe, safe, over]);
         assert_eq!(between(Task::AtEnd), [safe, safe, safe, over]);
         let window = Window { from: 1, to: Some(2) };
@@ -174,7 +177,8 @@ mod tests {
 
     #[test]
     fn looks_are_counted_part_by_part() {
-        let looks = |points: u32| (0..4).map(|look| Moment::of_look(look, points)).collect::<Vec<_>>();
+        let looks =
+            |points: u32| (0..4).map(|look| Moment::of_look(look, points)).collect::<Vec<_>>();
         assert_eq!(looks(1), [0, 1, 2, 3].map(Moment::from));
         let two = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(step, point)| Moment { step, point });
         assert_eq!(looks(2), two);

@@ -49,8 +49,7 @@ impl Shapes {
         let huge = f64::from(HUGE);
         let bounded = |x: f64| x.clamp(-huge, huge);
         let mut fold = Fold::new();
-        let counts =
-            |margins: &&Margins| margins.role != Role::OVER && margins.are_numbers();
+        let counts = |margins: &&Margins| margins.role != Role::OVER && margins.are_numbers();
         for margins in margins.iter().take_while(counts) {
             let [target, constraint] = self.scaled(margins).map(bounded);
             fold.look(margins.role, target, constraint);

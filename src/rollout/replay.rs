@@ -128,9 +128,8 @@ pub fn pair_margins(
         nominal.extend(along);
         replayed.extend(beside);
     }
-    let [nominal, perturbed] = [nominal, replayed].map(|states| {
-        margins(&plant.model, spec.horizon, states.iter().map(Vec::as_slice))
-    });
+    let [nominal, perturbed] = [nominal, replayed]
+        .map(|states| margins(&plant.model, spec.horizon, states.iter().map(Vec::as_slice)));
     PairMargins { nominal, perturbed }
 }
 

@@ -150,7 +150,7 @@ mod tests {
     use super::*;
     use crate::policy::{Activation, Layer, Mlp, OutputActivation};
     use crate::race::system::DroneRace;
-    use crate::rollout::replay::{pair_measures, states};
+    use crate::rollout::replay::{looks, pair_measures, states};
 
     /// A network with weights that are no round numbers.
     fn network() -> Mlp {
@@ -193,6 +193,69 @@ mod tests {
                 assert_eq!(group.states(i, 30)[0], alone[30], "pair {i}, {control:?}");
             }
         }
+    }
+
+    /// A pendulum that is looked at three times inside each period.
+    fn pendulum() -> Plant {
+        let text = r#"
+            [model]
+            name = "pendulum"
+            [model.states]
+            angle = { unit = "rad", box = [-1.0, 1.0] }
+            rate = { unit = "rad/s", box = [-1.0, 1.0] }
+            [model.controls]
+            torque = { unit = "N m", bounds = [-1.0, 1.0] }
+            [model.flow]
+            angle = "2 * rate"
+            rate = "-9 * sin(angle) + torque + 0.5 * cos(3 * t)"
+            [model.time]
+            period = 0.25
+            integrator = "rk4"
+            substeps = 4
+            [model.task]
+            kind = "avoid"
+            between = 3
+            constraint = "1.2 - abs(angle)"
+            [policy]
+            formula = { torque = "-0.5 * rate" }
+        "#;
+        let place = std::path::Path::new(".");
+        crate::model::text::read(text, "pendulum.toml", place).unwrap().plant().unwrap()
+    }
+
+    #[test]
+    fn points_have_the_bits_of_one_at_a_time_and_count_at_the_sample_after_them() {
+        let (plant, spec) = (pendulum(), RolloutSpec::new(8, 0.95).unwrap());
+        let losses: Vec<f32> = (0..9).map(|t| 0.01 * t as f32).collect();
+        let tightening = Tightening::losing(losses.clone(), losses);
+        let pairs = [[vec![0.6, 0.2], vec![0.65, 0.2]], [vec![-0.2, 1.9], vec![-0.2, 2.0]]];
+        let control = PairControl::ClosedLoop;
+        let group = PairGroup::new(&plant, &pairs, spec.horizon, control);
+        let measures = group.measures(&plant.model, &spec, &tightening);
+        let mut inside = 0;
+        for (i, pair) in pairs.iter().enumerate() {
+            let both = [&*pair[0], &*pair[1]];
+            let (nominal, perturbed) = pair_measures(&plant, both, &spec, &tightening, control);
+            assert_eq!(measures[i], [nominal, perturbed], "pair {i}");
+            let [x, y] = both.map(|start| looks::<f64>(&plant, start, spec.horizon));
+            let apart = |look: usize| {
+                let squares = x[look].iter().zip(&y[look]).map(|(a, b)| (a - b).powi(2));
+                squares.sum::<f64>().sqrt()
+            };
+            let found = group.distances(i);
+            assert_eq!((found.len(), found[0]), (9, apart(0)));
+            for (t, found) in found.iter().enumerate().skip(1) {
+                let most = (4 * t - 3..=4 * t).map(apart).fold(0.0, f64::max);
+                assert_eq!(*found, most, "pair {i}, step {t}");
+                inside += u64::from(most > apart(4 * t));
+            }
+            assert_eq!(group.states(i, 31), [x[31].clone(), y[31].clone()]);
+        }
+        assert!(inside > 3, "{inside}");
+        // The first pair stays away from the limit, the second one crosses it inside a period.
+        assert_eq!(group.open_looks(&plant.model)[0], 33);
+        let open = group.open_looks(&plant.model)[1];
+        assert!(open < 33 && open % 4 != 0, "{open}");
     }
 
     #[test]

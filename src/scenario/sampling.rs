@@ -75,9 +75,7 @@ fn between(
     }
     text.push('.');
     match (moved, feature) {
-        (Some(moved), Some(feature)) if moved.step > f64::from(feature.width) => {
-            text + " " + leap
-        }
+        (Some(moved), Some(feature)) if moved.step > f64::from(feature.width) => text + " " + leap,
         _ => text,
     }
 }

@@ -62,8 +62,7 @@ impl Tube<'_> {
     /// Lipschitz constants of the target and the constraint margin over a box, at a moment.
     fn slopes(&self, x: &[Interval], at: Moment) -> [f64; 2] {
         let model = &*self.plant.model;
-        let outputs =
-            over(x, &[], |x, _| vec![model.target_at(x, at), model.constraint_at(x, at)]);
+        let outputs = over(x, &[], |x, _| vec![model.target_at(x, at), model.constraint_at(x, at)]);
         [0, 1].map(|i| open(&outputs[i]).map_or(f64::INFINITY, Enclosure::constant))
     }
 

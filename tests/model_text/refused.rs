@@ -189,7 +189,6 @@ fn what_does_not_work_yet_is_refused_by_name() {
         let place = format!("model.{section}: ");
         assert_refused("[model.time]", &text, &[&place, "not work yet; leave the section out"]);
     }
-    assert_refused("kind", "between = 3\nkind", &["model.task.between", "does not work yet"]);
     for text in ["size = 0.2", "joined = \"cart\""] {
         assert_refused("cart = {", &format!("cart = {{ {text}, "), &["do not show this yet"]);
     }

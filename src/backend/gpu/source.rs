@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compose::PlantText;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::{Controller, Model, Plant};
 use crate::policy::Mlp;
 
@@ -25,7 +25,6 @@ impl Source {
     /// # Errors
     /// [`crate::Error::Invalid`] where their parts do not fit.
     pub(super) fn new(model: &Model, controller: &Controller) -> Result<Self> {
-        check_points(model)?;
         let text = PlantText::new(model, controller)?;
         // In a chain it is one of the networks that are called.
         let driving = controller.shared_network().filter(|_| text.chain().is_none());
@@ -50,15 +49,6 @@ impl Source {
         let (mine, theirs) = (of(self), of(other));
         mine.len() == theirs.len() && mine.iter().zip(&theirs).all(|(a, b)| same_bits(a, b))
     }
-}
-
-/// Refuses points inside a period, which kernels do not look at.
-fn check_points(model: &Model) -> Result<()> {
-    if model.points == 1 {
-        return Ok(());
-    }
-    let problem = "adapters do not look at points inside a period; use the native CPU backend, or leave it out";
-    Err(Error::invalid("model.task.between", problem))
 }
 
 /// Whether two networks have the same layers, bit by bit: 0 and -0 differ.

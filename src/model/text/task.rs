@@ -64,12 +64,14 @@ fn between(section: &Section<'_>, dynamics: &Dynamics) -> Result<u32> {
     };
     let points = u32::try_from(count).ok().filter(|count| *count > 0);
     let parts = points.and_then(|count| count.checked_add(1)).ok_or_else(|| {
-        let problem = "expected a number of points inside each period, 1 or more; leave it out for none";
+        let problem =
+            "expected a number of points inside each period, 1 or more; leave it out for none";
         refuse(format!("{count}; {problem}"))
     })?;
     if !rule.substeps.is_multiple_of(parts) {
         let problem = format!(
-            "{count} points cut a period into {parts} parts, and {} substeps cannot be shared evenly; take a              multiple of {parts} for `model.time.substeps`",
+            "{count} points cut a period into {parts} parts, and {} substeps cannot be shared evenly; \
+             take a multiple of {parts} for `model.time.substeps`",
             rule.substeps
         );
         return Err(refuse(problem));

@@ -21,6 +21,8 @@ const JUDGE: &str = include_str!("../../../../shaders/judge.wgsl");
 const EXACT: &str = include_str!("../../../../shaders/exact.wgsl");
 const SAMPLE: &str = include_str!("../../../../shaders/sample.wgsl");
 const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
+const REACH_AVOID_POINTS: &str = include_str!("../../../../shaders/reach_avoid_points.wgsl");
+const DEVIATION_POINTS: &str = include_str!("../../../../shaders/deviation_points.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
 const NARROW: &str = include_str!("../../../../shaders/narrow.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
@@ -47,7 +49,8 @@ impl PlantText {
     ///
     /// # Errors
     /// [`Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
-    /// what is not known there, or the network does not fit; [`Error::Device`] if more networks follow
+    /// what is not known there, or the network does not fit; [`Error::Invalid`] for points inside a period
+    /// where formulas call networks; [`Error::Device`] if more networks follow
     /// one another inside formulas than an adapter takes.
     pub fn new(model: &Model, controller: &Controller) -> Result<Self> {
         check_formulas(model, controller)?;
@@ -58,11 +61,13 @@ impl PlantText {
             controls: model.controls.len(),
             parameters: model.parameters.len(),
             period: model.period.unwrap_or(0.0),
+            points: model.points,
             contexts: 0,
             driving: controller.network().map(DrivingNetwork::new),
         };
         let chain = ChainText::new(&outline, model, controller)?;
         if chain.is_some() {
+            check_points(model)?;
             // The network that drives is one of those that the chain calls.
             outline.driving = None;
         }
@@ -81,6 +86,17 @@ impl PlantText {
     /// The parts between networks, where formulas call some.
     pub fn chain(&self) -> Option<&ChainText> {
         self.chain.as_ref()
+    }
+
+    /// Parts of a period.
+    pub fn points(&self) -> u32 {
+        self.outline.points
+    }
+
+    /// Rows of the schedule for each step, and of distances: of its sample and, where there are any, of the points
+    /// behind it.
+    pub fn rows(&self) -> u32 {
+        self.outline.points.min(2)
     }
 
     /// Number of states.
@@ -104,9 +120,10 @@ impl PlantText {
         self.outline.driving.as_ref().and_then(|driving| driving.fused.as_ref())
     }
 
-    /// Operations of the formulas for one step: a line of the text is one.
+    /// Operations of the formulas for one step: a line of the text is one, in each part of a period.
     pub fn operations(&self) -> u64 {
-        self.physics.functions.iter().map(|one| one.text.lines().count() as u64).sum()
+        let lines = self.physics.functions.iter().map(|one| one.text.lines().count() as u64);
+        lines.sum::<u64>() * u64::from(self.outline.points)
     }
 
     /// What `kernel` binds.
@@ -160,9 +177,13 @@ impl PlantText {
         let folds = || [FINITE, FOLD].concat();
         let parts = match kernel {
             Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
-            Kernel::ReachAvoid => vec![self.rollout(kernel), REACH_AVOID.to_owned()],
+            Kernel::ReachAvoid => {
+                let text = if self.looks_between() { REACH_AVOID_POINTS } else { REACH_AVOID };
+                vec![self.rollout(kernel), text.to_owned()]
+            }
             Kernel::Deviation => {
-                vec![self.rollout(kernel), self.distance(), DEVIATION.to_owned()]
+                let text = if self.looks_between() { DEVIATION_POINTS } else { DEVIATION };
+                vec![self.rollout(kernel), self.distance(), text.to_owned()]
             }
             Kernel::Compact => vec![folds(), COMPACT.to_owned()],
             Kernel::Reduce => vec![REDUCE.to_owned()],
@@ -185,6 +206,11 @@ impl PlantText {
         let sizes = constants_with(states, self.outline.controls, length);
         let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts].concat().join("\n")
+    }
+
+    /// Whether rollouts are looked at between samples.
+    fn looks_between(&self) -> bool {
+        self.outline.points > 1
     }
 
     /// What counts: bits alone, nothing of the plant.
@@ -210,6 +236,11 @@ impl PlantText {
             self.columns(kernel),
             self.fused().is_some()
         );
+        let parts = match self.looks_between() {
+            true => format!("const POINTS: u32 = {}u;\n", self.outline.points),
+            false => String::new(),
+        };
+        let lanes = lanes + &parts;
         let states = self.outline.states;
         let moves = match &self.chain {
             Some(_) => {
@@ -262,7 +293,9 @@ impl PlantText {
         let roles = self.roles(kernel);
         let functions: Vec<&Function> =
             roles.iter().filter_map(|role| self.physics.function(*role)).collect();
-        physics_glue(&self.outline, &functions)
+        // What a network with kernels of its own sees is asked at samples alone.
+        let points = if kernel == Kernel::Observe { 1 } else { self.outline.points };
+        physics_glue(&Outline { points, ..self.outline.clone() }, &functions)
     }
 
     /// The recorded functions that `kernel` calls.
@@ -358,6 +391,16 @@ fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Refuses points inside a period where formulas call networks, which go from kernel to kernel.
+fn check_points(model: &Model) -> Result<()> {
+    if model.points == 1 {
+        return Ok(());
+    }
+    let problem = "adapters do not look at points inside a period where formulas call networks; use the native \
+                   CPU backend, or leave it out";
+    Err(Error::invalid("model.task.between", problem))
 }
 
 fn check_network(inputs: bool, outputs: bool, problem: impl FnOnce() -> String) -> Result<()> {
