@@ -1,6 +1,7 @@
 //! The text of the kernels of measures, pairs and networks.
 
 use super::chain::ChainText;
+use super::fit::{check_formulas, check_points, check_reads};
 use super::fused::{Fused, fused_text};
 use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
@@ -9,10 +10,10 @@ use super::layers::layer_text;
 use super::narrowed::block_constants;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formula::wgsl::{Arithmetic, CHOICES, function, function_with};
 use crate::formula::{Expr, record};
-use crate::model::{Controller, Law, Model};
+use crate::model::{Controller, Model};
 use crate::policy::Mlp;
 use crate::real::Real;
 
@@ -352,71 +353,6 @@ pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
     let DrivingNetwork { activations, inputs, outputs, .. } = DrivingNetwork::new(mlp);
     let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
     [constants(inputs, outputs), PARAMS.to_owned(), CHOICES.to_owned(), text].join("\n")
-}
-
-/// The sizes of every formula must be those of its place: kernels do not check.
-fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
-    let (inputs, states, controls) = (model.inputs(), model.states.len(), model.controls.len());
-    let mut expected = vec![
-        ("step", &model.step, [inputs, states]),
-        ("target", &model.target, [inputs, 1]),
-        ("constraint", &model.constraint, [inputs, 1]),
-    ];
-    if let Law::Formula(graph) = &controller.law {
-        expected.push(("control", graph, [inputs, controls]));
-    }
-    if let Law::Network { observe, network, act } = &controller.law {
-        let DrivingNetwork { inputs: seen, outputs: said, .. } = DrivingNetwork::new(network);
-        check_network(
-            observe.is_some() || seen == states,
-            act.is_some() || said == controls,
-            || {
-                format!(
-                    "maps {seen} inputs to {said} outputs; the system has {states} states and \
-                 {controls} controls"
-                )
-            },
-        )?;
-        expected.extend(observe.iter().map(|graph| ("observe", graph, [inputs, seen])));
-        expected.extend(act.iter().map(|graph| ("act", graph, [inputs + said, controls])));
-    }
-    for (place, graph, sizes) in expected {
-        let found = [graph.inputs, graph.outputs.len()];
-        if found != sizes {
-            let problem = format!(
-                "maps {} inputs to {} outputs; {} to {} were expected",
-                found[0], found[1], sizes[0], sizes[1]
-            );
-            return Err(Error::invalid(place, problem));
-        }
-    }
-    Ok(())
-}
-
-/// Refuses points inside a period where formulas call networks, which go from kernel to kernel.
-fn check_points(model: &Model) -> Result<()> {
-    if model.points == 1 {
-        return Ok(());
-    }
-    let problem = "adapters do not look at points inside a period where formulas call networks; use the native \
-                   CPU backend, or leave it out";
-    Err(Error::invalid("model.task.between", problem))
-}
-
-fn check_network(inputs: bool, outputs: bool, problem: impl FnOnce() -> String) -> Result<()> {
-    if inputs && outputs { Ok(()) } else { Err(Error::invalid("network", problem())) }
-}
-
-/// Only the step knows the controls.
-fn check_reads(physics: &Physics) -> Result<()> {
-    let reads = |role| role != Role::Step;
-    match physics.functions.iter().find(|one| reads(one.role) && one.reads(Part::Control)) {
-        None => Ok(()),
-        Some(function) => {
-            let problem = "reads a control, which only the step knows";
-            Err(Error::invalid(function.role.name(), problem))
-        }
-    }
 }
 
 /// `normal_pair` and `ln_unit`, with the bits of the host.
