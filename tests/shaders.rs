@@ -123,19 +123,21 @@ fn text(model: &Model, controller: &Controller) -> PlantText {
     PlantText::new(model, controller).expect("formulas that fit")
 }
 
-/// A model whose formulas read parameters and time, under each kind of driver.
-fn drifts() -> Vec<Named> {
+/// A model whose formulas read parameters and time, under each kind of driver, with `points` parts of a period.
+fn drifts(points: u32) -> Vec<Named> {
     let mut all = Vec::new();
     for driver in DRIVERS {
         let plant = driver.plant(VALUES);
-        let text = text(&plant.model, &plant.controller);
+        let mut model = Model::clone(&plant.model);
+        model.points = points;
+        let text = text(&model, &plant.controller);
         for form in FORMS {
             let fused = plant.controller.network().and_then(|mlp| Fused::new(mlp, form));
             let Some(fused) = fused else { continue };
-            let name = format!("drift, {driver:?} fused, {form:?}");
+            let name = format!("drift in {points}, {driver:?} fused, {form:?}");
             all.push((name, text.clone().fusing(Some(fused))));
         }
-        all.push((format!("drift, {driver:?}"), text));
+        all.push((format!("drift in {points}, {driver:?}"), text));
     }
     all
 }
@@ -152,7 +154,7 @@ fn all_plants() -> Vec<Named> {
         let speed_limit = cone == Cone::Distance;
         all.extend(plants(DroneRace { cone, speed_limit, ..DroneRace::default() }));
     }
-    all.extend(drifts());
+    all.extend([1, 3].into_iter().flat_map(drifts));
     for law in learned::LAWS {
         let plant = learned::plant(law);
         all.push((format!("learned cart, {law:?}"), text(&plant.model, &plant.controller)));

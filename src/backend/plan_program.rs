@@ -28,6 +28,7 @@ impl Backend {
     /// [`Error::Invalid`] where its parts do not fit each other, and those of the device.
     pub fn prepare_plans(&self, planning: &Planning) -> Result<PlanProgram<'_>> {
         planning.check()?;
+        let planning = &planning.sampled();
         let prepared = match self {
             Self::Cpu(cpu) => Prepared::Cpu(cpu, Box::new(cpu.prepare_plans(planning))),
             Self::Gpu(gpu) => Prepared::Gpu(Box::new(gpu.prepare_plans(planning)?)),

@@ -55,7 +55,8 @@ pub fn scored(model: &Model) -> f64 {
 /// Of the measure of a rollout of `steps` steps, which may be a mean.
 pub fn rollout(plant: &Plant, steps: f64) -> f64 {
     let Plant { model, controller } = plant;
-    steps * (control(controller) + formula(&model.step)) + (steps + 1.0) * scored(model)
+    let looks = steps * f64::from(model.points);
+    steps * control(controller) + looks * formula(&model.step) + (looks + 1.0) * scored(model)
 }
 
 /// Of a pair whose perturbed rollout takes the controls of the nominal one; drawing it apart.
@@ -63,14 +64,15 @@ pub fn replayed_pair(plant: &Plant, steps: f64) -> f64 {
     let model = &plant.model;
     // Per state a difference, a square and a sum; then the root.
     let distance = 3.0 * model.states.len() as f64 + 1.0;
-    let perturbed = steps * formula(&model.step) + (steps + 1.0) * scored(model);
-    rollout(plant, steps) + perturbed + (steps + 1.0) * distance
+    let looks = steps * f64::from(model.points);
+    let perturbed = looks * formula(&model.step) + (looks + 1.0) * scored(model);
+    rollout(plant, steps) + perturbed + (looks + 1.0) * distance
 }
 
 /// Of an MPPI sample without networks, its noise independent over steps and controls, and of its part
 /// in the new plan.
 pub fn sample(planning: &Planning) -> f64 {
-    let Planning { model, cost, spec, .. } = planning;
+    let Planning { model, cost, spec, .. } = &planning.sampled();
     let horizon = spec.horizon();
     let stage = record(cost.stage.inputs, |inputs| {
         let own = &inputs[..model.inputs()];

@@ -41,6 +41,9 @@ impl Plant {
         if states == 0 {
             return Err(Error::invalid("model.states", "none given; a model has one at least"));
         }
+        if model.points == 0 {
+            return Err(Error::invalid("model.points", "0 parts of a period; 1 is the least"));
+        }
         let part = |name, graph, outputs| Part { name, graph, inputs, outputs: Some(outputs) };
         part("model.step", &model.step, states).check()?;
         part("model.target", &model.target, 1).check()?;

@@ -41,6 +41,9 @@ impl Plant {
         if !model.task.is_plain() {
             writeln!(text, "// task {}", model.task).expect("a String grows");
         }
+        if model.points > 1 {
+            writeln!(text, "// between {}", model.points - 1).expect("a String grows");
+        }
         for parameter in &model.parameters {
             // The bits, so that no decimal hides a difference.
             let (name, value) = (&parameter.name, parameter.value);

@@ -9,6 +9,7 @@ mod interface;
 mod lookups;
 mod picture;
 mod plant;
+mod points;
 mod recorded;
 mod reference;
 mod role;
@@ -26,6 +27,9 @@ pub use interface::Interface;
 pub use lookups::Lookups;
 pub use picture::{Outline, Picture, PlacedBody, Shape, ShapeKind};
 pub use plant::Plant;
+pub use points::Moment;
+#[cfg(feature = "gpu")]
+pub(crate) use points::share;
 pub use reference::{Reference, ReferenceSource};
 pub use role::Role;
 pub use stage::{MapCost, StageCost};
@@ -55,7 +59,9 @@ pub struct Model {
     pub parameters: Vec<Parameter>,
     /// Seconds between two steps; none where the model does not say.
     pub period: Option<f32>,
-    /// The next state, `[states]`; clips the controls to their bounds.
+    /// Parts of a period, at the end of each of which the state is looked at; 1: at samples alone.
+    pub points: u32,
+    /// The state after one part, `[states]`: the next one where there is 1; clips the controls to their bounds.
     pub step: Graph,
     /// What a rollout has to do.
     pub task: Task,
@@ -80,6 +86,7 @@ impl PartialEq for Model {
         let same_axes = self.states == other.states && self.controls == other.controls;
         let same_data = self.parameters == other.parameters && self.period == other.period;
         let same_formulas = self.step == other.step
+            && self.points == other.points
             && self.task == other.task
             && self.target == other.target
             && self.constraint == other.constraint;

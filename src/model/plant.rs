@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Controller, Law, Model};
+use super::{Controller, Law, Model, Moment};
 use crate::formula::{Graph, Node};
 use crate::policy::{Mlp, Policy};
 use crate::real::Real;
@@ -70,15 +70,22 @@ impl Plant {
 
 impl Model {
     /// The inputs of the formulas.
-    pub(crate) fn arguments<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
+    pub(crate) fn arguments<R: Real>(&self, x: &[R], u: &[R], at: impl Into<Moment>) -> Vec<R> {
+        let at = at.into();
         // A step is a whole number below 2^24: exact.
-        self.arguments_at(x, u, R::lit(step as f32))
+        let [elapsed, step] = [at.elapsed(self.points), at.step as f32];
+        self.arguments_at(x, u, [R::lit(elapsed), R::lit(step)])
     }
 
-    /// The same where each lane may be at a step of its own.
-    pub(crate) fn arguments_at<R: Real>(&self, x: &[R], u: &[R], step: R) -> Vec<R> {
+    /// The same where each lane may be at a time of its own: periods since the start, and the step.
+    pub(crate) fn arguments_at<R: Real>(
+        &self,
+        x: &[R],
+        u: &[R],
+        [elapsed, step]: [R; 2],
+    ) -> Vec<R> {
         let parameters = self.parameters.iter().map(|parameter| R::lit(parameter.value));
-        let time = step * R::lit(self.period.unwrap_or(0.0));
+        let time = elapsed * R::lit(self.period.unwrap_or(0.0));
         x.iter().chain(u).copied().chain(parameters).chain([time, step]).collect()
     }
 
@@ -92,27 +99,27 @@ impl Model {
             .all(|graph| !graph.nodes.iter().any(reads))
     }
 
-    /// The state after `x` under the control `u`, `[states]`.
+    /// The state a period after `x` under the control `u`, `[states]`.
     pub fn next<R: Real>(&self, x: &[R], u: &[R], step: u32) -> Vec<R> {
-        self.step.eval(&self.arguments(x, u, step))
+        self.parts(x, u, step).pop().unwrap_or_else(|| x.to_vec())
     }
 
     /// The target margin at `x`: positive inside the target set.
-    pub fn target_at<R: Real>(&self, x: &[R], step: u32) -> R {
-        self.margin(&self.target, x, step)
+    pub fn target_at<R: Real>(&self, x: &[R], at: impl Into<Moment>) -> R {
+        self.margin(&self.target, x, at.into())
     }
 
     /// The constraint margin at `x`: positive where safe.
-    pub fn constraint_at<R: Real>(&self, x: &[R], step: u32) -> R {
-        self.margin(&self.constraint, x, step)
+    pub fn constraint_at<R: Real>(&self, x: &[R], at: impl Into<Moment>) -> R {
+        self.margin(&self.constraint, x, at.into())
     }
 
-    fn margin<R: Real>(&self, margin: &Graph, x: &[R], step: u32) -> R {
-        margin.eval_first(&self.at_state(x, step), &mut Vec::with_capacity(margin.nodes.len()))
+    fn margin<R: Real>(&self, margin: &Graph, x: &[R], at: Moment) -> R {
+        margin.eval_first(&self.at_state(x, at), &mut Vec::with_capacity(margin.nodes.len()))
     }
 
     /// The inputs of the formulas at a state, where no formula reads a control.
-    pub(crate) fn at_state<R: Real>(&self, x: &[R], step: u32) -> Vec<R> {
-        self.arguments(x, &vec![R::lit(0.0); self.controls.len()], step)
+    pub(crate) fn at_state<R: Real>(&self, x: &[R], at: impl Into<Moment>) -> Vec<R> {
+        self.arguments(x, &vec![R::lit(0.0); self.controls.len()], at)
     }
 }

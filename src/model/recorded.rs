@@ -43,6 +43,7 @@ impl Model {
             controls: system.controls().to_vec(),
             parameters: system.parameters(),
             period: None,
+            points: 1,
             step: record(&|x, u| system.step(x, u).to_vec()),
             task: Task::default(),
             target: record(&|x, _| vec![system.target(x)]),

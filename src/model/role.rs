@@ -32,6 +32,12 @@ impl Role {
         Self(self.0 | other.0)
     }
 
+    /// What both have.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
     /// Whether it has a mark of `other`.
     pub const fn has(self, other: Self) -> bool {
         self.0 & other.0 != 0

@@ -23,13 +23,14 @@ impl Judged {
     pub fn new(model: &Model, run: &Trajectory, spec: &RolloutSpec) -> Self {
         let wide = |x: &Vec<f32>| x.iter().copied().map(f64::from).collect();
         let states: Vec<Vec<f64>> = run.states.iter().map(wide).collect();
-        let all = margins(model, spec.horizon, states.iter().map(Vec::as_slice));
+        let looks = looks(model, run, &states);
+        let all = margins(model, spec.horizon, looks.iter().map(Vec::as_slice));
         let at = |margin: fn(&Model, &[f64], u32) -> f64| -> Vec<f64> {
             (0..).zip(&states).map(|(step, x)| margin(model, x, step)).collect()
         };
         Self {
             measure: prefix(&all, all.len(), spec),
-            reached: reached(&all, spec),
+            reached: reached(&all, spec).map(|look| model.moment(look).sample() as u32),
             target: at(|model, x, step| model.target_at(x, step)),
             constraint: at(|model, x, step| model.constraint_at(x, step)),
         }
@@ -46,9 +47,24 @@ fn prefix(all: &[Margins], count: usize, spec: &RolloutSpec) -> f64 {
     measure_of(&all[..count], spec, &Tightening::none(spec))
 }
 
-/// The first step with which the measure is positive: from there on it stays so.
-fn reached(all: &[Margins], spec: &RolloutSpec) -> Option<u32> {
+/// The states that are looked at: those that are stored, `states`, and the points between them.
+fn looks(model: &Model, run: &Trajectory, states: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut looks: Vec<Vec<f64>> = states.first().cloned().into_iter().collect();
+    for (step, (next, u)) in (0..).zip(states.iter().skip(1).zip(&run.controls)) {
+        if model.points > 1 {
+            let u: Vec<f64> = u.iter().copied().map(f64::from).collect();
+            let mut parts = model.parts(&states[step as usize], &u, step);
+            parts.pop();
+            looks.extend(parts);
+        }
+        looks.push(next.clone());
+    }
+    looks
+}
+
+/// The number of the first look with which the measure is positive: from there on it stays so.
+fn reached(all: &[Margins], spec: &RolloutSpec) -> Option<usize> {
     let counts: Vec<usize> = (1..=all.len()).collect();
     let place = counts.partition_point(|&count| prefix(all, count, spec) <= 0.0);
-    (place < counts.len()).then_some(place as u32)
+    (place < counts.len()).then_some(place)
 }

@@ -81,6 +81,7 @@ impl Setting<'_> {
             controls: model.controls.clone(),
             bodies: model.bodies.clone(),
             task: model.task,
+            between: model.points - 1,
         }
     }
 }

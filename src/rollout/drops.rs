@@ -48,13 +48,11 @@ impl Shapes {
     pub fn score(&self, margins: &[Margins]) -> f64 {
         let huge = f64::from(HUGE);
         let bounded = |x: f64| x.clamp(-huge, huge);
-        let units = self.target.iter().zip(&self.constraint);
         let mut fold = Fold::new();
-        let counts =
-            |(margins, _): &(&Margins, _)| margins.role != Role::OVER && margins.are_numbers();
-        for (margins, (target, constraint)) in margins.iter().zip(units).take_while(counts) {
-            let scaled = [margins.target / target, margins.constraint / constraint].map(bounded);
-            fold.add_as(margins.role, scaled[0], scaled[1], 1.0);
+        let counts = |margins: &&Margins| margins.role != Role::OVER && margins.are_numbers();
+        for margins in margins.iter().take_while(counts) {
+            let [target, constraint] = self.scaled(margins).map(bounded);
+            fold.look(margins.role, target, constraint);
         }
         fold.measure()
     }
@@ -62,16 +60,22 @@ impl Shapes {
     /// The largest drop of a pair in these units, section 3 of `docs/method.md`: over the margins that count
     /// and the steps before the nominal rollout fails its task. Minus infinity where there is no such step.
     pub fn largest(&self, pair: &PairMargins) -> f64 {
-        let units = self.target.iter().zip(&self.constraint);
-        let scaled = drops(pair).zip(units).map(|(drop, (target, constraint))| {
-            (drop.target / target).max(drop.constraint / constraint)
+        let scaled = drops(pair).map(|drop| {
+            let [target, constraint] = self.scaled(&drop);
+            target.max(constraint)
         });
         scaled.fold(f64::NEG_INFINITY, f64::max)
     }
+
+    /// `margins` of target and constraint in the units of their step; a point has those of the sample after it.
+    pub(crate) fn scaled(&self, margins: &Margins) -> [f64; 2] {
+        let step = margins.moment.sample();
+        [margins.target / self.target[step], margins.constraint / self.constraint[step]]
+    }
 }
 
-/// How far the margins of the perturbed rollout lie below those of the nominal one, step by step up to,
-/// and without, the first step that decides the nominal rollout as failed: a margin that has to hold is not above
+/// How far the margins of the perturbed rollout lie below those of the nominal one, look by look up to,
+/// and without, the first one that decides the nominal rollout as failed: a margin that has to hold is not above
 /// 0, or a margin that counts or a state of it is no number; or up to the end of the task.
 ///
 /// Infinite where the perturbed rollout has no number; two equal infinite margins drop 0, and one that does not
@@ -79,12 +83,13 @@ impl Shapes {
 pub fn drops(pair: &PairMargins) -> impl Iterator<Item = Margins> {
     let both = pair.nominal.iter().zip(&pair.perturbed);
     both.take_while(|(nominal, _)| nominal.is_open()).map(|(nominal, perturbed)| {
-        let role = nominal.role;
+        let (moment, role) = (nominal.moment, nominal.role);
         let counted = |counts: bool, nominal: f64, other: f64| match counts || other.is_nan() {
             true => drop(nominal, other),
             false => f64::NEG_INFINITY,
         };
         Margins {
+            moment,
             role,
             target: counted(role.sees_target(), nominal.target, perturbed.target),
             constraint: counted(role.sees_constraint(), nominal.constraint, perturbed.constraint),
@@ -104,11 +109,12 @@ fn drop(nominal: f64, perturbed: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Moment;
     use crate::rollout::{RolloutSpec, replay};
 
     fn rollout(margins: &[[f64; 2]]) -> Vec<Margins> {
         let role = Role::REACH_AVOID;
-        margins.iter().map(|both| Margins::of(role, *both)).collect()
+        (0..).zip(margins).map(|(t, both)| Margins::of(Moment::from(t), role, *both)).collect()
     }
 
     fn z(shapes: &Shapes, nominal: &[[f64; 2]], perturbed: &[[f64; 2]]) -> f64 {

@@ -34,6 +34,13 @@ impl<R: Real> Fold<R> {
     /// Adds the margins of the next state, which is `role` to the task.
     #[inline(always)]
     pub fn add_as(&mut self, role: Role, target_margin: R, constraint_margin: R, gamma: R) {
+        self.look(role, target_margin, constraint_margin);
+        self.advance(gamma);
+    }
+
+    /// Adds the margins of a state under the discount of the sample at or before it.
+    #[inline(always)]
+    pub fn look(&mut self, role: Role, target_margin: R, constraint_margin: R) {
         if role.has(Role::CONSTRAINT) {
             self.safe = self.safe.min(self.discount * constraint_margin);
         }
@@ -46,6 +53,11 @@ impl<R: Real> Fold<R> {
         if role.has(Role::CONCLUSION) {
             self.best = self.best.max(self.safe);
         }
+    }
+
+    /// Goes on to the discount of the next sample.
+    #[inline(always)]
+    pub fn advance(&mut self, gamma: R) {
         self.discount = self.discount * gamma;
     }
 

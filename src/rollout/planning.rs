@@ -169,6 +169,15 @@ impl Planning {
         }
     }
 
+    /// The same where stages are whole periods: plans look at samples alone.
+    pub(crate) fn sampled(&self) -> Self {
+        let model = match self.model.points {
+            1 => Arc::clone(&self.model),
+            _ => Arc::new(self.model.sampled().into_owned()),
+        };
+        Self { model, ..self.clone() }
+    }
+
     /// The networks that take part: value and disturbance.
     pub(crate) fn networks(&self) -> [Option<&Arc<Mlp>>; 2] {
         let value = self.value.as_ref().map(|term| &term.network);

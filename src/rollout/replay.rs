@@ -3,10 +3,10 @@
 
 use super::fold::{Fold, NON_FINITE};
 use super::spec::{PairControl, RolloutSpec, Tightening};
-use crate::model::{Model, Plant, Role};
+use crate::model::{Model, Moment, Plant, Role};
 use crate::real::Real;
 
-/// The states x_0..=x_T from `start`, `[T + 1, states]`.
+/// The states x_0..=x_T from `start` at the samples, `[T + 1, states]`.
 pub fn states<R: Real>(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Vec<R>> {
     let mut x: Vec<R> = start.iter().copied().map(R::lit).collect();
     let mut states = vec![x.clone()];
@@ -17,14 +17,26 @@ pub fn states<R: Real>(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Vec<R>
     states
 }
 
-/// The measure of `start` in f64, with tightened margins.
-pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
-    fold_states(&plant.model, &states(plant, start, spec.horizon), spec, tightening)
+/// The states from `start` that are looked at, samples and the points between them, `[looks, states]`; as
+/// many as [`Model::looks`] says.
+pub fn looks<R: Real>(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Vec<R>> {
+    let mut states: Vec<Vec<R>> = vec![start.iter().copied().map(R::lit).collect()];
+    for step in 0..horizon {
+        let x = states.last().map_or(&[][..], Vec::as_slice);
+        let parts = plant.model.parts(x, &plant.control(x, step), step);
+        states.extend(parts);
+    }
+    states
 }
 
-/// The margins of the rollout from `start` in f64, `[T + 1]`.
+/// The measure of `start` in f64, with tightened margins.
+pub fn measure(plant: &Plant, start: &[f32], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
+    fold_looks(&plant.model, &looks(plant, start, spec.horizon), spec, tightening)
+}
+
+/// The margins of the rollout from `start` in f64, `[looks]`.
 pub fn states_margins(plant: &Plant, start: &[f32], spec: &RolloutSpec) -> Vec<Margins> {
-    let states = states::<f64>(plant, start, spec.horizon);
+    let states = looks::<f64>(plant, start, spec.horizon);
     margins(&plant.model, spec.horizon, states.iter().map(Vec::as_slice))
 }
 
@@ -41,7 +53,7 @@ pub fn pair_measures(
     (measure_of(&nominal, spec, tightening), measure_of(&perturbed, spec, &Tightening::none(spec)))
 }
 
-/// The margins of both rollouts of a pair in f64, `[T + 1]` each.
+/// The margins of both rollouts of a pair in f64, `[looks]` each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairMargins {
     /// Of the nominal rollout.
@@ -50,10 +62,12 @@ pub struct PairMargins {
     pub perturbed: Vec<Margins>,
 }
 
-/// The margins at one step; both NaN where the state is not finite, and 0 else where they do not count.
+/// The margins of one state; both NaN where it is not finite, and 0 else where they do not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
-    /// What the step is to the task.
+    /// Where on the rollout it is.
+    pub moment: Moment,
+    /// What it is to the task.
     pub role: Role,
     /// Target margin `r_t`.
     pub target: f64,
@@ -63,8 +77,9 @@ pub struct Margins {
 
 impl Margins {
     /// The margins `[target, constraint]` of a finite state as far as `role` lets them count.
-    pub(super) fn of(role: Role, [target, constraint]: [f64; 2]) -> Self {
+    pub(super) fn of(moment: Moment, role: Role, [target, constraint]: [f64; 2]) -> Self {
         Self {
+            moment,
             role,
             target: if role.sees_target() { target } else { 0.0 },
             constraint: if role.sees_constraint() { constraint } else { 0.0 },
@@ -72,8 +87,8 @@ impl Margins {
     }
 
     /// The margins of a state that is not finite.
-    pub(super) fn lost(role: Role) -> Self {
-        Self { role, target: f64::NAN, constraint: f64::NAN }
+    pub(super) fn lost(moment: Moment, role: Role) -> Self {
+        Self { moment, role, target: f64::NAN, constraint: f64::NAN }
     }
 
     /// Whether state and margins are numbers, as far as they count.
@@ -99,62 +114,47 @@ pub fn pair_margins(
     spec: &RolloutSpec,
     control: PairControl,
 ) -> PairMargins {
-    let nominal = driven(plant, nominal, spec.horizon);
-    let mut x: Vec<f64> = perturbed.iter().copied().map(f64::from).collect();
-    let mut replayed = vec![x.clone()];
-    for (step, Driven { controls, .. }) in (0..spec.horizon).zip(&nominal) {
-        x = match control {
-            PairControl::Replay => plant.model.next(&x, controls, step),
-            PairControl::ClosedLoop => plant.model.next(&x, &plant.control(&x, step), step),
+    let start = |x: &[f32]| vec![x.iter().copied().map(f64::from).collect::<Vec<f64>>()];
+    let (mut nominal, mut replayed) = (start(nominal), start(perturbed));
+    for step in 0..spec.horizon {
+        let at = step as usize * plant.model.points as usize;
+        let (x, y) = (&nominal[at], &replayed[at]);
+        let driven = plant.control(x, step);
+        let beside = match control {
+            PairControl::Replay => plant.model.parts(y, &driven, step),
+            PairControl::ClosedLoop => plant.model.parts(y, &plant.control(y, step), step),
         };
-        replayed.push(x.clone());
+        let along = plant.model.parts(x, &driven, step);
+        nominal.extend(along);
+        replayed.extend(beside);
     }
-    let nominal = nominal.iter().map(|driven| &*driven.state);
-    PairMargins {
-        nominal: margins(&plant.model, spec.horizon, nominal),
-        perturbed: margins(&plant.model, spec.horizon, replayed.iter().map(Vec::as_slice)),
-    }
+    let [nominal, perturbed] = [nominal, replayed]
+        .map(|states| margins(&plant.model, spec.horizon, states.iter().map(Vec::as_slice)));
+    PairMargins { nominal, perturbed }
 }
 
-/// A state and the controls there.
-struct Driven {
-    state: Vec<f64>,
-    /// None after the last step.
-    controls: Vec<f64>,
-}
-
-/// The states x_0..=x_T from `start` with the controls that lead on.
-fn driven(plant: &Plant, start: &[f32], horizon: u32) -> Vec<Driven> {
-    let mut state: Vec<f64> = start.iter().copied().map(f64::from).collect();
-    let mut all = Vec::with_capacity(horizon as usize + 1);
-    for step in 0..horizon {
-        let controls = plant.control(&state, step);
-        let next = plant.model.next(&state, &controls, step);
-        all.push(Driven { state, controls });
-        state = next;
-    }
-    all.push(Driven { state, controls: Vec::new() });
-    all
-}
-
-/// The margins at each of `states`, of rollouts of `horizon` steps.
+/// The margins at each of `states`, the looks of a rollout of `horizon` steps.
 pub(crate) fn margins<'a>(
     model: &Model,
     horizon: u32,
     states: impl Iterator<Item = &'a [f64]>,
 ) -> Vec<Margins> {
-    let at = |(step, x): (u32, &[f64])| {
-        let role = model.task.role(step, horizon);
+    let at = |(look, x): (usize, &[f64])| {
+        let moment = model.moment(look);
+        let role = model.task.role_at(moment, horizon);
         match x.iter().all(|x| x.is_finite()) {
-            true => Margins::of(role, [model.target_at(x, step), model.constraint_at(x, step)]),
-            false => Margins::lost(role),
+            true => {
+                let both = [model.target_at(x, moment), model.constraint_at(x, moment)];
+                Margins::of(moment, role, both)
+            }
+            false => Margins::lost(moment, role),
         }
     };
-    (0..).zip(states).map(at).collect()
+    states.enumerate().map(at).collect()
 }
 
-/// The measure of `states`.
-pub(crate) fn fold_states(
+/// The measure of `states`, the looks of a rollout.
+pub(crate) fn fold_looks(
     model: &Model,
     states: &[Vec<f64>],
     spec: &RolloutSpec,
@@ -164,7 +164,7 @@ pub(crate) fn fold_states(
     measure_of(&margins(model, spec.horizon, states), spec, tightening)
 }
 
-/// The measure of the margins of a rollout, `[T + 1]`, tightened.
+/// The measure of the margins of a rollout, `[looks]`, tightened.
 pub fn measure_of(margins: &[Margins], spec: &RolloutSpec, tightening: &Tightening) -> f64 {
     fold(margins.iter().copied(), spec, tightening)
 }
@@ -172,23 +172,28 @@ pub fn measure_of(margins: &[Margins], spec: &RolloutSpec, tightening: &Tighteni
 /// Folds the margins of states in order; a state that is not finite, or a margin that counts and is no
 /// number, fails the rollout from there on.
 pub(super) fn fold(
-    steps: impl Iterator<Item = Margins>,
+    looks: impl Iterator<Item = Margins>,
     spec: &RolloutSpec,
     tightening: &Tightening,
 ) -> f64 {
-    let mut fold = Fold::new();
-    for (t, margins) in steps.enumerate() {
+    let (mut fold, mut step) = (Fold::new(), 0);
+    for margins in looks {
         if margins.role == Role::OVER {
             break;
         }
+        // A point has the discount of the sample before it, and loses what the one after it does.
+        if margins.moment.step > step {
+            fold.advance(f64::from(spec.gamma));
+            step = margins.moment.step;
+        }
+        let t = margins.moment.sample();
         let target = tightening.acted(margins.target, tightening.target[t]);
         let constraint = tightening.acted(margins.constraint, tightening.constraint[t]);
         if target.is_nan() || constraint.is_nan() {
             let so_far: f64 = fold.measure();
             return if so_far > 0.0 { so_far } else { f64::from(NON_FINITE) };
         }
-        let gamma = f64::from(spec.gamma);
-        fold.add_as(margins.role, bounded(target), bounded(constraint), gamma);
+        fold.look(margins.role, bounded(target), bounded(constraint));
     }
     fold.measure()
 }

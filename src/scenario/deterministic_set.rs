@@ -160,7 +160,7 @@ fn radii(
 /// Largest distance of the f32 rollout from `start` to any state of the enclosure of the nominal; infinite
 /// where the enclosure ends before it.
 fn distance(context: Context<'_>, certificate: &Deterministic<'_>, start: &[f32]) -> f64 {
-    let rollout = replay::states::<f32>(context.plant(), start, certificate.horizon());
+    let rollout = replay::looks::<f32>(context.plant(), start, certificate.horizon());
     let enclosure = certificate.nominal(start).states();
     if enclosure.len() < rollout.len() {
         return f64::INFINITY;

@@ -134,7 +134,15 @@ fn exact(model: &Model, settings: &Settings) -> Result<Option<Vec<f64>>> {
         ));
     }
     let radius = f64::from(asked.radius);
-    Ok(matrix.map(|matrix| linear::exact_deviation(&matrix, radius, settings.spec.horizon)))
+    let (points, horizon) = (model.points, settings.spec.horizon);
+    // The matrix is that of a part: a step has the largest of its sample and of the points before it.
+    let by_part = |matrix| linear::exact_deviation(&matrix, radius, horizon * points);
+    let by_step = |parts: Vec<f64>| {
+        let steps = parts[1..].chunks(points as usize);
+        let largest = |period: &[f64]| period.iter().copied().fold(0.0, f64::max);
+        std::iter::once(parts[0]).chain(steps.map(largest)).collect()
+    };
+    Ok(matrix.map(by_part).map(by_step))
 }
 
 /// Rolls out `count` pairs of the streams `[nominal, perturbation]`.

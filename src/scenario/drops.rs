@@ -110,14 +110,15 @@ fn pilot(context: Context<'_>, settings: &Settings, count: u64) -> Result<Shapes
     Ok(shapes(&all, settings.spec.horizon as usize + 1))
 }
 
-/// The shapes of pairs with these drops, step by step.
+/// The shapes of pairs with these drops: at each step the largest of its sample and of the points before it.
 pub fn shapes(pairs: &[Vec<Margins>], steps: usize) -> Shapes {
     let largest = |margin: &dyn Fn(&Margins) -> f64| -> Vec<f64> {
-        let at = |t: usize| {
-            let drops = pairs.iter().filter_map(|pair| pair.get(t)).map(margin);
-            drops.filter(|drop| drop.is_finite()).fold(0.0, f64::max)
-        };
-        (0..steps).map(at).collect()
+        let mut largest = vec![0.0; steps];
+        for drop in pairs.iter().flatten().filter(|drop| margin(drop).is_finite()) {
+            let most = &mut largest[drop.moment.sample()];
+            *most = margin(drop).max(*most);
+        }
+        largest
     };
     Shapes {
         target: with_floor(largest(&|drop| drop.target)),
@@ -183,9 +184,9 @@ fn widest_at(
 ) -> Result<WidestRecord> {
     let pairs = pairs(settings, [purpose::DROPS_NOMINAL, purpose::DROPS_PERTURBATION])?;
     let pair = margins(context.plant(), settings, &pairs, index);
-    let scaled = drops(&pair).enumerate().flat_map(|(t, drop)| {
-        let target = (drop.target / shapes.target[t], t, "target");
-        [target, (drop.constraint / shapes.constraint[t], t, "constraint")]
+    let scaled = drops(&pair).flat_map(|drop| {
+        let (step, [target, constraint]) = (drop.moment.sample(), shapes.scaled(&drop));
+        [(target, step, "target"), (constraint, step, "constraint")]
     });
     let (_, step, margin) = scaled.reduce(|a, b| if b.0 > a.0 { b } else { a }).unwrap_or((
         f64::NEG_INFINITY,

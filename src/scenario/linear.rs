@@ -22,6 +22,7 @@ pub fn state_matrix(model: &Model, horizon: u32) -> Option<DMatrix<f64>> {
     let states = model.states.len();
     let ends = |state: f64, side: fn(&Axis) -> f32, step: u32| -> Vec<f64> {
         let controls: Vec<f64> = model.controls.iter().map(|axis| f64::from(side(axis))).collect();
+        // The last point of a period comes before the sample after it.
         model.arguments(&vec![state; states], &controls, step)
     };
     let low = ends(f64::NEG_INFINITY, |axis| axis.low, 0);

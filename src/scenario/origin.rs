@@ -59,5 +59,6 @@ pub(super) fn system_record(model: &Model, settings: &Settings) -> SystemRecord 
         controls: model.controls.clone(),
         bodies: model.bodies.clone(),
         task: model.task,
+        between: model.points - 1,
     }
 }

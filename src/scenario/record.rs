@@ -168,6 +168,14 @@ pub struct SystemRecord {
     /// What a rollout has to do; nothing is said of reach-avoid without a window.
     #[serde(default, skip_serializing_if = "Task::is_plain")]
     pub task: Task,
+    /// Points inside each period that are looked at; nothing is said where there is none.
+    #[serde(default, skip_serializing_if = "is_none_between")]
+    pub between: u32,
+}
+
+/// Whether samples alone are looked at.
+fn is_none_between(between: &u32) -> bool {
+    *between == 0
 }
 
 /// The deviation bound, `docs/method.md` section 3.

@@ -1,4 +1,4 @@
-//! What states at samples do not tell: what lies between two of them, and motion below their spacing.
+//! What the states looked at do not tell: what lies between two of them, and motion below their spacing.
 
 use crate::model::Plant;
 use crate::rollout::{States, replay};
@@ -8,25 +8,66 @@ use crate::system::{Axis, Body, Feature};
 /// Share of the longest step of a coordinate from which on the spacing of its numbers is told.
 const SHARE: f64 = 0.01;
 
-/// What is to be said of rollouts from `starts`: that nothing is looked at between samples, with the
-/// farthest that something moves within a step, and where f32 loses the motion.
+/// What is to be said of rollouts from `starts`: that nothing is looked at between samples, or between the points
+/// of a period, with the farthest that something moves from one to the next, and where f32 loses the motion.
 pub fn sampling(plant: &Plant, starts: States<'_>, horizon: u32) -> Vec<String> {
     let model = &plant.model;
-    let roll = |start: &[f32]| replay::states::<f64>(plant, start, horizon);
+    let roll = |start: &[f32]| replay::looks::<f64>(plant, start, horizon);
     let rollouts: Vec<Vec<Vec<f64>>> = starts.iter().map(roll).collect();
     let moved = farthest(&model.states, &model.bodies, &rollouts);
-    let between = between(rollouts.len(), moved, model.smallest_feature.clone());
+    let looked = Looked::of(model.points);
+    let between = between(looked, rollouts.len(), moved, model.smallest_feature.clone());
     std::iter::once(between).chain(lost(&model.states, &rollouts)).collect()
 }
 
-/// That rollouts are looked at at their samples alone, beside what is known of steps and features.
-fn between(count: usize, moved: Option<Moved>, feature: Option<Feature>) -> String {
-    let mut text =
-        "States are looked at only at the samples, and nothing is said of what lies between two of them"
-            .to_owned();
+/// Where states are looked at, in words.
+struct Looked {
+    /// The places.
+    places: String,
+    /// The way from one to the next.
+    way: &'static str,
+    /// That a feature may be missed, and what to do about it.
+    leap: &'static str,
+}
+
+impl Looked {
+    /// Where a period has `points` parts.
+    fn of(points: u32) -> Self {
+        match points {
+            1 => Self {
+                places: "only at the samples".to_owned(),
+                way: "in a step",
+                leap: "A step can leap over it unseen: shorten the step of the system, or the speeds.",
+            },
+            _ => Self {
+                places: format!("at the samples and {}", points_between(points - 1)),
+                way: "from one to the next",
+                leap: "It can be leapt over unseen between two of them: look at more points of each period \
+                       (`between`), or shorten the period, or the speeds.",
+            },
+        }
+    }
+}
+
+/// `at 3 further points of each period`.
+pub(crate) fn points_between(between: u32) -> String {
+    let points = if between == 1 { "point" } else { "points" };
+    format!("at {between} further {points} of each period")
+}
+
+/// Where rollouts are looked at, beside what is known of the way between and of features.
+fn between(
+    Looked { places, way, leap }: Looked,
+    count: usize,
+    moved: Option<Moved>,
+    feature: Option<Feature>,
+) -> String {
+    let mut text = format!(
+        "States are looked at {places}, and nothing is said of what lies between two of them"
+    );
     if let Some(Moved { what, step }) = &moved {
         let step = upper(*step);
-        text += &format!("; in {count} rollouts, {what} moves up to {step} m in a step");
+        text += &format!("; in {count} rollouts, {what} moves up to {step} m {way}");
     }
     if let Some(Feature { name, width }) = &feature {
         let wide = lower(f64::from(*width));
@@ -34,14 +75,12 @@ fn between(count: usize, moved: Option<Moved>, feature: Option<Feature>) -> Stri
     }
     text.push('.');
     match (moved, feature) {
-        (Some(moved), Some(feature)) if moved.step > f64::from(feature.width) => {
-            text + " A step can leap over it unseen: shorten the step of the system, or the speeds."
-        }
+        (Some(moved), Some(feature)) if moved.step > f64::from(feature.width) => text + " " + leap,
         _ => text,
     }
 }
 
-/// The longest way within a step.
+/// The longest way from one look to the next.
 #[derive(Clone, Debug, PartialEq)]
 struct Moved {
     /// What moved so far.
@@ -50,7 +89,7 @@ struct Moved {
     step: f64,
 }
 
-/// The farthest that a body moves in a step; without bodies, a coordinate in metres.
+/// The farthest that a body moves from one look to the next; without bodies, a coordinate in metres.
 fn farthest(axes: &[Axis], bodies: &[Body], rollouts: &[Vec<Vec<f64>>]) -> Option<Moved> {
     let plane = |body: &Body| (format!("the {}", body.name), vec![body.x, body.y]);
     let mut parts: Vec<(String, Vec<usize>)> = bodies.iter().map(plane).collect();

@@ -26,9 +26,9 @@ pub(super) fn visited(context: Context<'_>, settings: &Settings) -> Result<Visit
     let (plant, horizon) = (context.plant(), settings.spec.horizon);
     let of = |group: &PairGroup| {
         let mut hull = Hull::of_starts(settings);
-        for (pair, steps) in group.open_steps(&plant.model).into_iter().enumerate() {
-            for step in 0..steps {
-                group.states(pair, step).iter().for_each(|x| hull.add(x));
+        for (pair, looks) in group.open_looks(&plant.model).into_iter().enumerate() {
+            for look in 0..looks {
+                group.states(pair, look).iter().for_each(|x| hull.add(x));
             }
         }
         hull

@@ -10,7 +10,7 @@ use super::{Block, GRANULE};
 const LINE: usize = 64;
 
 /// Which rows a frame has: the states, the controls, the step, the target margin, the constraint
-/// margin, then rows that formulas have to themselves.
+/// margin, the periods since the start, then rows that formulas have to themselves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// Number of states.
@@ -34,9 +34,15 @@ impl Layout {
         [self.step() + 1, self.step() + 2]
     }
 
+    /// Number of the row of the periods since the start, which are no whole number between samples.
+    #[inline(always)]
+    pub(crate) fn elapsed(&self) -> usize {
+        self.step() + 3
+    }
+
     /// Number of the first row of formulas' own.
     pub(crate) fn first_own(&self) -> usize {
-        self.step() + 3
+        self.elapsed() + 1
     }
 
     /// Number of rows.
@@ -45,12 +51,12 @@ impl Layout {
     }
 }
 
-/// Whether formulas read the row of steps.
+/// Whether formulas read the rows of steps and of periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clock {
     /// Some formula does.
     Read,
-    /// None does: the row is not kept.
+    /// None does: the rows are not kept.
     Ignored,
 }
 
@@ -132,6 +138,12 @@ impl Frame {
         self.layout.margins()
     }
 
+    /// Number of the row of the periods since the start.
+    #[inline(always)]
+    pub(crate) fn elapsed(&self) -> usize {
+        self.layout.elapsed()
+    }
+
     /// All rows, one after the other, `[rows, width]`.
     #[inline(always)]
     pub(crate) fn rows(&self) -> &[f32] {
@@ -181,9 +193,9 @@ impl Frame {
         }
     }
 
-    /// Copies the states of trajectory `from` to trajectory `to`.
+    /// Copies the states of trajectory `from` to trajectory `to`, and its controls: it may be inside a period.
     pub(crate) fn move_lane(&mut self, to: usize, from: usize) {
-        for row in self.states() {
+        for row in 0..self.layout.step() {
             let row = self.row_mut(row);
             row[to] = row[from];
         }

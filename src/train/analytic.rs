@@ -13,7 +13,7 @@ use super::rows::Rows;
 use super::run::Learner;
 use super::score::{mean_measure, share, successes};
 use super::settings::AnalyticSettings;
-use super::soft::{Measured, measure_tape, observe_tape, step_tape};
+use super::soft::{Measured, measure_tape, observe_tape, part_tapes};
 use super::starts::Mixture;
 use super::tape::Tape;
 use crate::backend::Backend;
@@ -54,7 +54,8 @@ pub struct Task<'a> {
 pub struct Analytic<'a> {
     task: Task<'a>,
     settings: AnalyticSettings,
-    step: Arc<Tape>,
+    /// The parts of a step.
+    parts: Vec<Arc<Tape>>,
     observe: Option<Arc<Tape>>,
     /// What temperature and scale are multiples of.
     unit: f64,
@@ -116,7 +117,7 @@ impl<'a> Analytic<'a> {
         };
         Self {
             unit,
-            step: Arc::new(step_tape(&task.model, &task.interface)),
+            parts: part_tapes(&task.model, &task.interface).into_iter().map(Arc::new).collect(),
             observe: observe_tape(&task.model, &task.interface).map(Arc::new),
             measure: Arc::new(measure_tape(&task.model, measured)),
             adam: Adam::new(network.parameters.len()),
@@ -139,8 +140,11 @@ impl<'a> Analytic<'a> {
                 Some(observe) => apply(observe, temperature, [x.clone(), step.clone()]),
                 None => x.clone(),
             };
-            x = apply(&self.step, temperature, [x, network.forward(seen), step]);
-            states.push(x.clone());
+            let (sample, out) = (x.clone(), network.forward(seen));
+            for part in &self.parts {
+                x = apply(part, temperature, [sample.clone(), x, out.clone(), step.clone()]);
+                states.push(x.clone());
+            }
         }
         apply(&self.measure, temperature, [Tensor::cat(states, 1)])
     }

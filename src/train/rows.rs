@@ -31,7 +31,7 @@ impl<'a> Rows<'a> {
 
     /// The next states under `controls`, row by row like them.
     pub fn next(&self, controls: &[f32]) -> Vec<f32> {
-        self.each(&self.model.step, controls, &[])
+        self.each(&self.model.sampled().step, controls, &[])
     }
 
     /// The next states by `step`, of the inputs of the model and the numbers of a disturbance, under
@@ -74,7 +74,7 @@ impl<'a> Rows<'a> {
             let x = columns(self.states.numbers(), states, tile);
             let u = columns(controls, self.model.controls.len(), tile);
             let step = columns(self.steps, 1, tile);
-            let mut inputs = self.model.arguments_at(&x, &u, step[0]);
+            let mut inputs = self.model.arguments_at(&x, &u, [step[0], step[0]]);
             inputs.extend(columns(more, beyond, tile));
             store(graph.eval(&inputs).into_iter(), found, outputs);
         }

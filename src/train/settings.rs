@@ -84,6 +84,23 @@ impl Method {
         );
         Err(Error::invalid("train.method", problem))
     }
+
+    /// Refuses a model whose periods have `points` parts where the method looks at samples alone.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the method and those that look at the points.
+    pub fn check_points(self, points: u32) -> Result<()> {
+        if points == 1 || matches!(self, Self::Analytic | Self::Value) {
+            return Ok(());
+        }
+        let (name, kinds) = (self.name(), "`analytic` and `value`");
+        let problem = format!(
+            "`{name}` looks at samples alone, this task at {} points inside each period (`between`); \
+             {kinds} look at them too",
+            points - 1
+        );
+        Err(Error::invalid("train.method", problem))
+    }
 }
 
 /// A box that starts are drawn from.

@@ -2,24 +2,29 @@
 
 use super::tape::Tape;
 use crate::formula::{Expr, record};
-use crate::model::{Interface, Model, Role};
+use crate::model::{Interface, Model, Moment, Role};
 use crate::real::Real;
-use crate::rollout::{RolloutSpec, Tightening, measure_as};
+use crate::rollout::{Fold, RolloutSpec, Tightening};
 
-/// The step: states, outputs of the network behind `interface` and the number of the step to the next
-/// states.
-pub fn step_tape(model: &Model, interface: &Interface) -> Tape {
-    let (states, outputs) = (model.states.len(), interface.outputs);
-    Tape::hard(&record(states + outputs + 1, |inputs| {
-        let (x, rest) = inputs.split_at(states);
-        let (out, step) = rest.split_at(outputs);
-        match &interface.act {
-            None => model.step.recorded_at(&model.arguments_at(x, out, step[0])),
-            Some(act) => {
-                let u = act.recorded_at(&[at_state(model, x, step[0]), out.to_vec()].concat());
-                model.step.recorded_at(&model.arguments_at(x, &u, step[0]))
-            }
-        }
+/// The parts of a step, in turn: states at the sample, states, outputs of the network behind `interface` and
+/// the number of the step to the states after the part.
+pub fn part_tapes(model: &Model, interface: &Interface) -> Vec<Tape> {
+    (0..model.points).map(|point| part_tape(model, interface, point)).collect()
+}
+
+fn part_tape(model: &Model, interface: &Interface, point: u32) -> Tape {
+    let (states, controls) = (model.states.len(), interface.outputs);
+    Tape::hard(&record(2 * states + controls + 1, |inputs| {
+        let (sample, rest) = inputs.split_at(states);
+        let (x, rest) = rest.split_at(states);
+        let (out, step) = rest.split_at(controls);
+        let acted = interface
+            .act
+            .as_ref()
+            .map(|act| act.recorded_at(&[at_state(model, sample, step[0]), out.to_vec()].concat()));
+        let u = acted.unwrap_or_else(|| out.to_vec());
+        let times = [model.elapsed_at(step[0], point), step[0]];
+        model.step.recorded_at(&model.arguments_at(x, &u, times))
     }))
 }
 
@@ -37,7 +42,7 @@ pub fn observe_tape(model: &Model, interface: &Interface) -> Option<Tape> {
 
 /// The inputs of the formulas at a state, where no formula reads a control.
 fn at_state(model: &Model, x: &[Expr], step: Expr) -> Vec<Expr> {
-    model.arguments_at(x, &vec![Real::lit(0.0); model.controls.len()], step)
+    model.arguments_at(x, &vec![Real::lit(0.0); model.controls.len()], [step, step])
 }
 
 /// What a measure is read from.
@@ -51,7 +56,7 @@ pub struct Measured<'a> {
     pub unit: Option<f32>,
 }
 
-/// The measures of a rollout: its states `[T + 1, states]` to the softened G and, where the margins are
+/// The measures of a rollout: its states that are looked at, `[looks, states]`, to the softened G and, where the margins are
 /// to lose something, the softened `V_check` (`docs/method.md`, sections 1 and 4); where a unit is given, the
 /// mean over the steps of `tanh(margin / unit)` of what has to hold at each.
 ///
@@ -59,37 +64,53 @@ pub struct Measured<'a> {
 /// temperature 0 they would be the measures that the engine computes.
 pub fn measure_tape(model: &Model, measured: Measured<'_>) -> Tape {
     let (states, Measured { spec, tightening, unit }) = (model.states.len(), measured);
-    Tape::soft(&record(states * (spec.horizon as usize + 1), |inputs| {
-        let margins: Vec<(Expr, Expr)> = (0..)
-            .zip(inputs.chunks_exact(states))
-            .map(|(step, x)| (model.target_at(x, step), model.constraint_at(x, step)))
+    Tape::soft(&record(states * model.looks(spec.horizon), |inputs| {
+        let margins: Vec<(Moment, [Expr; 2])> = inputs
+            .chunks_exact(states)
+            .enumerate()
+            .map(|(look, x)| (model.moment(look), x))
+            .map(|(at, x)| (at, [model.target_at(x, at), model.constraint_at(x, at)]))
             .collect();
-        let gamma = Real::lit(spec.gamma);
-        let roles = || model.task.roles(spec.horizon);
-        let mut measures = vec![measure_as(roles(), margins.iter().copied(), gamma)];
+        let mut measures = vec![measure(model, spec, margins.iter().copied())];
         measures.extend(tightening.map(|tightening| {
-            let tightened = margins.iter().enumerate().map(|(t, &(target, constraint))| {
-                let tightened = |margin, by: &[f32]| margin - Expr::lit(by[t]);
-                (
-                    tightened(target, &tightening.target),
-                    tightened(constraint, &tightening.constraint),
-                )
+            let tightened = margins.iter().map(|&(at, [target, constraint])| {
+                let by = |losses: &[f32]| Expr::lit(losses[at.sample()]);
+                let losses = [by(&tightening.target), by(&tightening.constraint)];
+                (at, [target - losses[0], constraint - losses[1]])
             });
-            measure_as(roles(), tightened, gamma)
+            measure(model, spec, tightened)
         }));
-        measures.extend(unit.map(|unit| stepwise(&model.task.roles(spec.horizon), &margins, unit)));
+        measures.extend(unit.map(|unit| stepwise(model, spec.horizon, &margins, unit)));
         measures
     }))
 }
 
-/// The mean over the steps of `tanh(margin / unit)` of the margins that have to hold there; 0 without any.
-fn stepwise(roles: &[Role], margins: &[(Expr, Expr)], unit: f32) -> Expr {
+/// The mean over all looks of `tanh(margin / unit)` of the margins that have to hold there; 0 without any.
+fn stepwise(model: &Model, horizon: u32, margins: &[(Moment, [Expr; 2])], unit: f32) -> Expr {
     let squashed = |margin: Expr| (margin * Expr::lit(1.0 / unit)).tanh();
-    let held = roles.iter().zip(margins).flat_map(|(role, &(target, constraint))| {
+    let held = margins.iter().flat_map(|&(at, [target, constraint])| {
+        let role = model.task.role_at(at, horizon);
         let constraint = role.has(Role::CONSTRAINT).then_some(constraint);
         [constraint, role.has(Role::REQUIREMENT).then_some(target)]
     });
     let held: Vec<Expr> = held.flatten().map(squashed).collect();
     let count = held.len().max(1) as f32;
     held.into_iter().fold(Expr::lit(0.0), |sum, term| sum + term) * Expr::lit(1.0 / count)
+}
+
+/// The measure of margins of target and constraint, each with its place on the rollout.
+fn measure(
+    model: &Model,
+    spec: &RolloutSpec,
+    margins: impl Iterator<Item = (Moment, [Expr; 2])>,
+) -> Expr {
+    let (mut fold, mut step) = (Fold::new(), 0);
+    for (at, [target, constraint]) in margins {
+        if at.step > step {
+            fold.advance(Real::lit(spec.gamma));
+            step = at.step;
+        }
+        fold.look(model.task.role_at(at, spec.horizon), target, constraint);
+    }
+    fold.measure()
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Fold, Nominal, Tube};
-use crate::model::{Plant, Role};
+use crate::model::{Moment, Plant, Role};
 use crate::real::bound::{Bound, Domain, Enclosure, Interval, enclose};
 use crate::rollout::PairControl;
 
@@ -18,34 +18,40 @@ impl Tube<'_> {
     pub fn lipschitz_measure(&self, nominal: &Nominal, radius: f64) -> f64 {
         let mut fold = Fold::new(self.spec.gamma);
         let mut distance = Interval::point(radius).magnitude();
+        // The distance at the last sample, and the box that it spans there.
+        let (mut apart, mut sample) = (distance, Vec::new());
         if !(radius >= 0.0 && radius.is_finite()) {
             return fold.best;
         }
-        for (step, set) in nominal.sets.iter().enumerate() {
-            let (at, step) = (super::ranges(set), step as u32);
+        for (look, set) in nominal.sets.iter().enumerate() {
+            let (at, (moment, role)) = (super::ranges(set), self.look(look));
+            fold.begin(moment);
             let around = |x: &Interval| *x + Interval::new(-distance, distance);
             let around: Vec<Interval> = at.iter().map(around).collect();
             let lost = |low: f64, slope: f64| {
                 (Interval::point(low.max(f64::MIN)) - product(slope, distance)).low
             };
-            let [target, constraint] = self.slopes(&around, step);
-            let role = self.plant.model.task.role(step, self.spec.horizon);
+            let [target, constraint] = self.slopes(&around, moment);
             if role.sees_constraint() {
-                fold.hold(lost(self.constraint.below(set, step), constraint));
+                fold.hold(lost(self.constraint.below(set, moment), constraint));
             }
             if role.sees_target() {
-                let low = self.target.below(set, step);
+                let low = self.target.below(set, moment);
                 // What may be no number fails the rollout from here on; and so may what has no constant.
                 if low == f64::NEG_INFINITY || target == f64::INFINITY {
                     break;
                 }
                 fold.target(role, lost(low, target));
             }
-            fold.end_step(role);
-            if fold.safe <= fold.best || step == self.spec.horizon || role == Role::OVER {
+            fold.conclude(role);
+            let ended = moment.step == self.spec.horizon || role == Role::OVER;
+            if fold.safe <= fold.best || ended {
                 break;
             }
-            distance = product(self.growth(nominal, &around, step), distance).high;
+            if moment.point == 0 {
+                (apart, sample) = (distance, around);
+            }
+            distance = product(self.growth(nominal, &sample, moment), apart).high;
             if !distance.is_finite() {
                 break;
             }
@@ -53,16 +59,17 @@ impl Tube<'_> {
         fold.best
     }
 
-    /// Lipschitz constants of the target and the constraint margin over a box, at a step.
-    fn slopes(&self, x: &[Interval], step: u32) -> [f64; 2] {
+    /// Lipschitz constants of the target and the constraint margin over a box, at a moment.
+    fn slopes(&self, x: &[Interval], at: Moment) -> [f64; 2] {
         let model = &*self.plant.model;
-        let outputs =
-            over(x, &[], |x, _| vec![model.target_at(x, step), model.constraint_at(x, step)]);
+        let outputs = over(x, &[], |x, _| vec![model.target_at(x, at), model.constraint_at(x, at)]);
         [0, 1].map(|i| open(&outputs[i]).map_or(f64::INFINITY, Enclosure::constant))
     }
 
-    /// The Lipschitz constant of a step over a box: under the nominal's controls, or with the policy.
-    fn growth(&self, nominal: &Nominal, x: &[Interval], step: u32) -> f64 {
+    /// The Lipschitz constant, over a box of states at the sample of `moment`, of what comes after the state of
+    /// `moment`: under the nominal's controls, or with the policy. Controls are those at the sample, so that the
+    /// constant of a part by itself would not do.
+    fn growth(&self, nominal: &Nominal, x: &[Interval], Moment { step, point }: Moment) -> f64 {
         let Plant { model, .. } = self.plant;
         let none = Vec::new();
         let replayed = match self.control {
@@ -71,8 +78,10 @@ impl Tube<'_> {
         };
         let u: Vec<Interval> = replayed.iter().map(|control| control.range).collect();
         let outputs = over(x, &u, |x, u| match self.control {
-            PairControl::Replay => model.next(x, u, step),
-            PairControl::ClosedLoop => model.next(x, &self.plant.control(x, step), step),
+            PairControl::Replay => model.parts(x, u, step).swap_remove(point as usize),
+            PairControl::ClosedLoop => {
+                model.parts(x, &self.plant.control(x, step), step).swap_remove(point as usize)
+            }
         });
         spectral(&outputs, x.len())
     }

@@ -9,7 +9,7 @@ use super::flow::at_state;
 use super::piece::{Nodes, Piece, depends};
 use super::state::Set;
 use crate::formula::{Graph, Node};
-use crate::model::Model;
+use crate::model::{Model, Moment};
 use crate::real::bound::Interval;
 
 /// A margin with what is known of it at every step.
@@ -29,14 +29,14 @@ impl<'a> Margin<'a> {
         let mut margin = Self { model, graph, depends, pieces: None };
         if model.is_stationary() {
             let anywhere = Set::ball(&vec![0.0; model.states.len()], 0.0);
-            let values = margin.values(&anywhere, 0);
+            let values = margin.values(&anywhere, 0.into());
             margin.pieces = Some(margin.nodes(&values).pieces(graph.outputs[0]));
         }
         margin
     }
 
-    fn values(&self, set: &Set, step: u32) -> Vec<Affine> {
-        let inputs = at_state(self.model, &set.forms, step);
+    fn values(&self, set: &Set, at: Moment) -> Vec<Affine> {
+        let inputs = at_state(self.model, &set.forms, at);
         let mut symbols: Symbols = set.symbols;
         evaluate::values(self.graph, &inputs, &mut symbols)
     }
@@ -45,11 +45,11 @@ impl<'a> Margin<'a> {
         Nodes { graph: self.graph, depends: &self.depends, values }
     }
 
-    /// A number that the margin is nowhere below over `set`, at a step: of two bounds the better, that of the
+    /// A number that the margin is nowhere below over `set`, at a moment: of two bounds the better, that of the
     /// formula as a whole and, where that leaves the sign open, that of the lowest of its pieces. Minus infinity
     /// where the margin may be no number.
-    pub(super) fn below(&self, set: &Set, step: u32) -> f64 {
-        let values = self.values(set, step);
+    pub(super) fn below(&self, set: &Set, at: Moment) -> f64 {
+        let values = self.values(set, at);
         let whole = &values[self.graph.outputs[0] as usize];
         if !whole.known() {
             return f64::NEG_INFINITY;

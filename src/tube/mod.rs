@@ -14,7 +14,7 @@ mod margin;
 mod piece;
 mod state;
 
-use crate::model::{Plant, Role};
+use crate::model::{Moment, Plant, Role};
 use crate::real::bound::Interval;
 use crate::rollout::{HUGE, PairControl, RolloutSpec};
 use affine::Affine;
@@ -35,14 +35,15 @@ pub struct Tube<'a> {
 #[derive(Clone, Debug)]
 pub struct Nominal {
     start: Vec<f64>,
+    /// Of each state that is looked at.
     sets: Vec<Set>,
     /// Per step, where controls are replayed.
     controls: Vec<Vec<Affine>>,
 }
 
 impl Nominal {
-    /// Intervals that hold the states x_0, x_1, ... of real arithmetic, `[steps, states]`; they end before the
-    /// first of which nothing is known.
+    /// Intervals that hold the states of real arithmetic that are looked at, `[looks, states]`; they end before
+    /// the first of which nothing is known.
     pub fn states(&self) -> Vec<Vec<Interval>> {
         self.sets.iter().map(ranges).collect()
     }
@@ -74,46 +75,52 @@ impl<'a> Tube<'a> {
         if !nominal.start.iter().all(|x| x.is_finite()) {
             return nominal;
         }
-        let mut set = Set::ball(&nominal.start, 0.0);
+        nominal.sets.push(Set::ball(&nominal.start, 0.0));
         for step in 0..self.spec.horizon {
+            let Some(set) = nominal.sets.last() else { break };
             let mut symbols = set.symbols;
             let u = flow::control(self.plant, &set.forms, step, &mut symbols);
-            let next = flow::next(&self.plant.model, &set, &u, step, symbols);
+            let period = flow::period(&self.plant.model, set, &u, step, symbols);
+            let whole = self.is_whole(&period);
             nominal.controls.push(u.iter().map(alone).collect());
-            nominal.sets.push(std::mem::replace(&mut set, next));
-            if !set.known() {
-                return nominal;
+            nominal.sets.extend(period);
+            if !whole {
+                break;
             }
         }
-        nominal.sets.push(set);
         nominal
     }
 
-    /// Sets that hold x_0, x_1, ... of every trajectory from the Euclidean ball of `radius` around the start of
+    /// Whether something is known of all that is looked at in a period.
+    fn is_whole(&self, period: &[Set]) -> bool {
+        period.len() == self.plant.model.points as usize
+    }
+
+    /// Sets that hold the states looked at of every trajectory from the Euclidean ball of `radius` around the start of
     /// `nominal`, in turn; they end before the first of which nothing is known.
     fn sets(&self, nominal: &Nominal, radius: f64) -> impl Iterator<Item = Set> {
         let whole = !nominal.sets.is_empty() && radius >= 0.0 && radius.is_finite();
         let first = whole.then(|| Set::ball(&nominal.start, radius));
         let horizon = self.spec.horizon;
-        std::iter::successors(first.map(|set| (0, set)), move |(step, set)| {
-            let next = (*step < horizon).then(|| self.after(nominal, set, *step)).flatten();
-            next.map(|set| (step + 1, set))
+        std::iter::successors(first.map(|set| (0, vec![set])), move |(step, period)| {
+            let whole = *step == 0 || self.is_whole(period);
+            let sample = period.last().filter(|_| whole && *step < horizon)?;
+            Some((step + 1, self.after(nominal, sample, *step)?))
         })
-        .map(|(_, set)| set)
+        .flat_map(|(_, period)| period)
     }
 
-    /// The set after `set`, if something is known of it.
-    fn after(&self, nominal: &Nominal, set: &Set, step: u32) -> Option<Set> {
+    /// The sets after that of a sample up to the next one, as far as something is known of them.
+    fn after(&self, nominal: &Nominal, set: &Set, step: u32) -> Option<Vec<Set>> {
         let mut symbols = set.symbols;
         let u = match self.control {
             PairControl::Replay => nominal.controls.get(step as usize)?.clone(),
             PairControl::ClosedLoop => flow::control(self.plant, &set.forms, step, &mut symbols),
         };
-        let next = flow::next(&self.plant.model, set, &u, step, symbols);
-        next.known().then_some(next)
+        Some(flow::period(&self.plant.model, set, &u, step, symbols))
     }
 
-    /// Intervals that hold the states of every trajectory from the ball, `[steps, states]`.
+    /// Intervals that hold the states looked at of every trajectory from the ball, `[looks, states]`.
     pub fn states(&self, nominal: &Nominal, radius: f64) -> Vec<Vec<Interval>> {
         self.sets(nominal, radius).map(|set| ranges(&set)).collect()
     }
@@ -130,25 +137,32 @@ impl<'a> Tube<'a> {
         self.fold(nominal, radius, |fold| fold.best > 0.0 || fold.safe <= 0.0) > 0.0
     }
 
+    /// Where look number `look` is on a rollout, and what it is to the task.
+    fn look(&self, look: usize) -> (Moment, Role) {
+        let model = &self.plant.model;
+        let moment = model.moment(look);
+        (moment, model.task.role_at(moment, self.spec.horizon))
+    }
+
     /// The measure so far, until `decided`.
     fn fold(&self, nominal: &Nominal, radius: f64, decided: impl Fn(&Fold) -> bool) -> f64 {
         let mut fold = Fold::new(self.spec.gamma);
-        for (step, set) in self.sets(nominal, radius).enumerate() {
-            let step = step as u32;
-            let role = self.plant.model.task.role(step, self.spec.horizon);
+        for (look, set) in self.sets(nominal, radius).enumerate() {
+            let (moment, role) = self.look(look);
+            fold.begin(moment);
             if role.sees_constraint() {
-                fold.hold(self.constraint.below(&set, step));
+                fold.hold(self.constraint.below(&set, moment));
             }
             // Where the constraint decides, the target changes nothing.
             if role.sees_target() && !decided(&fold) {
-                let target = self.target.below(&set, step);
+                let target = self.target.below(&set, moment);
                 // What may be no number fails the rollout from here on.
                 if target == f64::NEG_INFINITY {
                     break;
                 }
                 fold.target(role, target);
             }
-            fold.end_step(role);
+            fold.conclude(role);
             if decided(&fold) || role == Role::OVER {
                 break;
             }
@@ -160,6 +174,8 @@ impl<'a> Tube<'a> {
 /// Lower ends of the measure so far.
 struct Fold {
     gamma: Interval,
+    /// The sample at or before the state that is looked at.
+    step: u32,
     discount: Interval,
     safe: f64,
     best: f64,
@@ -168,21 +184,29 @@ struct Fold {
 impl Fold {
     fn new(gamma: f32) -> Self {
         let (gamma, huge) = (Interval::point(f64::from(gamma)), f64::from(HUGE));
-        Self { gamma, discount: Interval::ONE, safe: huge, best: -huge }
+        Self { gamma, step: 0, discount: Interval::ONE, safe: huge, best: -huge }
     }
 
-    /// A margin of this step, discounted; what is no number is the lowest there is.
+    /// Goes on to a state, which has the discount of the sample at or before it.
+    fn begin(&mut self, moment: Moment) {
+        if moment.step > self.step {
+            self.step = moment.step;
+            self.discount = self.discount * self.gamma;
+        }
+    }
+
+    /// A margin of this state, discounted; what is no number is the lowest there is.
     fn discounted(&self, margin: f64) -> f64 {
         let huge = f64::from(HUGE);
         (self.discount * Interval::point(margin.max(-huge).min(huge))).low
     }
 
-    /// A margin of this step that has to hold.
+    /// A margin of this state that has to hold.
     fn hold(&mut self, margin: f64) {
         self.safe = self.safe.min(self.discounted(margin));
     }
 
-    /// The target margin of this step, as the task sees it.
+    /// The target margin of this state, as the task sees it.
     fn target(&mut self, role: Role, margin: f64) {
         if role.has(Role::REQUIREMENT) {
             self.hold(margin);
@@ -192,12 +216,11 @@ impl Fold {
         }
     }
 
-    /// Ends this step.
-    fn end_step(&mut self, role: Role) {
+    /// What had to hold has held, if this is the last state.
+    fn conclude(&mut self, role: Role) {
         if role.has(Role::CONCLUSION) {
             self.best = self.best.max(self.safe);
         }
-        self.discount = self.discount * self.gamma;
     }
 }
 

@@ -185,7 +185,6 @@ fn what_does_not_work_yet_is_refused_by_name() {
     );
     let (text, place) = ("[model.noise]\n[model.time]", "model.noise: ");
     assert_refused("[model.time]", text, &[place, "not work yet; leave the section out"]);
-    assert_refused("kind", "between = 3\nkind", &["model.task.between", "does not work yet"]);
 }
 
 #[test]

@@ -138,6 +138,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             statements: statements(self.radius),
             provenance: provenance(policy),
             system: SystemRecord {
+                between: 0,
                 task: reachcast::model::Task::default(),
                 name: self.system.name().to_owned(),
                 states: self.system.states().to_vec(),

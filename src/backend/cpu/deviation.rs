@@ -5,6 +5,7 @@ use super::kernel::Kernel;
 use super::load::Loader;
 use super::rule::{Roles, Rule};
 use super::tile::{Score, TilePlant, TileRunner, is_finite, lanes};
+use crate::model::Moment;
 use crate::real::simd::Body;
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{DeviationTask, Farthest, HUGE, PairControl, PairMeasure};
@@ -38,14 +39,19 @@ impl Unit for Deviation<'_> {
         for (tile, out) in self.out.chunks_mut(width).enumerate() {
             let first = self.first + (tile * width) as u64;
             pairs.load(task, first, out.len());
-            for (t, farthest) in farthest.iter_mut().enumerate() {
+            for (t, farthest) in (0..).zip(&mut farthest) {
                 if t > 0 {
-                    pairs.step(&mut runner, task.control);
+                    pairs.decide(&mut runner, task.control);
                 }
-                let steps = [t as u32; N];
-                let rule = Rule::at(task.tightening, roles, &steps);
-                let step = Step { t, rule, gamma: task.spec.gamma };
-                pairs.judge(&runner, step, farthest);
+                for moment in Moment::arriving(t, runner.points()) {
+                    if t > 0 {
+                        pairs.step(&runner);
+                    }
+                    let steps = [moment.step; N];
+                    let rule = Rule::at(task.tightening, roles, &steps, moment.point);
+                    let gamma = runner.gamma(task.spec.gamma, moment.point);
+                    pairs.judge(&runner, Look { moment, rule, gamma }, farthest);
+                }
             }
             pairs.write(out);
         }
@@ -53,13 +59,13 @@ impl Unit for Deviation<'_> {
     }
 }
 
-/// A step of the rollouts.
-struct Step<'a, const N: usize> {
-    /// Its number.
-    t: usize,
+/// States of the rollouts that are looked at.
+struct Look<'a, const N: usize> {
+    /// Where on the rollouts they are.
+    moment: Moment,
     /// How the margins of the nominal rollouts count.
     rule: Rule<'a, N>,
-    /// Discount.
+    /// What their discount is multiplied with behind them.
     gamma: f32,
 }
 
@@ -96,28 +102,32 @@ impl<K: Kernel, const N: usize> Pairs<K, N> {
         self.scores.iter_mut().for_each(|scores| scores.fill(Score::new()));
     }
 
-    /// Moves both rollouts of each pair one step on.
-    fn step(&mut self, runner: &mut TileRunner<'_, K>, control: PairControl) {
+    /// Decides the controls of both rollouts of each pair.
+    fn decide(&mut self, runner: &mut TileRunner<'_, K>, control: PairControl) {
         runner.decide(&mut self.nominal, self.count);
         match control {
             PairControl::Replay => self.perturbed.copy_controls(&self.nominal),
             PairControl::ClosedLoop => runner.decide(&mut self.perturbed, self.count),
         }
+    }
+
+    /// Moves both rollouts of each pair one part of a period on.
+    fn step(&mut self, runner: &TileRunner<'_, K>) {
         runner.step(&mut self.nominal, self.count);
         runner.step(&mut self.perturbed, self.count);
     }
 
-    /// Adds the states of a step to the scores, and their distances to the farthest.
+    /// Adds states to the scores, and their distances to the farthest.
     fn judge(
         &mut self,
         runner: &TileRunner<'_, K>,
-        Step { t, rule, gamma }: Step<'_, N>,
+        Look { moment, rule, gamma }: Look<'_, N>,
         farthest: &mut Farthest,
     ) {
         let rules = [rule, rule.without_loss()];
         let frames = [&mut self.nominal, &mut self.perturbed];
         for ((frame, scores), rule) in frames.into_iter().zip(&mut self.scores).zip(rules) {
-            runner.at_step(frame, t);
+            runner.at(frame, moment);
             let scores = scores.iter_mut().map(|score| (score, rule));
             runner.judge(frame, self.count, gamma, scores);
         }

@@ -7,6 +7,7 @@ use super::load::Loader;
 use super::reach_avoid::{ReachAvoid, measures};
 use super::rule::{Roles, Rule};
 use super::tile::{Score, TileRunner};
+use crate::model::Moment;
 use crate::real::per_lane;
 use crate::rollout::{NON_FINITE, Query, ReachAvoidTask};
 use crate::tile::Frame;
@@ -26,7 +27,8 @@ impl Unit for ReachAvoid<'_> {
 /// The signs of the unit's measures.
 ///
 /// Each lane has a clock of its own, so the tile stays full until no start is left, and then
-/// shrinks. A trajectory does not see which lane it is in.
+/// shrinks. A trajectory does not see which lane it is in. All of a tile are at the same point of their
+/// periods: starts come in between two periods.
 pub(super) fn signs<K: Kernel, const N: usize>(
     unit: ReachAvoid<'_>,
     mut runner: TileRunner<'_, K>,
@@ -45,12 +47,30 @@ pub(super) fn signs<K: Kernel, const N: usize>(
         if live == 0 {
             return;
         }
+        say_when(&runner, &mut frame, &groups, 0);
         runner.decide(&mut frame, live);
+        for point in 1..runner.points() {
+            runner.step(&mut frame, live);
+            judge(&runner, &mut frame, &mut groups, live, Asked::of(&unit, point));
+            live = retire(&mut frame, &mut groups, live, unit.out);
+            say_when(&runner, &mut frame, &groups, point);
+        }
         runner.step(&mut frame, live);
         groups.iter_mut().for_each(|group| group.tick(unit.task.spec.horizon));
-        judge(&runner, &mut frame, &mut groups, live, Asked::of(&unit));
+        judge(&runner, &mut frame, &mut groups, live, Asked::of(&unit, 0));
         live = retire(&mut frame, &mut groups, live, unit.out);
     }
+}
+
+/// Says of which moment each state of a tile is; those that have changed lanes bring theirs along.
+fn say_when<K: Kernel, const N: usize>(
+    runner: &TileRunner<'_, K>,
+    frame: &mut Frame,
+    groups: &[Group<N>],
+    point: u32,
+) {
+    let steps = groups.iter().flat_map(|group| group.step);
+    runner.at_each(frame, steps.map(|step| Moment { step, point }));
 }
 
 /// What states are judged by.
@@ -58,11 +78,13 @@ pub(super) fn signs<K: Kernel, const N: usize>(
 struct Asked<'a> {
     task: &'a ReachAvoidTask<'a>,
     roles: &'a Roles,
+    /// Number of the point of their periods; 0 at samples.
+    point: u32,
 }
 
 impl<'a> Asked<'a> {
-    fn of(unit: &ReachAvoid<'a>) -> Self {
-        Self { task: unit.task, roles: unit.roles }
+    fn of(unit: &ReachAvoid<'a>, point: u32) -> Self {
+        Self { task: unit.task, roles: unit.roles, point }
     }
 }
 
@@ -72,14 +94,14 @@ fn judge<K: Kernel, const N: usize>(
     frame: &mut Frame,
     groups: &mut [Group<N>],
     live: usize,
-    Asked { task, roles }: Asked<'_>,
+    Asked { task, roles, point }: Asked<'_>,
 ) {
-    runner.at_steps(frame, groups.iter().flat_map(|group| group.step));
+    say_when(runner, frame, groups, point);
     let scores = groups.iter_mut().map(|group| {
         let Group { score, step, .. } = group;
-        (score, Rule::at_each(task.tightening, roles, step))
+        (score, Rule::at_each(task.tightening, roles, step, point))
     });
-    runner.judge(frame, live, task.spec.gamma, scores);
+    runner.judge(frame, live, runner.gamma(task.spec.gamma, point), scores);
     groups.iter_mut().take(live.div_ceil(N)).for_each(|group| group.decide(task.spec.horizon));
 }
 
@@ -182,7 +204,7 @@ impl<'a, K: Kernel, const N: usize> Queue<'a, K, N> {
     fn new(unit: &ReachAvoid<'a>, runner: &TileRunner<'_, K>) -> Self {
         let frame = runner.frame_of(N);
         Self {
-            asked: Asked::of(unit),
+            asked: Asked::of(unit, 0),
             first: unit.first,
             count: unit.out.len(),
             loaded: 0,

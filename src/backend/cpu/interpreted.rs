@@ -7,7 +7,7 @@ use crate::real::simd::Instructions;
 use crate::tile::{Clock, Frame, Layout, NativeFormula, NativeSystem, Source};
 
 /// Where the inputs of a model's formulas are in a frame: its states and controls in their rows,
-/// the parameters as numbers, the time as a multiple of the row of steps.
+/// the parameters as numbers, the time as a multiple of the row of steps, or of periods where a period has parts.
 #[derive(Clone, Debug)]
 pub(super) struct Inputs {
     layout: Layout,
@@ -33,8 +33,9 @@ impl Inputs {
             Held::Zeros => Source::Number(0.0),
         });
         let step = layout.step();
+        let row = if model.points > 1 { layout.elapsed() } else { step };
         let time = match model.period {
-            Some(period) => Source::Multiple { row: step, of: period },
+            Some(period) => Source::Multiple { row, of: period },
             None => Source::Number(0.0),
         };
         let sources = (0..states)
@@ -100,7 +101,7 @@ impl InterpretedSystem {
         self.step.own_rows().max(self.margins.own_rows())
     }
 
-    /// Whether they read the row of steps.
+    /// Whether they read the rows of steps and periods.
     pub(super) fn clock(&self) -> Clock {
         clock(&[&self.step, &self.margins], self.layout)
     }
@@ -147,7 +148,7 @@ impl InterpretedFormula {
         self.tape.own_rows()
     }
 
-    /// Whether it reads the row of steps.
+    /// Whether it reads the rows of steps and periods.
     pub(super) fn clock(&self) -> Clock {
         clock(&[&self.tape], self.layout)
     }
@@ -163,7 +164,9 @@ impl NativeFormula for InterpretedFormula {
     }
 }
 
-/// Whether one of `tapes` reads the row of steps.
+/// Whether one of `tapes` reads the row of steps or that of periods.
 fn clock(tapes: &[&Chained], layout: Layout) -> Clock {
-    if tapes.iter().any(|tape| tape.reads(layout.step())) { Clock::Read } else { Clock::Ignored }
+    let rows = [layout.step(), layout.elapsed()];
+    let reads = |tape: &&Chained| rows.iter().any(|row| tape.reads(*row));
+    if tapes.iter().any(reads) { Clock::Read } else { Clock::Ignored }
 }

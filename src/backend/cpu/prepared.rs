@@ -20,6 +20,7 @@ use crate::tile::{Clock, Layout, NativeFormula, NativeSystem};
 pub(in crate::backend) struct Prepared {
     system: Arc<dyn NativeSystem>,
     task: Task,
+    points: u32,
     law: PreparedLaw,
     layout: Layout,
     clock: Clock,
@@ -71,7 +72,8 @@ impl Cpu {
             }
         };
         let system = needs.system();
-        Ok(Prepared { system, task: model.task, law, layout: needs.layout, clock: needs.clock })
+        let (task, points) = (model.task, model.points);
+        Ok(Prepared { system, task, points, law, layout: needs.layout, clock: needs.clock })
     }
 }
 
@@ -177,6 +179,7 @@ impl Prepared {
         TilePlant {
             system: &*self.system,
             task: self.task,
+            points: self.points,
             law,
             layout: self.layout,
             clock: self.clock,

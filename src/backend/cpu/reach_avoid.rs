@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::load::Loader;
 use super::rule::{Roles, Rule};
 use super::tile::{Score, TilePlant, TileRunner};
+use crate::model::Moment;
 use crate::rollout::ReachAvoidTask;
 
 /// Consecutive starts for one thread; twin: `shaders/reach_avoid.wgsl`.
@@ -35,16 +36,21 @@ pub(super) fn measures<K: Kernel, const N: usize>(
         let count = out.len();
         scores.fill(Score::new());
         loader.starts(&task.starts, unit.first + (tile * width) as u64, count, &mut frame);
-        for t in 0..=task.spec.horizon as usize {
+        for t in 0..=task.spec.horizon {
             if t > 0 {
                 runner.decide(&mut frame, count);
-                runner.step(&mut frame, count);
             }
-            runner.at_step(&mut frame, t);
-            let steps = [t as u32; N];
-            let rule = Rule::at(task.tightening, unit.roles, &steps);
-            let scores = scores.iter_mut().map(|score| (score, rule));
-            runner.judge(&mut frame, count, task.spec.gamma, scores);
+            for moment in Moment::arriving(t, runner.points()) {
+                if t > 0 {
+                    runner.step(&mut frame, count);
+                }
+                runner.at(&mut frame, moment);
+                let steps = [moment.step; N];
+                let rule = Rule::at(task.tightening, unit.roles, &steps, moment.point);
+                let scores = scores.iter_mut().map(|score| (score, rule));
+                let gamma = runner.gamma(task.spec.gamma, moment.point);
+                runner.judge(&mut frame, count, gamma, scores);
+            }
         }
         for (out, score) in out.chunks_mut(N).zip(&scores) {
             out.copy_from_slice(&score.measure().0[..out.len()]);

@@ -1,18 +1,33 @@
 //! How the margins of a step count: what they lose, and what the step is to the task.
 
-use crate::model::{Role, Task};
+use crate::model::{Moment, Role, Task};
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{Effect, RolloutSpec, Tightening};
 
-/// What each step is to the task, `[T + 1]` roles as bits; none where all steps are alike, as in a reach-avoid
-/// task without a window.
-pub(super) struct Roles(Vec<u32>);
+/// What each step, and the points behind it, are to the task, `[T + 1]` roles as bits each; none where all are
+/// alike, as in a reach-avoid task without a window.
+pub(super) struct Roles {
+    samples: Vec<u32>,
+    between: Vec<u32>,
+}
 
 impl Roles {
     /// Those of `task`.
     pub(super) fn of(task: Task, spec: &RolloutSpec) -> Self {
-        let roles = || task.roles(spec.horizon).into_iter().map(Role::bits).collect();
-        Self(if task.is_plain() { Vec::new() } else { roles() })
+        let bits = |role: &dyn Fn(u32) -> Role| {
+            let steps = if task.is_plain() { 0..0 } else { 0..spec.horizon + 1 };
+            steps.map(|step| role(step).bits()).collect()
+        };
+        Self {
+            samples: bits(&|step| task.role(step, spec.horizon)),
+            between: bits(&|step| task.role_between(step, spec.horizon)),
+        }
+    }
+
+    /// Those of the states that are number `point` of their period.
+    #[inline(always)]
+    fn of_point(&self, point: u32) -> &[u32] {
+        if point == 0 { &self.samples } else { &self.between }
     }
 }
 
@@ -26,16 +41,36 @@ pub(super) struct Rule<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Rule<'a, N> {
-    /// At the same step for all lanes, which `steps` holds once for each.
+    /// At the same step for all lanes, which `steps` holds once for each, or at point number `point` of its
+    /// period.
     #[inline(always)]
-    pub(super) fn at(tightening: &Tightening, roles: &'a Roles, steps: &'a [u32; N]) -> Self {
-        Self { loss: Loss::at(tightening, steps[0] as usize), roles: &roles.0, steps }
+    pub(super) fn at(
+        tightening: &Tightening,
+        roles: &'a Roles,
+        steps: &'a [u32; N],
+        point: u32,
+    ) -> Self {
+        let sample = Moment { step: steps[0], point }.sample();
+        Self { loss: Loss::at(tightening, sample), roles: roles.of_point(point), steps }
     }
 
-    /// At a step of its own for each lane.
+    /// At a step of its own for each lane, or at point number `point` of its period.
     #[inline(always)]
-    pub(super) fn at_each(tightening: &Tightening, roles: &'a Roles, steps: &'a [u32; N]) -> Self {
-        Self { loss: Loss::at_each(tightening, steps), roles: &roles.0, steps }
+    pub(super) fn at_each(
+        tightening: &Tightening,
+        roles: &'a Roles,
+        steps: &'a [u32; N],
+        point: u32,
+    ) -> Self {
+        let loss = match point {
+            0 => Loss::at_each(tightening, steps),
+            _ => {
+                // An empty lane runs on behind the last step.
+                let last = tightening.target.len() as u32 - 1;
+                Loss::at_each(tightening, &per_lane!(N, i => (steps[i] + 1).min(last)))
+            }
+        };
+        Self { loss, roles: roles.of_point(point), steps }
     }
 
     /// The same for margins that lose nothing.

@@ -3,7 +3,7 @@
 use super::kernel::Kernel;
 use super::mlp::{Evaluator, Packed};
 use super::rule::Rule;
-use crate::model::{Role, Task};
+use crate::model::{Moment, Role, Task};
 use crate::real::simd::{Body, Instructions};
 use crate::real::{Lanes, Real, per_lane};
 use crate::rollout::{Fold, HUGE, NON_FINITE};
@@ -26,11 +26,13 @@ pub(super) struct TilePlant<'a> {
     pub(super) system: &'a dyn NativeSystem,
     /// What its rollouts have to do.
     pub(super) task: Task,
+    /// Parts of a period.
+    pub(super) points: u32,
     /// The controls.
     pub(super) law: TileLaw<'a>,
     /// Rows of a frame.
     pub(super) layout: Layout,
-    /// Whether formulas read the row of steps.
+    /// Whether formulas read the rows of steps and of periods.
     pub(super) clock: Clock,
     /// The instructions that formulas are evaluated with.
     pub(super) with: Instructions,
@@ -135,25 +137,40 @@ impl<'a, K: Kernel> TileRunner<'a, K> {
         }
     }
 
-    /// Moves the first `lanes` states one step on, by the controls decided last.
+    /// Moves the first `lanes` states one part of a period on, by the controls decided last.
     pub(super) fn step(&self, frame: &mut Frame, lanes: usize) {
         self.plant.system.step(self.plant.with, frame, lanes);
     }
 
-    /// Says that the states are those of step `t`.
-    pub(super) fn at_step(&self, frame: &mut Frame, t: usize) {
+    /// Says that the states are those of `moment`.
+    pub(super) fn at(&self, frame: &mut Frame, moment: Moment) {
         if self.plant.clock == Clock::Read {
-            let row = frame.step();
-            frame.row_mut(row).fill(t as f32);
+            let [step, elapsed] = [frame.step(), frame.elapsed()];
+            frame.row_mut(step).fill(moment.step as f32);
+            frame.row_mut(elapsed).fill(moment.elapsed(self.plant.points));
         }
     }
 
-    /// Says of which step each state is.
-    pub(super) fn at_steps(&self, frame: &mut Frame, steps: impl Iterator<Item = u32>) {
+    /// Says of which moment each state is.
+    pub(super) fn at_each(&self, frame: &mut Frame, moments: impl Iterator<Item = Moment>) {
         if self.plant.clock == Clock::Read {
-            let row = frame.step();
-            frame.row_mut(row).iter_mut().zip(steps).for_each(|(at, step)| *at = step as f32);
+            let [step, elapsed] = [frame.step(), frame.elapsed()];
+            for (lane, moment) in (0..frame.width()).zip(moments) {
+                frame.row_mut(step)[lane] = moment.step as f32;
+                frame.row_mut(elapsed)[lane] = moment.elapsed(self.plant.points);
+            }
         }
+    }
+
+    /// Parts of a period.
+    pub(super) fn points(&self) -> u32 {
+        self.plant.points
+    }
+
+    /// What the discount of states is multiplied with behind those that are number `point` of their period:
+    /// all of a period have that of its sample.
+    pub(super) fn gamma(&self, gamma: f32, point: u32) -> f32 {
+        if point + 1 == self.plant.points { gamma } else { 1.0 }
     }
 
     /// Adds the first `lanes` states to the scores of their groups, each by its rule.

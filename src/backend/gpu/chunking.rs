@@ -87,6 +87,8 @@ pub(super) struct Size<'a> {
     pub(super) states: usize,
     /// Operations of the formulas for one step of one trajectory.
     pub(super) flops: u64,
+    /// Parts of a period, each a loop iteration.
+    pub(super) points: u32,
     /// The network that drives the rollouts.
     pub(super) network: Option<&'a Mlp>,
     /// The same, where they run it themselves.
@@ -106,6 +108,13 @@ impl Size<'_> {
         let layers = self.network.map_or(0, |mlp| mlp.layers().len());
         let chained = self.chain.map_or(0, |load| load.dispatches);
         (2 + layers + chained) as u64
+    }
+
+    /// Most steps of a dispatch whose rollouts run the network `fused` themselves, or none.
+    fn most_steps(&self, fused: Option<&Fused>, work: Work) -> u32 {
+        let driven = fused.map_or(1, |fused| step_trips(fused, work.sides()));
+        let trips = driven + u64::from(self.points) - 1;
+        (MAX_TRIPS / trips).max(1) as u32
     }
 
     /// Operations of a step of one trajectory.
@@ -142,11 +151,11 @@ impl Chunking {
         work: Work,
         size: &Size<'_>,
     ) -> Result<Self> {
-        let Size { states, network, fused, seen, count, chain, .. } = *size;
+        let Size { network, fused, count, chain, .. } = *size;
         let driven_by = DrivenBy::new(size);
         let segment = work.segment(driven_by);
         let layered = network.filter(|_| driven_by == DrivenBy::Layered);
-        let mut parts = column_bytes(work, states, seen, layered, segment);
+        let mut parts = column_bytes(work, size, layered, segment);
         let called = chain.map_or([0; 5], |load| load.bytes);
         parts.extend(called.map(|bytes| bytes * u64::from(work.sides())));
         let largest = parts.iter().copied().max().unwrap_or(1);
@@ -171,10 +180,10 @@ impl Chunking {
         };
         let steps = match (driven_by, fused) {
             (DrivenBy::Layered, _) => 1,
-            (_, Some(fused)) => segment.min((MAX_TRIPS / step_trips(fused, work.sides())) as u32),
-            (_, None) => segment,
+            (_, fused) => segment.min(size.most_steps(fused, work)),
         };
-        let trips = longest_trips(states, layered, stride, u64::from(steps));
+        let iterations = u64::from(steps) * u64::from(size.points);
+        let trips = longest_trips(size.states, layered, stride, iterations);
         let trips = trips.max(chain.map_or(0, |load| load.inputs));
         if trips > MAX_TRIPS {
             return Err(Error::Device(format!(
@@ -204,13 +213,8 @@ fn rounds(size: &Size<'_>, timely: u64, segment: u32) -> u32 {
 }
 
 /// Bytes that each buffer holds per column.
-fn column_bytes(
-    work: Work,
-    states: usize,
-    seen: usize,
-    network: Option<&Mlp>,
-    segment: u32,
-) -> Vec<u64> {
+fn column_bytes(work: Work, size: &Size<'_>, network: Option<&Mlp>, segment: u32) -> Vec<u64> {
+    let Size { states, seen, points, .. } = *size;
     let sides = u64::from(work.sides());
     let state = 16 * input_quads(states) as u64 * sides;
     let (folds, origin, measure) = (8 * sides, 4, 4 * sides);
@@ -218,7 +222,8 @@ fn column_bytes(
     match work {
         Work::Measure => {}
         Work::Sign => parts.extend([state, folds, origin]),
-        Work::Pairs => parts.push(4 * u64::from(segment)),
+        // Distances of samples, and of the points behind them.
+        Work::Pairs => parts.push(4 * u64::from(segment) * u64::from(points.min(2))),
     }
     if let Some(mlp) = network {
         let widths = mlp.layers().iter().map(|layer| output_quads(layer.outputs));
@@ -265,7 +270,7 @@ mod tests {
         fused: Option<&'a Fused>,
         count: u64,
     ) -> Size<'a> {
-        Size { states, flops: 200, network, fused, chain: None, seen: 0, count }
+        Size { states, flops: 200, points: 1, network, fused, chain: None, seen: 0, count }
     }
 
     fn planned(adapter: &Adapter, work: Work, size: &Size<'_>) -> Result<Chunking> {

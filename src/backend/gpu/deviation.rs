@@ -12,6 +12,7 @@ use super::params::Params;
 use super::workspace::{Buffers, Chunk, Kernels, MEASURES_AT, Sent, Workspace};
 use crate::backend::sink::{Asked, PairsSink};
 use crate::error::Result;
+use crate::model::Moment;
 use crate::rollout::{DeviationTask, Farthest, PairControl, PairCounts, PairMeasure};
 
 /// Bytes of the measures of a pair.
@@ -75,7 +76,8 @@ pub(super) fn deviation(
     let request = Request { work: Work::Pairs, asked, starts, spec, tightening, count };
     let mut job = Job::new(opened, attempt, subject, request)?;
     let params = pair_params(task, job.chunking.stride);
-    let mut delivery = Delivery { asked, farthest, sink };
+    let rows = subject.source.text.rows();
+    let mut delivery = Delivery { asked, rows, farthest, sink };
     let mut first = task.range.start;
     while first < task.range.end {
         let columns = (task.range.end - first).min(u64::from(job.chunking.stride)) as u32;
@@ -135,6 +137,8 @@ fn rolled(asked: Asked, Sent { first, columns, .. }: Sent, bytes: &[u8]) -> Roll
 /// Results in order of index.
 struct Delivery<'a> {
     asked: Asked,
+    /// Rows of distances for each step.
+    rows: u32,
     farthest: &'a mut [Farthest],
     sink: Sink<'a>,
 }
@@ -142,7 +146,10 @@ struct Delivery<'a> {
 impl Delivery<'_> {
     /// Merges the farthest pairs of a chunk, and gives what it came to to the sink.
     fn take(&mut self, Rolled { first, came_to, found }: Rolled) -> Result<()> {
-        for (farthest, [bits, column]) in self.farthest.iter_mut().zip(found) {
+        for (row, [bits, column]) in (0..).zip(found) {
+            // The second row of a step is that of the points behind it, which count at the next one.
+            let step = Moment { step: row / self.rows, point: row % self.rows }.sample();
+            let Some(farthest) = self.farthest.get_mut(step) else { continue };
             *farthest = farthest.merge(Farthest {
                 distance: f32::from_bits(bits),
                 pair: first + u64::from(column),
@@ -158,7 +165,7 @@ fn roll(job: &mut Job<'_>, chunk: Chunk<'_>, delivery: &mut Delivery<'_>) -> Res
     let (asked, columns) = (delivery.asked, params.columns);
     let slot = if asked == Asked::Each { Slot::Measures } else { Slot::Counts };
     let bytes = result_bytes(asked, columns);
-    let farthest = 8 * (u64::from(params.horizon) + 1);
+    let farthest = 8 * u64::from(delivery.rows) * (u64::from(params.horizon) + 1);
     let Job { flight, chunking, space, .. } = job;
     let Workspace { inputs, listed, results, buffers, kernels, .. } = space;
     let kernels = &kernels[0];
@@ -167,7 +174,8 @@ fn roll(job: &mut Job<'_>, chunk: Chunk<'_>, delivery: &mut Delivery<'_>) -> Res
     let mut step = 0;
     while step <= params.horizon {
         let count = chunking.segment.min(params.horizon + 1 - step);
-        segment(&mut batch, kernels, buffers, *chunking, params, step, count);
+        let span = Span { first: step, count, rows: delivery.rows };
+        segment(&mut batch, kernels, buffers, *chunking, params, span);
         step += count;
         let ended = step > params.horizon;
         if let Some(count) = kernels.count.as_ref().filter(|_| ended) {
@@ -198,15 +206,23 @@ fn roll(job: &mut Job<'_>, chunk: Chunk<'_>, delivery: &mut Delivery<'_>) -> Res
     Ok(())
 }
 
-/// Adds the dispatches of `count` steps from `first` on, and the reduction of their distances.
+/// Steps that are reduced together.
+#[derive(Clone, Copy)]
+struct Span {
+    first: u32,
+    count: u32,
+    /// Rows of distances for each.
+    rows: u32,
+}
+
+/// Adds the dispatches of the steps of a span, and the reduction of their distances.
 fn segment<'a>(
     batch: &mut Batch<'a>,
     kernels: &'a Kernels,
     buffers: &Buffers,
     chunking: Chunking,
     params: Params,
-    first: u32,
-    count: u32,
+    Span { first, count, rows }: Span,
 ) {
     let params = Params { segment_start: first, ..params };
     let mut step = first;
@@ -224,6 +240,6 @@ fn segment<'a>(
         step += steps;
     }
     if let Some(reduce) = &kernels.after {
-        batch.push(reduce, &params.over(first, count), [count, 1]);
+        batch.push(reduce, &params.over(rows * first, rows * count), [rows * count, 1]);
     }
 }

@@ -5,7 +5,7 @@ use super::buffer::Pool;
 use super::compose::Slot;
 use super::device::Device;
 use super::upload::Upload;
-use crate::model::Task;
+use crate::model::{Moment, Task};
 use crate::rollout::{Effect, Region, RolloutSpec, Starts, Tightening};
 
 /// In the last number of a row of the schedule: its bit for margins with factors, and where the role of the
@@ -20,8 +20,8 @@ const VECTOR_BYTES: usize = 16;
 pub(super) struct InputSizes {
     /// Of the parameters of the model.
     pub(super) values: usize,
-    /// Of the schedule, one per step.
-    pub(super) steps: usize,
+    /// Of the schedule, one per step, or two where there are points between.
+    pub(super) schedule: usize,
     /// Of the region that starts are drawn from.
     pub(super) region: usize,
     /// Dispatches of a submission.
@@ -41,7 +41,8 @@ pub(super) struct Inputs(Upload);
 impl Inputs {
     /// Room for `sizes`.
     pub(super) fn new(device: &Device, pool: &Pool, sizes: InputSizes) -> Self {
-        let parts = [sizes.values, sizes.steps, sizes.region].map(|vectors| VECTOR_BYTES * vectors);
+        let parts =
+            [sizes.values, sizes.schedule, sizes.region].map(|vectors| VECTOR_BYTES * vectors);
         Self(Upload::new(device, pool, &parts, sizes.dispatches, sizes.narrowed))
     }
 
@@ -74,19 +75,31 @@ impl Inputs {
 
     /// Sets the schedule, per step: discount, what both margins lose, and a whole number of two parts:
     /// whether they are multiplied with it instead, and what the step is to `task`. The discount is
-    /// multiplied up step by step in f32, as the host's fold does.
-    pub(super) fn set_schedule(&mut self, spec: &RolloutSpec, task: Task, tightening: &Tightening) {
-        let losses = tightening.target.iter().zip(&tightening.constraint);
+    /// multiplied up step by step in f32, as the host's fold does. Where a step has two rows, the second is that
+    /// of the points behind it: they have its discount and lose what the next step does.
+    pub(super) fn set_schedule(
+        &mut self,
+        spec: &RolloutSpec,
+        task: Task,
+        tightening: &Tightening,
+        rows: u32,
+    ) {
         let multiplied = match tightening.effect {
             Effect::Subtracted => 0,
             Effect::Multiplied => MULTIPLIED,
         };
+        let Tightening { target, constraint, .. } = tightening;
         let mut discount = 1.0;
-        let roles = task.roles(spec.horizon).into_iter();
-        for (step, (role, (&target, &constraint))) in roles.zip(losses).enumerate() {
-            let marks = multiplied | (role.bits() << ROLE_SHIFT);
-            // Below 64: a whole number that f32 holds.
-            self.0.put(SCHEDULE, 4 * step, &[discount, target, constraint, marks as f32]);
+        for step in 0..=spec.horizon {
+            for point in 0..rows {
+                let moment = Moment { step, point };
+                let (at, role) = (moment.sample(), task.role_at(moment, spec.horizon));
+                let at = at.min(spec.horizon as usize);
+                let marks = multiplied | (role.bits() << ROLE_SHIFT);
+                // Below 64: a whole number that f32 holds.
+                let row = [discount, target[at], constraint[at], marks as f32];
+                self.0.put(SCHEDULE, 4 * (step * rows + point) as usize, &row);
+            }
             discount *= spec.gamma;
         }
     }

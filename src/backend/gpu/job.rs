@@ -64,7 +64,7 @@ impl<'a> Job<'a> {
         let shape = Shape { work, asked, listed, horizon: spec.horizon, chunking };
         let mut space = program.take(&flight, shape)?;
         space.inputs.set_values(subject.values);
-        space.inputs.set_schedule(spec, subject.task, tightening);
+        space.inputs.set_schedule(spec, subject.task, tightening, subject.source.text.rows());
         space.inputs.set_region(starts);
         Ok(Self { flight, chunking, space, opened, program })
     }

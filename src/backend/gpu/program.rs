@@ -69,6 +69,7 @@ impl Program {
         let size = Size {
             states: text.states(),
             flops: text.operations(),
+            points: text.points(),
             network,
             fused: text.fused(),
             chain: chain.as_ref(),

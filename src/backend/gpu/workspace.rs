@@ -6,7 +6,7 @@ use super::chain::{BoundChain, ChainBinder, ChainBuffers, ChainStep};
 use super::chain_load::ChainLoad;
 use super::chunking::{Chunking, Work};
 use super::compiled::Compiled;
-use super::compose::{Kernel, Slot};
+use super::compose::{Kernel, PlantText, Slot};
 use super::counting;
 use super::flight::Flight;
 use super::inputs::{InputSizes, Inputs};
@@ -82,6 +82,7 @@ impl Workspace {
         shape: Shape,
     ) -> Result<Self> {
         let (device, pool) = (&flight.device, flight.pool);
+        let rows = compiled.text.rows();
         let (quads, chunking) = (compiled.text.states().div_ceil(4), shape.chunking);
         let layers = network.map_or(0, |mlp| mlp.layers().len());
         let chain = compiled.text.chain().map(ChainLoad::new);
@@ -90,7 +91,7 @@ impl Workspace {
         let segment = chunking.segment as usize * (layers + chained + 2) + 1;
         let sizes = InputSizes {
             values: compiled.text.parameters().div_ceil(4),
-            steps: shape.horizon as usize + 1,
+            schedule: rows as usize * (shape.horizon as usize + 1),
             region: 4 * quads,
             // The draw, segments, and what counts.
             dispatches: 2 + chunking.rounds_of(shape.horizon) as usize * segment,
@@ -111,7 +112,7 @@ impl Workspace {
         };
         let kernels = (0..sets).map(|set| binder.kernels(shape, set)).collect::<Result<_>>()?;
         let results = u64::from(shape.work.sides()) * 4 * u64::from(chunking.stride);
-        let farthest = 8 * (u64::from(shape.horizon) + 1);
+        let farthest = 8 * u64::from(rows) * (u64::from(shape.horizon) + 1);
         let results = Turns::new(device, pool, MEASURES_AT + results + farthest);
         Ok(Self { shape, inputs, listed, results, buffers, kernels })
     }
@@ -136,7 +137,7 @@ pub(super) struct Buffers {
 impl Buffers {
     fn new(flight: &Flight<'_>, compiled: &Compiled, network: Option<&Mlp>, shape: Shape) -> Self {
         let storage = |bytes| flight.pool.take(&flight.device, Use::Storage, bytes);
-        let sizes = sizes(shape, compiled.text.states());
+        let sizes = sizes(shape, &compiled.text);
         let row = shape.chunking.row;
         let layered = network.filter(|_| compiled.text.fused().is_none());
         let seen = layered.filter(|_| compiled.text.observes()).map(|mlp| mlp.widths()[0]);
@@ -178,7 +179,11 @@ impl Buffers {
 }
 
 /// Bytes of each buffer.
-fn sizes(Shape { work, asked, horizon, chunking, .. }: Shape, states: usize) -> Vec<(Slot, u64)> {
+fn sizes(
+    Shape { work, asked, horizon, chunking, .. }: Shape,
+    text: &PlantText,
+) -> Vec<(Slot, u64)> {
+    let (states, rows) = (text.states(), u64::from(text.rows()));
     let (row, stride) = (u64::from(chunking.row), u64::from(chunking.stride));
     let state = 16 * states.div_ceil(4) as u64 * row;
     let measures = 4 * stride * u64::from(work.sides());
@@ -203,8 +208,8 @@ fn sizes(Shape { work, asked, horizon, chunking, .. }: Shape, states: usize) -> 
             (Slot::Left, 4),
         ]),
         Work::Pairs => sizes.extend([
-            (Slot::Distances, 4 * stride * u64::from(chunking.segment)),
-            (Slot::Farthest, 8 * (u64::from(horizon) + 1)),
+            (Slot::Distances, 4 * stride * rows * u64::from(chunking.segment)),
+            (Slot::Farthest, 8 * rows * (u64::from(horizon) + 1)),
         ]),
     }
     sizes

@@ -123,6 +123,7 @@ impl Training<'_> {
     fn run(self, folder: &Path) -> Result<Trained> {
         let model = Arc::new(self.config.plain_model()?);
         self.settings.method.check_task(&model.task)?;
+        self.settings.method.check_points(model.points)?;
         match self.settings.method {
             Method::Analytic => self.analytic(&model),
             Method::Ddpg => self.ddpg(&model),

@@ -97,14 +97,16 @@ impl Description {
         let policy = root.section("policy")?;
         let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
         let policy = policy.transpose()?.flatten();
+        let dynamics = dynamics::dynamics(&model, &state_names, time, &scope)?;
         Ok(Self {
-            dynamics: dynamics::dynamics(&model, &state_names, time, &scope)?,
             task: task::task(
                 &model.required("task", "the kind and its margins")?,
                 &scope,
+                &dynamics,
                 time.period,
             )?,
             costs: costs::costs(&model, &scope)?,
+            dynamics,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
             shapes: shapes::shapes(model.section("shapes")?)?,
             policy,

@@ -47,6 +47,7 @@ impl Description {
             controls: self.controls.clone(),
             parameters: self.parameters.clone(),
             period: self.period,
+            points: self.task.between + 1,
             step: self.step(&networks, &[])?,
             task: self.task.task,
             target: margin(&self.task.target, NOWHERE)?,
@@ -94,8 +95,8 @@ impl Description {
         Ok(())
     }
 
-    /// The graph of the next state, of the inputs of the model and one for each of the disturbances that
-    /// `act`, as a share of its bound.
+    /// The graph of the state after one part of a period, the next one where nothing is looked at between; of the
+    /// inputs of the model and one for each of the disturbances that `act`, as a share of its bound.
     pub(super) fn step(&self, networks: &Networks, act: &[Disturbance]) -> Result<Graph> {
         let (path, formulas, stages) = match &self.dynamics {
             Dynamics::Next(formulas) => ("model.next", formulas, 1),
@@ -113,7 +114,10 @@ impl Description {
             }
             match &self.dynamics {
                 Dynamics::Next(_) => formulas.values(&inputs),
-                Dynamics::Flow(_, rule) => formulas.integrated(&inputs, *rule),
+                Dynamics::Flow(_, rule) => {
+                    let substeps = rule.substeps / (self.task.between + 1);
+                    formulas.integrated(&inputs, *rule, substeps)
+                }
             }
         });
         self.check_size(path, graph.nodes.len())?;
@@ -193,11 +197,11 @@ impl<'a> Formulas<'a> {
         written.formula.value(Values { names, outputs: &[], looked: &[], networks: self.networks })
     }
 
-    /// The state a period after `inputs`, the formulas being derivatives.
-    fn integrated<R: Scalar>(&self, inputs: &[R], rule: Integration) -> Vec<R> {
+    /// The state `substeps` substeps after `inputs`, the formulas being derivatives.
+    fn integrated<R: Scalar>(&self, inputs: &[R], rule: Integration, substeps: u32) -> Vec<R> {
         let count = self.description.states.len();
         let mut moment = inputs.to_vec();
-        for substep in 0..rule.substeps {
+        for substep in 0..substeps {
             let begin = f64::from(substep) * rule.seconds();
             self.at_time(&mut moment, inputs, begin);
             let next = match rule.integrator {

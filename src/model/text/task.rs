@@ -2,6 +2,7 @@
 
 use toml::Value;
 
+use super::dynamics::Dynamics;
 use super::names::Scope;
 use super::section::{Section, unknown};
 use super::written::{FormulaKind, Written};
@@ -12,8 +13,8 @@ use crate::model::{Task, Window};
 const KINDS: [&str; 5] = ["reach-avoid", "avoid", "reach", "reach-stay", "at-end"];
 /// Keys of times.
 const TIMES: [&str; 3] = ["from", "to", "by"];
-/// A part of tasks that is refused by name.
-const LATER: &str = "between";
+/// How many further points of each period are looked at.
+const BETWEEN: &str = "between";
 /// How far a time may lie from a whole number of periods, in periods for each of them: a period is an f32.
 const WHOLE: f64 = 1e-6;
 
@@ -26,19 +27,20 @@ pub struct WrittenTask {
     pub target: Option<Written>,
     /// Positive where safe.
     pub constraint: Option<Written>,
+    /// Points inside each period that are looked at besides the samples.
+    pub between: u32,
 }
 
-/// Reads `[model.task]` of a model whose steps last `period` seconds, where that is known.
+/// Reads `[model.task]` of a model that moves on by `dynamics`, whose steps last `period` seconds, where that
+/// is known.
 pub(super) fn task(
     section: &Section<'_>,
     scope: &Scope,
+    dynamics: &Dynamics,
     period: Option<f32>,
 ) -> Result<WrittenTask> {
-    section.only(["kind", "target", "constraint", LATER].into_iter().chain(TIMES))?;
+    section.only(["kind", "target", "constraint", BETWEEN].into_iter().chain(TIMES))?;
     let kind = kind(section)?;
-    if section.has(LATER) {
-        return Err(section.refuse(LATER, "this part of a task does not work yet; leave it out"));
-    }
     refuse_unused(section, kind)?;
     let margin = |key: &str| {
         let needed = used(kind).contains(&key);
@@ -48,7 +50,33 @@ pub(super) fn task(
         task: timed(section, kind, period)?,
         target: margin("target")?,
         constraint: margin("constraint")?,
+        between: between(section, dynamics)?,
     })
+}
+
+/// The number of points inside each period: the state after each of its equal parts but the last.
+fn between(section: &Section<'_>, dynamics: &Dynamics) -> Result<u32> {
+    let Some(count) = section.whole(BETWEEN)? else { return Ok(0) };
+    let refuse = |problem: String| section.refuse(BETWEEN, problem);
+    let Dynamics::Flow(_, rule) = dynamics else {
+        let problem = "points inside a period need `model.flow`: next values have nothing between";
+        return Err(refuse(problem.to_owned()));
+    };
+    let points = u32::try_from(count).ok().filter(|count| *count > 0);
+    let parts = points.and_then(|count| count.checked_add(1)).ok_or_else(|| {
+        let problem =
+            "expected a number of points inside each period, 1 or more; leave it out for none";
+        refuse(format!("{count}; {problem}"))
+    })?;
+    if !rule.substeps.is_multiple_of(parts) {
+        let problem = format!(
+            "{count} points cut a period into {parts} parts, and {} substeps cannot be shared evenly; \
+             take a multiple of {parts} for `model.time.substeps`",
+            rule.substeps
+        );
+        return Err(refuse(problem));
+    }
+    Ok(parts - 1)
 }
 
 /// The task of this kind with its times.

@@ -43,14 +43,13 @@ pub struct Replayed {
 impl Replayed {
     /// The reach-avoid measure in f64.
     pub fn measure(&self, model: &Model, spec: &RolloutSpec) -> f64 {
-        let mut x: Vec<f64> = self.x.iter().copied().map(f64::from).collect();
-        let mut states = vec![x.clone()];
+        let mut states = vec![self.x.iter().copied().map(f64::from).collect::<Vec<f64>>()];
         for (step, controls) in (0..spec.horizon).zip(&self.controls) {
             let controls: Vec<f64> = controls.iter().copied().map(f64::from).collect();
-            x = model.next(&x, &controls, step);
-            states.push(x.clone());
+            let x = &states[(step * model.points) as usize];
+            states.extend(model.parts(x, &controls, step));
         }
-        replay::fold_states(model, &states, spec, &Tightening::none(spec))
+        replay::fold_looks(model, &states, spec, &Tightening::none(spec))
     }
 }
 

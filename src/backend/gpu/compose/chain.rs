@@ -154,7 +154,7 @@ impl ChainText {
             if link.asks.is_empty() { String::new() } else { declare(Slot::Asked, "read_write") },
             if link.told { declare(Slot::Said, "read") } else { String::new() },
             if outline.parameters > 0 { parameter_glue(outline.parameters) } else { String::new() },
-            seconds_glue(outline.period),
+            seconds_glue(outline.period, outline.points),
             load_glue(outline.states, &[]),
         ];
         [&glue.concat(), &link.text, LINK].join("\n")

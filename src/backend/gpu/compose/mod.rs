@@ -1,6 +1,7 @@
 //! The text of each kernel: constants, recorded formulas and the files of `shaders/`, concatenated.
 
 mod chain;
+mod fit;
 mod fused;
 mod glue;
 mod kernels;

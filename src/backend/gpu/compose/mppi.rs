@@ -58,6 +58,7 @@ impl MppiText {
     pub fn new(planning: &Planning) -> Self {
         let Planning { model, cost, spec, value, disturbance } = planning;
         let outline = Outline {
+            points: 1,
             states: model.states.len(),
             controls: model.controls.len(),
             parameters: model.parameters.len(),

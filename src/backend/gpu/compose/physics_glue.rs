@@ -4,6 +4,7 @@ use super::fused::Fused;
 use super::kernels::Slot;
 use super::layers::Activations;
 use crate::backend::physics::{Function, Part, Physics, Role};
+use crate::model::share;
 use crate::policy::Mlp;
 
 /// What the texts have of a plant besides its formulas.
@@ -17,6 +18,8 @@ pub(super) struct Outline {
     pub(super) parameters: usize,
     /// Seconds between two steps; 0 where the model does not say.
     pub(super) period: f32,
+    /// Parts of a period; the kernels count moments in them where there are more than 1.
+    pub(super) points: u32,
     /// Numbers of context that the cost of a stage takes; 0 where there is no cost.
     pub(super) contexts: usize,
     /// The network that drives, if one does.
@@ -64,7 +67,8 @@ impl Physics {
 }
 
 /// `functions` as recorded and what calls them: `advance`, `target_at`, `constraint_at`,
-/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, `cells_of`, `ended`, all of them given the number of the step.
+/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, `cells_of`, `ended`, all of them given the number of the step, or
+/// of the parts of periods so far where these have several.
 pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String {
     let reads = |part| functions.iter().any(|function| function.reads(part));
     let mut glue = String::new();
@@ -72,7 +76,7 @@ pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String
         glue += &parameter_glue(outline.parameters);
     }
     if reads(Part::Seconds) {
-        glue += &seconds_glue(outline.period);
+        glue += &seconds_glue(outline.period, outline.points);
     }
     for function in functions {
         glue += &function.text;
@@ -98,9 +102,20 @@ pub(super) fn parameter_glue(count: usize) -> String {
     )
 }
 
-/// `seconds_at`: the time at a step.
-pub(super) fn seconds_glue(period: f32) -> String {
-    format!("fn seconds_at(t: u32) -> f32 {{\n    return f32(t) * {period:?}f;\n}}\n")
+/// `seconds_at`: the time at a step, or after so many parts of periods that have `points` each.
+pub(super) fn seconds_glue(period: f32, points: u32) -> String {
+    if points == 1 {
+        return format!("fn seconds_at(t: u32) -> f32 {{\n    return f32(t) * {period:?}f;\n}}\n");
+    }
+    // Numbers of the host: a quotient of a device may be another one.
+    let shares: Vec<String> =
+        (0..points).map(|point| format!("{:?}f", share(point, points))).collect();
+    format!(
+        "fn seconds_at(t: u32) -> f32 {{\n    \
+         var shares = array<f32, POINTS>({});\n    \
+         return (f32(t / POINTS) + shares[t % POINTS]) * {period:?}f;\n}}\n",
+        shares.join(", ")
+    )
 }
 
 /// What the places of a formula on maps are.
@@ -151,6 +166,7 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Part::Looked => format!("looked_up({}, t)", names_of(&arguments)),
         Part::Parameters => "parameters()".to_owned(),
         Part::Seconds => "seconds_at(t)".to_owned(),
+        Part::Step if outline.points > 1 => "f32(t / POINTS)".to_owned(),
         Part::Step => "f32(t)".to_owned(),
     };
     let passed: Vec<String> = function.takes.iter().map(passed).collect();

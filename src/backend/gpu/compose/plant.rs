@@ -1,6 +1,7 @@
 //! The text of the kernels of measures, pairs and networks.
 
 use super::chain::ChainText;
+use super::fit::{check_formulas, check_points, check_reads};
 use super::fused::{Fused, fused_text};
 use super::glue::{FINITE, PARAMS, RNG, component, constants, constants_with, finite_glue};
 use super::glue::{listed_glue, load_glue, recorded_pair, state_glue, store_glue};
@@ -9,10 +10,10 @@ use super::layers::layer_text;
 use super::narrowed::block_constants;
 use super::physics_glue::{DrivingNetwork, Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Physics, Role};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formula::wgsl::{Arithmetic, CHOICES, function, function_with};
 use crate::formula::{Expr, record};
-use crate::model::{Controller, Law, Model};
+use crate::model::{Controller, Model};
 use crate::policy::Mlp;
 use crate::real::Real;
 
@@ -21,6 +22,8 @@ const JUDGE: &str = include_str!("../../../../shaders/judge.wgsl");
 const EXACT: &str = include_str!("../../../../shaders/exact.wgsl");
 const SAMPLE: &str = include_str!("../../../../shaders/sample.wgsl");
 const REACH_AVOID: &str = include_str!("../../../../shaders/reach_avoid.wgsl");
+const REACH_AVOID_POINTS: &str = include_str!("../../../../shaders/reach_avoid_points.wgsl");
+const DEVIATION_POINTS: &str = include_str!("../../../../shaders/deviation_points.wgsl");
 const COMPACT: &str = include_str!("../../../../shaders/compact.wgsl");
 const NARROW: &str = include_str!("../../../../shaders/narrow.wgsl");
 const DEVIATION: &str = include_str!("../../../../shaders/deviation.wgsl");
@@ -47,7 +50,8 @@ impl PlantText {
     ///
     /// # Errors
     /// [`Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
-    /// what is not known there, or the network does not fit; [`Error::Device`] if more networks follow
+    /// what is not known there, or the network does not fit; [`Error::Invalid`] for points inside a period
+    /// where formulas call networks; [`Error::Device`] if more networks follow
     /// one another inside formulas than an adapter takes.
     pub fn new(model: &Model, controller: &Controller) -> Result<Self> {
         check_formulas(model, controller)?;
@@ -58,11 +62,13 @@ impl PlantText {
             controls: model.controls.len(),
             parameters: model.parameters.len(),
             period: model.period.unwrap_or(0.0),
+            points: model.points,
             contexts: 0,
             driving: controller.network().map(DrivingNetwork::new),
         };
         let chain = ChainText::new(&outline, model, controller)?;
         if chain.is_some() {
+            check_points(model)?;
             // The network that drives is one of those that the chain calls.
             outline.driving = None;
         }
@@ -81,6 +87,17 @@ impl PlantText {
     /// The parts between networks, where formulas call some.
     pub fn chain(&self) -> Option<&ChainText> {
         self.chain.as_ref()
+    }
+
+    /// Parts of a period.
+    pub fn points(&self) -> u32 {
+        self.outline.points
+    }
+
+    /// Rows of the schedule for each step, and of distances: of its sample and, where there are any, of the points
+    /// behind it.
+    pub fn rows(&self) -> u32 {
+        self.outline.points.min(2)
     }
 
     /// Number of states.
@@ -104,9 +121,10 @@ impl PlantText {
         self.outline.driving.as_ref().and_then(|driving| driving.fused.as_ref())
     }
 
-    /// Operations of the formulas for one step: a line of the text is one.
+    /// Operations of the formulas for one step: a line of the text is one, in each part of a period.
     pub fn operations(&self) -> u64 {
-        self.physics.functions.iter().map(|one| one.text.lines().count() as u64).sum()
+        let lines = self.physics.functions.iter().map(|one| one.text.lines().count() as u64);
+        lines.sum::<u64>() * u64::from(self.outline.points)
     }
 
     /// What `kernel` binds.
@@ -160,9 +178,13 @@ impl PlantText {
         let folds = || [FINITE, FOLD].concat();
         let parts = match kernel {
             Kernel::Sample => vec![folds(), self.draw(), SAMPLE.to_owned()],
-            Kernel::ReachAvoid => vec![self.rollout(kernel), REACH_AVOID.to_owned()],
+            Kernel::ReachAvoid => {
+                let text = if self.looks_between() { REACH_AVOID_POINTS } else { REACH_AVOID };
+                vec![self.rollout(kernel), text.to_owned()]
+            }
             Kernel::Deviation => {
-                vec![self.rollout(kernel), self.distance(), DEVIATION.to_owned()]
+                let text = if self.looks_between() { DEVIATION_POINTS } else { DEVIATION };
+                vec![self.rollout(kernel), self.distance(), text.to_owned()]
             }
             Kernel::Compact => vec![folds(), COMPACT.to_owned()],
             Kernel::Reduce => vec![REDUCE.to_owned()],
@@ -185,6 +207,11 @@ impl PlantText {
         let sizes = constants_with(states, self.outline.controls, length);
         let shared = vec![sizes, PARAMS.to_owned(), CHOICES.to_owned()];
         [shared, parts].concat().join("\n")
+    }
+
+    /// Whether rollouts are looked at between samples.
+    fn looks_between(&self) -> bool {
+        self.outline.points > 1
     }
 
     /// What counts: bits alone, nothing of the plant.
@@ -210,6 +237,11 @@ impl PlantText {
             self.columns(kernel),
             self.fused().is_some()
         );
+        let parts = match self.looks_between() {
+            true => format!("const POINTS: u32 = {}u;\n", self.outline.points),
+            false => String::new(),
+        };
+        let lanes = lanes + &parts;
         let states = self.outline.states;
         let moves = match &self.chain {
             Some(_) => {
@@ -262,7 +294,9 @@ impl PlantText {
         let roles = self.roles(kernel);
         let functions: Vec<&Function> =
             roles.iter().filter_map(|role| self.physics.function(*role)).collect();
-        physics_glue(&self.outline, &functions)
+        // What a network with kernels of its own sees is asked at samples alone.
+        let points = if kernel == Kernel::Observe { 1 } else { self.outline.points };
+        physics_glue(&Outline { points, ..self.outline.clone() }, &functions)
     }
 
     /// The recorded functions that `kernel` calls.
@@ -319,61 +353,6 @@ pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
     let DrivingNetwork { activations, inputs, outputs, .. } = DrivingNetwork::new(mlp);
     let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
     [constants(inputs, outputs), PARAMS.to_owned(), CHOICES.to_owned(), text].join("\n")
-}
-
-/// The sizes of every formula must be those of its place: kernels do not check.
-fn check_formulas(model: &Model, controller: &Controller) -> Result<()> {
-    let (inputs, states, controls) = (model.inputs(), model.states.len(), model.controls.len());
-    let mut expected = vec![
-        ("step", &model.step, [inputs, states]),
-        ("target", &model.target, [inputs, 1]),
-        ("constraint", &model.constraint, [inputs, 1]),
-    ];
-    if let Law::Formula(graph) = &controller.law {
-        expected.push(("control", graph, [inputs, controls]));
-    }
-    if let Law::Network { observe, network, act } = &controller.law {
-        let DrivingNetwork { inputs: seen, outputs: said, .. } = DrivingNetwork::new(network);
-        check_network(
-            observe.is_some() || seen == states,
-            act.is_some() || said == controls,
-            || {
-                format!(
-                    "maps {seen} inputs to {said} outputs; the system has {states} states and \
-                 {controls} controls"
-                )
-            },
-        )?;
-        expected.extend(observe.iter().map(|graph| ("observe", graph, [inputs, seen])));
-        expected.extend(act.iter().map(|graph| ("act", graph, [inputs + said, controls])));
-    }
-    for (place, graph, sizes) in expected {
-        let found = [graph.inputs, graph.outputs.len()];
-        if found != sizes {
-            let problem = format!(
-                "maps {} inputs to {} outputs; {} to {} were expected",
-                found[0], found[1], sizes[0], sizes[1]
-            );
-            return Err(Error::invalid(place, problem));
-        }
-    }
-    Ok(())
-}
-
-fn check_network(inputs: bool, outputs: bool, problem: impl FnOnce() -> String) -> Result<()> {
-    if inputs && outputs { Ok(()) } else { Err(Error::invalid("network", problem())) }
-}
-
-/// Only the step knows the controls.
-fn check_reads(physics: &Physics) -> Result<()> {
-    let reads = |role| role != Role::Step;
-    match physics.functions.iter().find(|one| reads(one.role) && one.reads(Part::Control)) {
-        None => Ok(()),
-        Some(function) => {
-            let problem = "reads a control, which only the step knows";
-            Err(Error::invalid(function.role.name(), problem))
-        }
-    }
 }
 
 /// `normal_pair` and `ln_unit`, with the bits of the host.
