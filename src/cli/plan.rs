@@ -89,7 +89,7 @@ impl<'a> Asked<'a> {
     fn read(config: &'a Config, path: &Path) -> Result<Self> {
         let (folder, settings) = (folder_of(path), config.plan_settings());
         let model = config.planned_model()?;
-        let (costs, files) = (config.planned_costs(folder)?, config.planned_files(folder)?);
+        let (costs, files) = (config.planned_costs(&model, folder)?, config.planned_files(folder)?);
         let spec = config.plan_spec()?;
         model.task.check(spec.horizon).map_err(|error| config.placed(error))?;
         settings.spec(&model.controls).map_err(|error| config.placed(error))?;
