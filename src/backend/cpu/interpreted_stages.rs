@@ -5,11 +5,10 @@ use std::sync::Arc;
 
 use super::chained::{Chained, Pack};
 use super::interpreted::{Held, Inputs};
-use super::interpreted_terminal::{CostRows, InterpretedTerminal};
-use super::lookups::Asked;
+use super::interpreted_cost::{CostRows, InterpretedCost};
 use crate::cost::CostMap;
 use crate::formula::Graph;
-use crate::model::{Model, StageCost};
+use crate::model::{Lookups, Model, StageCost};
 use crate::real::Vector;
 use crate::real::simd::{Formulas, Instructions};
 use crate::tile::{Clock, NativeStages, Stages, cell_cost, clipped, noise_cost};
@@ -18,9 +17,8 @@ use crate::tile::{Clock, NativeStages, Stages, cell_cost, clipped, noise_cost};
 #[derive(Debug)]
 pub(super) struct InterpretedStages {
     step: Chained,
-    asked: Option<Asked>,
-    stage: Chained,
-    terminal: Option<InterpretedTerminal>,
+    stage: InterpretedCost,
+    terminal: Option<InterpretedCost>,
     cell: Option<(Arc<CostMap>, Chained)>,
     /// The rows of the contexts.
     contexts: Range<usize>,
@@ -46,29 +44,19 @@ impl InterpretedStages {
             |graph: &Graph, inputs: &Inputs, rows: &[usize]| inputs.chained(graph, rows, own, pack);
         let next: Vec<usize> = (0..model.states.len()).collect();
         let step = tape(&model.step, &held(), &next);
-        let asked = cost.lookups.as_ref();
-        let answers = looked.start..looked.start + asked.map_or(0, |all| all.maps.len());
-        let stage = tape(&cost.stage, &told(Held::Rows).followed_by(answers), &[staged]);
-        let asked = asked.map(|all| Asked::new(all, &told(Held::Rows), looked.start, own, pack));
         let rows = CostRows { looked: looked.start, value: staged, own };
-        let terminal = cost.terminal.as_ref();
-        let terminal =
-            terminal.map(|end| InterpretedTerminal::new(end, &told(Held::Zeros), rows, pack));
+        let charged = |formula: &Graph, lookups: &Option<Lookups>, controls| {
+            InterpretedCost::new(formula, lookups.as_ref(), &told(controls), rows, pack)
+        };
+        let stage = charged(&cost.stage, &cost.lookups, Held::Rows);
+        let end = cost.terminal.as_ref();
+        let terminal = end.map(|end| charged(&end.formula, &end.lookups, Held::Zeros));
         let cell = cost
             .map
             .as_ref()
             .map(|map| (Arc::clone(&map.map), tape(&map.cell, &held(), &[staged + 1])));
-        let formulas = Self {
-            step,
-            asked,
-            stage,
-            terminal,
-            cell,
-            contexts,
-            staged,
-            clock: Clock::Ignored,
-            rows: 0,
-        };
+        let clock = Clock::Ignored;
+        let formulas = Self { step, stage, terminal, cell, contexts, staged, clock, rows: 0 };
         let clock_row = held().step();
         let reads = formulas.tapes().any(|tape| tape.reads(clock_row));
         let clock = if reads { Clock::Read } else { Clock::Ignored };
@@ -78,10 +66,9 @@ impl InterpretedStages {
 
     /// All tapes.
     fn tapes(&self) -> impl Iterator<Item = &Chained> {
-        let asked = self.asked.iter().map(Asked::cells);
         let cell = self.cell.iter().map(|(_, tape)| tape);
-        let terminal = self.terminal.iter().flat_map(InterpretedTerminal::tapes);
-        [&self.step, &self.stage].into_iter().chain(cell).chain(asked).chain(terminal)
+        let costs = self.terminal.iter().chain([&self.stage]).flat_map(InterpretedCost::tapes);
+        cell.chain(costs).chain([&self.step])
     }
 
     /// Tells the formulas the number of the step and the contexts of row `t`.
@@ -107,9 +94,6 @@ impl NativeStages for InterpretedStages {
         for t in stages.steps.clone() {
             self.tell(&mut stages, t);
             with.call(Controls { stages: &mut stages, t });
-            if let Some(asked) = &self.asked {
-                asked.evaluate(with, stages.frame, stages.lanes);
-            }
             self.stage.evaluate(with, stages.frame, stages.lanes);
             if let Some((_, cell)) = &self.cell {
                 cell.evaluate(with, stages.frame, stages.lanes);

@@ -5,8 +5,8 @@ mod deviation;
 mod dispatch;
 mod early_exit;
 mod interpreted;
+mod interpreted_cost;
 mod interpreted_stages;
-mod interpreted_terminal;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;

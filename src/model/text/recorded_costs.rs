@@ -148,29 +148,36 @@ impl Recording<'_> {
     /// What `terms` ask, each question once.
     fn asked(&self, terms: &[&WrittenTerm]) -> Asked {
         let formulas = terms.iter().map(|written| &written.formula.formula);
-        let numbers = formulas.clone().flat_map(|formula| formula.lookups()).map(|found| found.map);
-        let numbers: Vec<u32> = numbers.collect();
-        let mut cells = record(self.inputs(), |inputs| {
-            let names = self.names(terms, inputs);
-            let (outputs, looked, networks) = (&[], &[], &self.networks);
-            let values = Values { names: &names, outputs, looked, networks };
-            let places = formulas.flat_map(|formula| formula.places(values));
-            let cell = |(place, map): ([Expr; 2], &u32)| self.maps[*map as usize].cell(place);
-            places.zip(&numbers).map(cell).collect()
-        });
-        let questions: Vec<(u32, u32)> = numbers.into_iter().zip(cells.outputs.clone()).collect();
+        let numbers: Vec<u32> =
+            formulas.flat_map(|formula| formula.lookups()).map(|found| found.map).collect();
+        let mut cells = self.cells(terms, &numbers);
         let mut each: Vec<(u32, u32)> = Vec::new();
-        let answer = |question: &(u32, u32)| {
-            each.iter().position(|known| known == question).unwrap_or_else(|| {
-                each.push(*question);
-                each.len() - 1
-            })
-        };
-        let answers = questions.iter().map(answer).collect();
+        let questions = numbers.into_iter().zip(cells.outputs.clone());
+        let answers = questions.map(|question| place_in(&mut each, question)).collect();
         cells.outputs = each.iter().map(|(_, cell)| *cell).collect();
         let maps = each.iter().map(|(map, _)| Arc::clone(&self.maps[*map as usize])).collect();
         Asked { lookups: (!each.is_empty()).then_some(Lookups { maps, cells }), answers }
     }
+
+    /// The cells of all lookups of `terms`, which ask the maps of these `numbers`.
+    fn cells(&self, terms: &[&WrittenTerm], numbers: &[u32]) -> Graph {
+        record(self.inputs(), |inputs| {
+            let names = self.names(terms, inputs);
+            let values =
+                Values { names: &names, outputs: &[], looked: &[], networks: &self.networks };
+            let places = terms.iter().flat_map(|written| written.formula.formula.places(values));
+            let cell = |(place, map): ([Expr; 2], &u32)| self.maps[*map as usize].cell(place);
+            places.zip(numbers).map(cell).collect()
+        })
+    }
+}
+
+/// The place of `question` in `each`, where it is put if it is not there.
+fn place_in(each: &mut Vec<(u32, u32)>, question: (u32, u32)) -> usize {
+    each.iter().position(|known| *known == question).unwrap_or_else(|| {
+        each.push(question);
+        each.len() - 1
+    })
 }
 
 /// The sum from the first to the last; 0 of none.

@@ -1,16 +1,17 @@
-//! What the end of a plan costs, as tapes over the rows of a tile.
+//! The cost of a stage or of an end of a plan, as tapes over the rows of a tile.
 
 use super::chained::{Chained, Pack};
 use super::interpreted::Inputs;
 use super::lookups::Asked;
-use crate::model::TerminalCost;
+use crate::formula::Graph;
+use crate::model::Lookups;
 use crate::real::Vector;
 use crate::real::simd::{Formulas, Instructions};
 use crate::tile::Frame;
 
-/// A terminal cost as tapes.
+/// A formula of costs as tapes, with the maps that it asks.
 #[derive(Debug)]
-pub(super) struct InterpretedTerminal {
+pub(super) struct InterpretedCost {
     asked: Option<Asked>,
     formula: Chained,
     /// The row of its value.
@@ -25,18 +26,18 @@ pub(super) struct CostRows {
     pub(super) own: usize,
 }
 
-impl InterpretedTerminal {
-    /// `terminal` of `inputs`, those of the model and the contexts; `pack` packs the networks.
+impl InterpretedCost {
+    /// `formula` of `inputs`, those of the model and the contexts; `pack` packs the networks.
     pub(super) fn new(
-        terminal: &TerminalCost,
+        formula: &Graph,
+        lookups: Option<&Lookups>,
         inputs: &Inputs,
         rows: CostRows,
         pack: Pack<'_>,
     ) -> Self {
-        let TerminalCost { formula, lookups } = terminal;
         let CostRows { looked, value, own } = rows;
-        let asked = lookups.as_ref().map(|all| Asked::new(all, inputs, looked, own, pack));
-        let count = lookups.as_ref().map_or(0, |all| all.maps.len());
+        let asked = lookups.map(|all| Asked::new(all, inputs, looked, own, pack));
+        let count = lookups.map_or(0, |all| all.maps.len());
         let inputs = inputs.clone().followed_by(looked..looked + count);
         Self { asked, formula: inputs.chained(formula, &[value], own, pack), row: value }
     }
@@ -46,12 +47,17 @@ impl InterpretedTerminal {
         self.asked.iter().map(Asked::cells).chain([&self.formula])
     }
 
-    /// Adds it to the row `total` of the first `lanes` samples.
-    pub(super) fn charge(&self, with: Instructions, frame: &mut Frame, total: usize, lanes: usize) {
+    /// Evaluates it for the first `lanes` samples.
+    pub(super) fn evaluate(&self, with: Instructions, frame: &mut Frame, lanes: usize) {
         if let Some(asked) = &self.asked {
             asked.evaluate(with, frame, lanes);
         }
         self.formula.evaluate(with, frame, lanes);
+    }
+
+    /// Adds it to the row `total` of the first `lanes` samples.
+    pub(super) fn charge(&self, with: Instructions, frame: &mut Frame, total: usize, lanes: usize) {
+        self.evaluate(with, frame, lanes);
         with.call(Add { frame, rows: [total, self.row], lanes });
     }
 }
