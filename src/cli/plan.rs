@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::options::Global;
-use super::planned::{stage, text};
+use super::planned::{Steered, stage, text};
 use super::progress::Progress;
 use super::{Outcome, devices, folder_of, report};
 use crate::backend::Backend;
@@ -14,9 +14,7 @@ use crate::error::Result;
 use crate::files::{Existing, Inputs, MANIFEST, Staged, check_room, is_free, json, make_way};
 use crate::model::{Costs, Model, Plant};
 use crate::plan::settings::FirstPlan;
-use crate::plan::{
-    ClosedLoop, FirstPlans, Flown, Judged, PlanRecord, PlanSettings, Setting, costs_sha256, starts,
-};
+use crate::plan::{ClosedLoop, FirstPlans, Judged, PlanSettings, Setting, costs_sha256, starts};
 use crate::rollout::RolloutSpec;
 
 /// Where the results go unless `--out` says otherwise.
@@ -50,18 +48,6 @@ pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     let files = staged.publish()?;
     report(global, &steered.record, || text(&steered.record, &files))?;
     Ok(Outcome::Done)
-}
-
-/// Runs that are over.
-pub(super) struct Steered {
-    /// What they came to.
-    pub(super) record: PlanRecord,
-    /// The runs.
-    pub(super) flown: Flown,
-    /// What each came to.
-    pub(super) judged: Vec<Judged>,
-    /// Ends of the box of starts, `[states]` each.
-    pub(super) bounds: [Vec<f32>; 2],
 }
 
 /// What a configuration asks for.
@@ -103,7 +89,7 @@ impl<'a> Asked<'a> {
     fn read(config: &'a Config, path: &Path) -> Result<Self> {
         let (folder, settings) = (folder_of(path), config.plan_settings());
         let model = config.planned_model()?;
-        let (costs, files) = (config.planned_costs(folder)?, config.planned_files(folder)?);
+        let (costs, files) = (config.planned_costs(&model, folder)?, config.planned_files(folder)?);
         let spec = config.plan_spec()?;
         model.task.check(spec.horizon).map_err(|error| config.placed(error))?;
         settings.spec(&model.controls).map_err(|error| config.placed(error))?;

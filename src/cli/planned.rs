@@ -3,12 +3,11 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::plan::Steered;
 use crate::error::Result;
 use crate::files::{Staged, json};
 use crate::model::{Costs, Model};
 use crate::plan::record::{LatencyRecord, SuccessRecord, TermRecord};
-use crate::plan::{PlanRecord, Plane, steps_table, trajectories};
+use crate::plan::{Flown, Judged, PlanRecord, Plane, steps_table, trajectories};
 use crate::report::{PlanPage, plan_html};
 use crate::rounding::{complement, interval, lower, number, upper};
 
@@ -20,6 +19,18 @@ const STEPS: &str = "steps.csv";
 const TRAJECTORIES: &str = "trajectories.npz";
 /// Name of the page.
 const PAGE: &str = "report.html";
+
+/// Runs that are over.
+pub(super) struct Steered {
+    /// What they came to.
+    pub(super) record: PlanRecord,
+    /// The runs.
+    pub(super) flown: Flown,
+    /// What each came to.
+    pub(super) judged: Vec<Judged>,
+    /// Ends of the box of starts, `[states]` each.
+    pub(super) bounds: [Vec<f32>; 2],
+}
 
 /// Writes the files of the folder, the record last.
 ///

@@ -13,14 +13,6 @@ use crate::rollout::RolloutSpec;
 use crate::scenario::limits::finite;
 use crate::system::Axis;
 
-/// What plans need and a text without it is shown.
-const EXAMPLE: &str = "\
-no costs, and plans are made to cost little; for instance
-    [model.costs]
-    stage.effort = { weight = 0.1, formula = \"force^2\" }
-    terminal.place = { weight = 10.0, formula = \"(x - 1)^2\" }
-with the states and controls of the model (docs/models.md)";
-
 impl Config {
     /// The section `[plan]`, every default filled in but those that follow from the model.
     pub fn plan_settings(&self) -> PlanSettings {
@@ -57,19 +49,19 @@ impl Config {
         described.and_then(|found| found.model()).map_err(|error| self.placed(error))
     }
 
-    /// The costs of plans; their files are sought relative to `folder`, where the configuration lies.
+    /// The costs of plans for `model`; their files are sought relative to `folder`, where the configuration lies.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a model without costs, with an example of them, and those of
     /// [`Config::costs`].
-    pub fn planned_costs(&self, folder: &Path) -> Result<Costs> {
+    pub fn planned_costs(&self, model: &Model, folder: &Path) -> Result<Costs> {
         if let Some(plant) = self.registered()? {
             let problem =
                 "has no costs, and plans are made to cost little: `Registered::costs` gives them";
             let missing = || self.placed(Error::invalid("system.name", problem));
             return plant.planned().cloned().ok_or_else(missing);
         }
-        let missing = || self.placed(Error::invalid("model.costs", EXAMPLE));
+        let missing = || self.placed(Error::invalid("model.costs", without_costs(model)));
         self.costs(folder)?.ok_or_else(missing)
     }
 
@@ -123,4 +115,17 @@ impl Config {
                        `[model.costs]`: configs/models/double_integrator.toml is an example";
         self.placed(Error::invalid("system.name", problem))
     }
+}
+
+/// What plans need and `model` has not, with an example in its own names.
+fn without_costs(model: &Model) -> String {
+    let first = |axes: &[Axis]| axes.first().map_or_else(String::new, |axis| axis.name.clone());
+    let (state, control) = (first(&model.states), first(&model.controls));
+    format!(
+        "no costs, and plans are made to cost little; for instance\n    \
+         [model.costs]\n    \
+         stage.effort = {{ weight = 0.1, formula = \"{control}^2\" }}\n    \
+         terminal.place = {{ weight = 10.0, formula = \"({state} - 1)^2\" }}\n\
+         which docs/models.md explains"
+    )
 }

@@ -18,6 +18,7 @@ pub(crate) mod palette;
 mod plan;
 mod plan_figures;
 mod plan_paths;
+mod plan_runs;
 pub(crate) mod plot;
 pub(crate) mod scale;
 mod sequential;
@@ -34,5 +35,6 @@ mod words;
 
 pub use falsify::{Search, falsify_html};
 pub use html::html;
-pub use plan::{PlanPage, plan_html};
+pub use plan::plan_html;
+pub use plan_runs::PlanPage;
 pub use train::train_html;

@@ -3,26 +3,14 @@
 use super::figure::Figure;
 use super::plan_figures::figures;
 use super::plan_paths;
+use super::plan_runs::PlanPage;
 use super::shell::{self, Headline, Scripts};
 use super::table::{pairs, table};
 use super::text::{count, escape, interval, lower, number, or_dash, percents, upper};
 use crate::model::Form;
+use crate::plan::PlanRecord;
 use crate::plan::record::{LatencyRecord, RunRecord, SuccessRecord, TermRecord};
-use crate::plan::{Judged, PlanRecord, Plane, Trajectory};
 use crate::rollout::NoiseKind;
-
-/// What the page is made of.
-#[derive(Clone, Copy, Debug)]
-pub struct PlanPage<'a> {
-    /// What the runs came to.
-    pub record: &'a PlanRecord,
-    /// The runs in order.
-    pub runs: &'a [Trajectory],
-    /// What each came to.
-    pub judged: &'a [Judged],
-    /// The margins over the plane of the paths, where there is one.
-    pub plane: Option<&'a Plane>,
-}
 
 /// The report of plans in closed loop as one HTML document that loads nothing from anywhere.
 pub fn plan_html(page: &PlanPage<'_>) -> String {

@@ -1,19 +1,16 @@
 //! The plan in time: states, controls, margins and cost terms of the runs, a small plot for each.
 
 use super::figure::{Figure, Swatch};
-use super::plan::PlanPage;
+use super::plan_runs::{PlanPage, class, drawn, legend, shown};
 use super::plot::{Labels, Plot, Proportions};
 use super::sheet::{WIDTH, panels};
 use super::span::Span;
-use super::text::counted;
-use crate::model::{Form, TermKind};
+use crate::model::TermKind;
 use crate::plan::record::TermRecord;
 use crate::plan::{Judged, PlanRecord, Trajectory};
 use crate::rounding::as_written;
 use crate::system::Axis;
 
-/// Runs that are drawn.
-pub(super) const DRAWN: usize = 20;
 /// Plots of a figure.
 const PLOTS: usize = 16;
 /// Height of a plot.
@@ -40,38 +37,6 @@ struct Panel {
 enum Zero {
     Marked,
     Plain,
-}
-
-/// The runs that are drawn, with what they came to.
-pub(super) fn drawn<'a>(
-    page: &PlanPage<'a>,
-) -> impl Iterator<Item = (&'a Trajectory, &'a Judged)> + use<'a> {
-    page.runs.iter().zip(page.judged).take(DRAWN)
-}
-
-/// The class of a run's line.
-pub(super) fn class(judged: &Judged) -> &'static str {
-    if judged.success() { "body first" } else { "body first failed" }
-}
-
-/// How many of the runs are drawn, in words.
-pub(super) fn shown(record: &PlanRecord) -> String {
-    let runs = record.runs.len();
-    match runs <= DRAWN {
-        true => format!("{}.", counted(runs, "run", "runs")),
-        false => format!("The first {DRAWN} of {runs} runs; the others are in steps.csv."),
-    }
-}
-
-/// What lines mean.
-pub(super) fn legend(page: &PlanPage<'_>) -> Vec<(Swatch, String)> {
-    let record = page.record;
-    let deed = record.system.task.short_words(Form::Past, record.steps);
-    let good = drawn(page).any(|(_, judged)| judged.success());
-    let bad = drawn(page).any(|(_, judged)| !judged.success());
-    let good = good.then(|| (Swatch::Line("body first"), deed.to_owned()));
-    let bad = bad.then(|| (Swatch::Line("body first failed"), "failed".to_owned()));
-    good.into_iter().chain(bad).collect()
 }
 
 /// The figures in the order of the page.

@@ -2,8 +2,7 @@
 
 use super::contour::Field;
 use super::figure::{Figure, Swatch, cross, dot};
-use super::plan::PlanPage;
-use super::plan_figures::{class, drawn, legend, shown};
+use super::plan_runs::{PlanPage, class, drawn, legend, shown};
 use super::plot::{Labels, Plot, Proportions};
 use super::span::Span;
 use super::text::ordinary;

@@ -29,7 +29,7 @@ fn models_without_costs() {
     let (before, rest) = LINE.split_once("[model.costs]").unwrap();
     let plain =
         format!("{before}{}", rest.split_once("[plan]").unwrap().1.replacen("", "[plan]", 1));
-    says(&plain, &[], &["model.costs", "stage.effort = {", "terminal.place = {"]);
+    says(&plain, &[], &["model.costs", "stage.effort = {", "\"u^2\"", "\"(x - 1)^2\""]);
     let folder = Folder::new();
     let out = folder.path("out");
     let carried = ["plan", "configs/double_integrator.toml", "--out", &out];
