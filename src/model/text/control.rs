@@ -29,8 +29,10 @@ impl Description {
     /// the network does not have, or calls a network that cannot be read or does not fit, or if the
     /// policy's network cannot be read or has another width.
     pub fn controller(&self) -> Result<Controller> {
-        let missing =
-            || self.origin.refuse("policy", "no policy; expected `file`, a network, or `formula`");
+        let missing = || {
+            self.origin
+                .refuse("policy", "missing: no policy; expected `file`, a network, or `formula`")
+        };
         match self.policy.as_ref().ok_or_else(missing)? {
             Policy::Formulas(formulas) => {
                 let networks = self.table()?;

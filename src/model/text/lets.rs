@@ -161,7 +161,10 @@ impl Lets {
         networks: &Networks,
     ) -> Vec<R> {
         let mut names = inputs.to_vec();
-        names.resize(self.first, R::lit(0.0));
+        // A recording notes every number that is made, so none is made that nobody needs.
+        if names.len() < self.first {
+            names.resize(self.first, R::lit(0.0));
+        }
         names.resize(self.first + self.formulas.len(), inputs[0]);
         for &i in self.order.iter().filter(|i| needed[**i]) {
             let values = Values { names: &names, outputs: &[], looked: &[], networks };
