@@ -52,7 +52,8 @@
 //! # Ok::<(), reachcast::Error>(())
 //! ```
 //!
-//! Plans for a model that is given as text take a cost as data: [`model::StageCost::new`] has an example.
+//! Plans for a model that is given as text take a cost as data: [`model::StageCost::new`] has an example. Costs
+//! may be text, too: [`model::Costs`].
 //!
 //! # A plant in Rust
 //!
@@ -210,6 +211,8 @@ pub mod error;
 pub mod files;
 pub mod formula;
 pub mod model;
+#[cfg(feature = "cli")]
+pub mod plan;
 pub mod policy;
 pub mod race;
 pub mod real;

@@ -18,7 +18,7 @@ use reachcast::rollout::{
 };
 use reachcast::scenario::sampling;
 use reachcast::train::settings::Method;
-use reachcast::train::soft::measure_tape;
+use reachcast::train::soft::{Measured, measure_tape};
 use reachcast::tube::Tube;
 
 /// Steps, substeps of each, seconds of a step, discount.
@@ -562,7 +562,8 @@ fn the_softened_measure_tends_to_that_of_the_task() {
     let (spec, losses, temperature) = (spec(), losses(), 1e-4);
     for case in cases() {
         let (plant, mut compared) = (case.plant(), 0);
-        let tape = measure_tape(&plant.model, &spec, Some(&losses));
+        let (spec, tightening, unit) = (&spec, Some(&losses), None);
+        let tape = measure_tape(&plant.model, Measured { spec, tightening, unit });
         for i in 0..100 {
             let states = fine(&starts().start(i));
             let wanted = case.wanted(&states, &losses);

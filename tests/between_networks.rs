@@ -48,7 +48,9 @@ target = "0.3 - abs(angle) - 0.5 * abs(rate)"
 constraint = "1.2 - abs(angle) - 0.1 * sin(5 * t)"
 "#
     );
-    text::read(&text, "pendulum.toml", Path::new(".")).and_then(|text| text.model()).expect("a model")
+    text::read(&text, "pendulum.toml", Path::new("."))
+        .and_then(|text| text.model())
+        .expect("a model")
 }
 
 /// The pendulum under a network that sees its states, and the time if `clock` says so.
@@ -106,8 +108,7 @@ fn networks_drive_points_as_in_f64() {
             let program = backend.prepare(&plant).expect("prepared");
             let all = |query| {
                 let (starts, tightening) = (pairs().nominal, &none);
-                let task =
-                    ReachAvoidTask { starts, range: 0..STARTS, spec, tightening, query };
+                let task = ReachAvoidTask { starts, range: 0..STARTS, spec, tightening, query };
                 let tally = program.tally(&task, Keep::Measures).expect("run");
                 tally.finish(0..STARTS).expect("all").values
             };
@@ -189,7 +190,9 @@ fn plans_of_a_model_with_points_are_those_of_its_whole_step() {
         Planning {
             model: Arc::new(model),
             cost: Arc::new(StageCost::new(stage, 0, None)),
-            spec: Arc::new(MppiSpec::new(MppiSettings { temperature: 0.1, ..settings }).expect("settings")),
+            spec: Arc::new(
+                MppiSpec::new(MppiSettings { temperature: 0.1, ..settings }).expect("settings"),
+            ),
             value: None,
             disturbance: None,
         }

@@ -27,6 +27,7 @@ const LAYERS: [(&str, u32); 29] = [
     ("backend", 4),
     ("scenario", 5),
     ("control", 5),
+    ("plan", 6),
     ("race", 8),
     ("race::system", 2),
     ("race::cost", 2),

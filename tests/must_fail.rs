@@ -4,6 +4,8 @@
 //! reference to see it; the comparison itself passes on the kernels as they are.
 
 mod common;
+#[path = "oracle/costs.rs"]
+mod costs;
 #[path = "oracle/drive.rs"]
 mod drive;
 #[path = "oracle/functions.rs"]
@@ -341,6 +343,11 @@ fn map_parity(gpu: Gpu) -> bool {
     drive::disagreement(&Backend::Gpu(gpu), &common::cpu(1)).is_ok()
 }
 
+/// Whether the adapter agrees with f64 on costs with an end, references and maps inside formulas.
+fn costs_parity(gpu: Gpu) -> bool {
+    costs::disagreement(&Backend::Gpu(gpu), 9).is_ok()
+}
+
 /// What marks the outputs of a formula, and the same without it.
 const MARK: [&str; 2] =
     ["select(bitcast<u32>(x), 0x7fc00000u, lost)", "select(bitcast<u32>(x), 0x7fc00000u, false)"];
@@ -428,6 +435,9 @@ fn kernels_as_they_are_agree() {
     }
     if let Some(gpu) = adapter() {
         assert!(map_parity(gpu));
+    }
+    if let Some(gpu) = adapter() {
+        assert!(costs_parity(gpu));
     }
 }
 
@@ -543,6 +553,20 @@ mutants! {
     beyond_the_last_row_as_in_it: "= 10.0f;" => "= 9.0f;";
     map_of_the_next_state: "total = charge(total, x, u, stage, nominal, first_step + t);" => "total = charge(total, advance(x, u, first_step + t), u, stage, nominal, first_step + t);";
     contexts_of_the_stage_before: "context_at(stage)" => "context_at(max(stage, 1u) - 1u)";
+}
+
+mutants! {
+    costs_parity:
+    end_charged_twice: "totals[column] += terminal_of(" => "totals[column] += 2.0 * terminal_of(";
+    end_not_charged: "totals[column] += terminal_of(" => "totals[column] += 0.0 * terminal_of(";
+    end_of_the_first_step: "streams[problem].w + params.horizon" => "streams[problem].w";
+    end_a_step_late: "streams[problem].w + params.horizon" => "streams[problem].w + params.horizon + 1u";
+    end_told_the_last_stage: "stages + problem, t" => "(problem + 1u) * params.horizon - 1u, t";
+    end_told_of_another_problem: "stages + problem, t" => "stages, t";
+    end_of_a_neighbour: "load_state(column), stages" => "load_state(column ^ 1u), stages";
+    stage_told_the_next_one: "context_at(stage)" => "context_at(stage + 1u)";
+    asked_the_first_map: "cells[first + " => "cells[";
+    asked_the_next_cell: "min(u32(cell), count - 1u)" => "min(u32(cell) + 1u, count - 1u)";
 }
 
 /// A mutant of what is printed of one function.

@@ -1,5 +1,8 @@
 //! Without a GPU: every composed kernel is valid WGSL and agrees with the Rust side.
 
+#[path = "oracle/costs.rs"]
+#[allow(dead_code, reason = "the texts alone are looked at")]
+mod costs;
 mod drivers;
 mod learned;
 mod models;
@@ -16,7 +19,7 @@ use reachcast::backend::gpu::compose::{
 };
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, Quadratic};
 use reachcast::formula::{Expr, Scalar as _, record};
-use reachcast::model::{Controller, Law, Model};
+use reachcast::model::{Controller, Law, Lookups, MapCost, Model, StageCost, TerminalCost};
 use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
 use reachcast::race::{Cone, DroneRace, Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::real::Real;
@@ -249,7 +252,23 @@ fn mppi_texts() -> Vec<(String, MppiText)> {
     mppi_texts_of(&DroneRace::default(), &cost, &mut all);
     let goal = GoalCost { distance: 1.0, angle: 1.0, map: map(&[0.0; 6]) };
     mppi_texts_of(&DiffDrive::default(), &goal, &mut all);
+    all.push(("skiff, costs of a text".to_owned(), MppiText::new(&costs::skiff(9).0)));
+    all.push(("skiff, a map besides".to_owned(), MppiText::new(&with_map(costs::skiff(9).0))));
     all
+}
+
+/// The same where a map charges besides, and stage and end ask one other map each.
+fn with_map(planning: Planning) -> Planning {
+    let (inputs, contexts) = (planning.model.inputs(), planning.cost.contexts);
+    let (charged, asked) = (map(&[0.0; 6]), Arc::new(map(&[1.0; 6])));
+    let cell = |map: &CostMap, inputs| record(inputs, |x| vec![map.cell([x[0], x[1]])]);
+    let places = Lookups { cells: cell(&asked, inputs + contexts), maps: vec![asked] };
+    let charge = MapCost { cell: cell(&charged, inputs), map: Arc::new(charged) };
+    let formula = record(inputs + contexts + 1, |x| vec![x[0] * x[inputs + contexts]]);
+    let terminal = TerminalCost { formula: formula.clone(), lookups: Some(places.clone()) };
+    let cost = StageCost::new(formula, contexts, Some(charge)).with_lookups(Some(places));
+    let cost = cost.with_terminal(Some(terminal));
+    Planning { cost: Arc::new(cost), ..planning }
 }
 
 fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInfo)) {
@@ -265,7 +284,7 @@ fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInf
         }
     }
     for (plant, text) in mppi_texts() {
-        for kernel in Kernel::MPPI {
+        for kernel in text.kernels() {
             let name = format!("{kernel:?} of {plant}");
             let (module, info) = validated(&name, &text.compose(kernel));
             let bindings = text.bindings(kernel);
@@ -522,7 +541,8 @@ fn a_map_is_not_part_of_the_text() {
     assert_eq!(text(&[0.0; 6]), text(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
     for (name, text) in mppi_texts() {
         let rollout = text.compose(Kernel::MppiRollout);
-        assert_eq!(rollout.contains("cell_at"), name.starts_with("diff-drive"), "{name}");
+        let has = name.starts_with("diff-drive") || name.ends_with("a map besides");
+        assert_eq!(rollout.contains("cell_at"), has, "{name}");
     }
 }
 

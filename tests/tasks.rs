@@ -17,7 +17,7 @@ use reachcast::rollout::{
     RolloutSpec, Starts, Stream, Tightening,
 };
 use reachcast::train::settings::Method;
-use reachcast::train::soft::measure_tape;
+use reachcast::train::soft::{Measured, measure_tape};
 use reachcast::tube::Tube;
 
 /// Steps.
@@ -407,7 +407,10 @@ fn the_softened_measure_tends_to_that_of_the_task() {
     let (spec, losses, temperature) = (spec(), losses(), 1e-4);
     for case in cases() {
         let (plant, mut compared) = (case.plant(), 0);
-        let tape = measure_tape(&plant.model, &spec, Some(&losses));
+        let tape = measure_tape(
+            &plant.model,
+            Measured { spec: &spec, tightening: Some(&losses), unit: None },
+        );
         for i in 0..200 {
             let states = states::<f64>(&plant, &starts().start(i), HORIZON);
             let wanted = of_states(case.task, &states, &losses);

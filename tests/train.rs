@@ -15,7 +15,7 @@ use reachcast::backend::Backend;
 use reachcast::bench;
 use reachcast::config::Config;
 use reachcast::formula::{Graph, Node, record};
-use reachcast::model::{Model, Plant};
+use reachcast::model::{Interface, Model, Plant};
 use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
@@ -607,7 +607,10 @@ fn a_layer_is_burns_own_operations() {
 /// A control beyond its bounds moves nothing.
 #[test]
 fn the_clip_of_a_control_stops_its_slope() {
-    let tape = reachcast::train::soft::step_tape(&Model::of(DoubleIntegrator::default()));
+    let tape = {
+        let model = Model::of(DoubleIntegrator::default());
+        reachcast::train::soft::step_tape(&model, &Interface::plain(&model))
+    };
     for (u, slope) in [(0.5_f64, f64::from(0.1_f32)), (1.5, 0.0), (-1.5, 0.0)] {
         let (mut values, mut adjoints, mut slopes) = (Vec::new(), Vec::new(), [f64::lit(0.0); 4]);
         tape.forward(&[0.3, -0.2, u, 0.0], 1.0, &mut values);

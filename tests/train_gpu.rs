@@ -15,7 +15,7 @@ use command::{Folder, document, refused};
 use common::{adapter, cpu};
 use reachcast::backend::Backend;
 use reachcast::bench;
-use reachcast::model::Plant;
+use reachcast::model::{Model, Plant};
 use reachcast::policy::{Activation, OutputActivation};
 use reachcast::race::DroneRace;
 use reachcast::rollout::Stream;
@@ -287,7 +287,7 @@ fn the_players_of_a_game_are_updated_as_on_the_cpu() {
     let config = config("double-integrator", "analytic", &set);
     agree(|device| {
         let game = Game {
-            entries: config.disturbed(&system.states()).unwrap(),
+            contest: config.contest(&Model::of(system.clone())).unwrap(),
             states: intervals(&system),
             hidden: vec![32, 32],
         };
@@ -310,7 +310,8 @@ fn a_policy_on_a_reward_is_updated_as_on_the_cpu() {
     agree(|device| {
         let ppo = settings(&config).ppo.clone();
         let goal = config.goal(&system.states()).unwrap();
-        let reward = Reward { goal, weights: ppo.reward.clone() };
+        let reward =
+            Reward { task: reachcast::model::Task::default(), goal, weights: ppo.reward.clone() };
         let lesson = ppo::Lesson { reward, states: intervals(&system), hidden: vec![32, 32] };
         Ppo::new(task(&system, &backend, device, &config), lesson, ppo)
     });

@@ -21,9 +21,9 @@ use reachcast::scenario::record::Provenance;
 use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::backup::Margins;
+use reachcast::train::contest::{Contest, pushed};
 use reachcast::train::ddpg::{Ddpg, Game};
 use reachcast::train::device::Device;
-use reachcast::train::disturbed::{disturbed, pushed};
 use reachcast::train::environments::Environments;
 use reachcast::train::gae::{Step, advantages};
 use reachcast::train::ppo::{Lesson, Ppo};
@@ -40,7 +40,7 @@ use training::{config, intervals, settings, task};
 /// The players of the double integrator and their critic.
 fn players<'a>(system: &DoubleIntegrator, backend: &'a Backend, config: &Config) -> Ddpg<'a> {
     let game = Game {
-        entries: config.disturbed(&system.states()).unwrap(),
+        contest: config.contest(&Model::of(system.clone())).unwrap(),
         states: intervals(system),
         hidden: settings(config).hidden.clone(),
     };
@@ -52,7 +52,8 @@ fn players<'a>(system: &DoubleIntegrator, backend: &'a Backend, config: &Config)
 fn pupil<'a>(system: &DoubleIntegrator, backend: &'a Backend, config: &Config) -> Ppo<'a> {
     let TrainSettings { ppo, hidden, .. } = settings(config);
     let goal = config.goal(&system.states()).unwrap();
-    let reward = Reward { goal, weights: ppo.reward.clone() };
+    let reward =
+        Reward { task: reachcast::model::Task::default(), goal, weights: ppo.reward.clone() };
     let lesson = Lesson { reward, states: intervals(system), hidden: hidden.clone() };
     Ppo::new(task(system, backend, &Device::cpu(), config), lesson, ppo.clone())
 }
@@ -306,7 +307,8 @@ fn a_disturbed_system_is_pushed_after_its_step() {
     let network = Mlp::new(vec![layer.clone()], Activation::Relu, OutputActivation::Tanh).unwrap();
     let (system, entries) = (DroneRace::default(), [(7, 0.01_f32), (9, 0.02), (11, 0.03)]);
     let x: [f64; 12] = std::array::from_fn(|i| 0.1 * i as f64 - 0.4);
-    let model = disturbed(&Model::of(system), &network.into(), &entries);
+    let race = Model::of(system);
+    let model = Contest::pushing(&race, &entries).disturbed(&race, &network.into());
     let found = model.next(&x, &[0.3, -2.0, 0.1], 0);
     let calm = system.step(x, [0.3, -2.0, 0.1]);
     for i in 0..12 {
@@ -361,7 +363,8 @@ fn a_step_earns_progress_and_the_target() {
     let system = DroneRace::default();
     let weights = settings(&config).ppo.reward.clone();
     let (target, violation) = (weights.target as f32, weights.violation as f32);
-    let reward = Reward { goal: config.goal(&system.states()).unwrap(), weights };
+    let task = reachcast::model::Task::default();
+    let reward = Reward { task, goal: config.goal(&system.states()).unwrap(), weights };
     let earned = |before: [f32; 12], after: [f32; 12]| {
         let [before, after] = [&before, &after].map(|x| {
             let margins = Margins { target: system.target(*x), constraint: system.constraint(*x) };

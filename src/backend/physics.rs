@@ -46,8 +46,14 @@ pub(crate) enum Role {
     Act,
     /// The cost of a stage of a plan.
     Stage,
+    /// The numbers of the cells that it asks.
+    StagePlaces,
     /// The number of the cell of a map.
     Cell,
+    /// The cost of the end of a plan.
+    Terminal,
+    /// The numbers of the cells that it asks.
+    TerminalPlaces,
 }
 
 impl Role {
@@ -61,7 +67,10 @@ impl Role {
             Self::Observe => "plant_observe",
             Self::Act => "plant_act",
             Self::Stage => "stage_cost",
+            Self::StagePlaces => "stage_cells",
             Self::Cell => "map_cell",
+            Self::Terminal => "terminal_cost",
+            Self::TerminalPlaces => "terminal_cells",
         }
     }
 
@@ -71,7 +80,7 @@ impl Role {
             Part::State => true,
             Part::Control => matches!(self, Self::Step | Self::Stage),
             Part::Said => self == Self::Act,
-            Part::Parameters | Part::Seconds | Part::Step | Part::Context => false,
+            Part::Parameters | Part::Seconds | Part::Step | Part::Context | Part::Looked => false,
         }
     }
 }
@@ -93,11 +102,13 @@ pub(crate) enum Part {
     Said,
     /// What the cost of a stage wants to know.
     Context,
+    /// What the maps say that it asks.
+    Looked,
 }
 
 impl Part {
-    /// In the order of the inputs; whoever has the last two has one of them alone.
-    const ALL: [Self; 7] = [
+    /// In the order of the inputs; whoever is told by a network has no context.
+    const ALL: [Self; 8] = [
         Self::State,
         Self::Control,
         Self::Parameters,
@@ -105,6 +116,7 @@ impl Part {
         Self::Step,
         Self::Said,
         Self::Context,
+        Self::Looked,
     ];
 
     /// Name of the argument.
@@ -117,6 +129,7 @@ impl Part {
             Self::Step => "number",
             Self::Said => "said",
             Self::Context => "context",
+            Self::Looked => "looked",
         }
     }
 }
@@ -135,17 +148,17 @@ pub(crate) struct Function {
 
 impl Function {
     /// Prints `graph`, a formula of `model`; behind the inputs of the model it takes as many numbers
-    /// of a network and of context as `more` says.
-    pub(crate) fn of(model: &Model, role: Role, graph: &Graph, more: [usize; 2]) -> Self {
+    /// of a network, of context and of maps as `more` says.
+    pub(crate) fn of(model: &Model, role: Role, graph: &Graph, more: [usize; 3]) -> Self {
         let (states, controls) = (model.states.len(), model.controls.len());
-        let [said, context] = more;
-        let lengths = [states, controls, model.parameters.len(), 1, 1, said, context];
+        let [said, context, looked] = more;
+        let lengths = [states, controls, model.parameters.len(), 1, 1, said, context, looked];
         Self::new(role, graph, lengths)
     }
 
     /// Prints `graph`, whose inputs are `lengths` of each part: what it does not read is no
     /// argument, so that nobody pays for it.
-    fn new(role: Role, graph: &Graph, lengths: [usize; 7]) -> Self {
+    fn new(role: Role, graph: &Graph, lengths: [usize; 8]) -> Self {
         let mut read = vec![false; graph.inputs];
         for node in &graph.nodes {
             if let Node::Input(input) = node {
@@ -210,7 +223,7 @@ impl Physics {
                 graphs.extend(act.iter().map(|graph| (Role::Act, graph)));
             }
         }
-        let print = |(role, graph): (Role, &Graph)| Function::of(model, role, graph, [said, 0]);
+        let print = |(role, graph): (Role, &Graph)| Function::of(model, role, graph, [said, 0, 0]);
         Self { functions: graphs.into_iter().map(print).collect() }
     }
 

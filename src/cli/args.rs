@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 
 use super::effort::USUAL;
 use super::falsify::FalsifyArguments;
+use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::config::Registry;
 use crate::files::Existing;
@@ -35,12 +36,14 @@ impl Arguments {
 /// Shown after the help of the program.
 const EXAMPLES: &str = "\
 Examples:
+  reachcast init plant.toml
   reachcast certify configs/race.toml
   reachcast certify configs/race.toml --profile study --set growth.rounds=10 --out study
   reachcast rollout configs/race.toml --starts configs/race_starts_500.csv --measures measures.npy
   reachcast query reachcast-out --states configs/race_starts_500.csv
   reachcast check reachcast-out
   reachcast falsify configs/models/dubins.toml
+  reachcast plan configs/models/double_integrator.toml
   reachcast race configs/race.toml
   reachcast sweep configs/race.toml --samples 64,256,1024 --horizon 10,20
   reachcast train configs/train/race.toml
@@ -57,6 +60,9 @@ Exit codes:
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    /// Write a starting configuration with comments: a plant as text, to be changed
+    #[command(after_help = format!("Plants to start from:\n{}\nExample:\n  reachcast init car.toml --from dubins", init::names()))]
+    Init(InitArguments),
     /// Certify a policy: deviation bound, certified set, and a locally grown ball
     ///
     /// Writes certificate.json, deviation.csv (step, bound, largest, exact), slice.npy (f32,
@@ -165,6 +171,28 @@ Examples:
   reachcast falsify configs/race.toml --radius 0.1 --starts configs/race_starts_500.csv
   reachcast falsify --around reachcast-out --within ball")]
     Falsify(FalsifyArguments),
+    /// Steer a model in closed loop by sampled plans (MPPI) that cost little
+    ///
+    /// For a model as text with [model.costs]: what a plan pays at each stage and at its end. Section [plan]
+    /// says how plans are made; a run starts at [state], several start in the box. Writes plan.json, steps.csv
+    /// (a row for each step: states, controls, margins, what each term costs, effective samples,
+    /// milliseconds), trajectories.npz and report.html to the folder of --out.
+    #[command(after_help = "\
+Examples:
+  reachcast plan configs/models/double_integrator.toml
+  reachcast plan configs/models/double_integrator.toml --set plan.runs=100 --out plan100
+  reachcast plan configs/models/double_integrator.toml --set plan.samples=4096 --backend gpu --json")]
+    Plan {
+        /// Configuration (TOML)
+        config: PathBuf,
+        /// Folder of the results [default: reachcast-plan]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        replace: Replace,
+        #[command(flatten, next_help_heading = "Configuration")]
+        changes: Changes,
+    },
     #[command(flatten)]
     Study(StudyCommand),
     /// Train a policy, or a network that tells its value
@@ -241,7 +269,9 @@ impl Command {
             Self::Train { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Rollout { keys, replace, .. } => own(no_seed(keys), &None, *replace),
             Self::Query { out, replace, .. } => own(Changes::default(), out, *replace),
+            Self::Init(asked) => asked.own(),
             Self::Falsify(asked) => own(asked.changes.clone(), &asked.out, asked.replace),
+            Self::Plan { changes, out, replace, .. } => own(changes.clone(), out, *replace),
             Self::Study(asked) => asked.options(),
             Self::Policy(PolicyCommand::Import(asked)) => {
                 own(no_seed(&asked.keys), &asked.out, asked.replace)

@@ -7,9 +7,12 @@ pub(crate) mod devices;
 mod effort;
 mod falsified;
 mod falsify;
+mod init;
 pub(crate) mod inputs;
 pub(crate) mod options;
 mod output;
+mod plan;
+mod planned;
 mod policy;
 pub(crate) mod progress;
 mod replayed;
@@ -86,6 +89,8 @@ fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
             stored::check(global, folder, *fresh_seed, *effort)
         }
         Command::Falsify(asked) => falsify::run(global, asked),
+        Command::Plan { config, .. } => plan::run(global, config),
+        Command::Init(asked) => init::run(global, asked),
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),

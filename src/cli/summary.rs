@@ -12,7 +12,7 @@ epsilon: the risk asked for; beta: chance that the sample misleads; simple, exac
 bound asks for; risk: the one obtained, which N and the failures certify";
 /// What the words below the table mean.
 const WORDS: &str = "\
-tier 0: in the target, 1: certified, 2: in the set that growth verified, 3: none of these; V_check: the reach-avoid
+tier 0: in the target, 1: certified, 2: in the set that growth verified, 3: none of these; V_check: the measure
 measure with its margins tightened, certified where positive; a pair: a start with a perturbed one beside
 it, fresh where it is drawn anew; fixed shape: one number scales bounds that a pilot sample fixed";
 

@@ -84,8 +84,25 @@ pub(super) fn with_optional(defaults: &Table) -> Table {
             global.insert(key.to_owned(), Value::Float(0.0));
         }
     }
+    if let Some(Value::Table(plan)) = valid.get_mut("plan") {
+        plan.insert("sigma".to_owned(), Value::Float(0.0));
+        plan.insert("steps".to_owned(), Value::Integer(0));
+    }
+    with_states(&mut valid);
     with_tagged(&mut valid);
     valid
+}
+
+/// Adds the states to the tables of training that numbers of states may stand in, for a model as text.
+fn with_states(valid: &mut Table) {
+    let states = valid.get("box").cloned().filter(|_| valid.contains_key("model"));
+    for path in [["ddpg", "disturbance"].as_slice(), &["ppo", "reward", "goal"]] {
+        let train = valid.get_mut("train");
+        let place = path.iter().try_fold(train, |table, key| table.map(|t| t.get_mut(key)));
+        if let (Some(Some(place)), Some(states)) = (place, &states) {
+            *place = states.clone();
+        }
+    }
 }
 
 /// Adds to each table with a tag the keys that another value of the tag would bring.

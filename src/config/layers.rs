@@ -71,7 +71,7 @@ impl Layers {
             keys::check_known(&valid, set, name)?;
         }
         keys::overlay(&mut merged, given);
-        for section in ["race", "train"] {
+        for section in ["race", "train", "plan"] {
             let checked = merged.get(section).map(|keys| keys::check_finite(section, keys));
             checked.unwrap_or(Ok(())).map_err(|error| self.placed(error, origin))?;
         }

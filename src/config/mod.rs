@@ -1,5 +1,6 @@
 //! Configuration: a TOML file over the defaults of its profile, and overrides over both.
 
+mod costs;
 mod counts;
 mod deterministic;
 mod deterministic_settings;
@@ -8,9 +9,11 @@ mod drops;
 mod enclosed;
 mod keys;
 mod layers;
+mod learning;
 mod model;
 mod named_system;
 mod open;
+mod plan;
 mod plant;
 pub(crate) mod profile;
 mod registered;
@@ -108,8 +111,8 @@ impl Config {
         config.registry = overrides.registry.clone();
         config.networks = config.networks_beside(&place)?;
         config.seed = overrides.seed.unwrap_or(config.seed);
-        // What is about to be trained is not there yet.
-        let checked = config.policy.check(layers.trains());
+        // What is about to be trained is not there yet, and a model may be given before its policy.
+        let checked = config.policy.check(layers.trains() || config.model.is_some());
         config.sources = layers.sources();
         let profile = ProfileOf::of(overrides.profile, &overrides.set);
         let checked = checked.and_then(|()| unused::check(&config, &config.sources, profile));
@@ -124,20 +127,21 @@ impl Config {
     }
 
     /// The configuration as a certificate or a race stores it, every default filled in, without the
-    /// section `train`, which they do not depend on.
+    /// sections `train` and `plan`, which they do not depend on.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_json(&self) -> Result<serde_json::Value> {
-        stored(Self { train: None, ..self.clone() })
+        stored(Self { train: None, plan: None, ..self.clone() })
     }
 
-    /// The configuration as training stores it, every default filled in, without the section `race`.
+    /// The configuration as training stores it, every default filled in, without the sections `race` and
+    /// `plan`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a value has no JSON form.
     pub fn to_train_json(&self) -> Result<serde_json::Value> {
-        stored(Self { study: None, ..self.clone() })
+        stored(Self { study: None, plan: None, ..self.clone() })
     }
 
     /// The configuration that a certificate stores, of a plant that is carried or given as text.

@@ -103,17 +103,19 @@ impl Config {
     }
 
     /// The description in the sections `model` and `policy`.
-    fn description(
+    pub(super) fn description(
         &self,
         model: &Table,
         policy: &PolicySection,
         origin: &Origin,
     ) -> Result<Description> {
         let refused = |e: toml::ser::Error| Error::invalid("policy", e.to_string());
-        let table = Table::from_iter([
-            ("model".to_owned(), Value::Table(model.clone())),
-            ("policy".to_owned(), Value::Table(Table::try_from(policy).map_err(refused)?)),
-        ]);
+        let mut table = Table::from_iter([("model".to_owned(), Value::Table(model.clone()))]);
+        // Plans and training do without a policy.
+        if *policy != PolicySection::default() {
+            let policy = Table::try_from(policy).map_err(refused)?;
+            table.insert("policy".to_owned(), Value::Table(policy));
+        }
         read_table(&table, origin)
     }
 

@@ -46,7 +46,11 @@ impl Config {
     /// Those of [`PolicySource::read`], of a model with the key that names the file, as
     /// [`Error::Invalid`]; [`Error::Invalid`] without file and formula.
     pub fn policy_source(&self, folder: &Path) -> Result<PolicySource> {
-        let missing = || self.placed(Error::invalid("policy", "neither `file` nor `formula`"));
+        let missing = || {
+            let problem = "no policy; give `file`, a safetensors file, or `formula`; `reachcast train` \
+                           makes the file";
+            self.placed(Error::invalid("policy", problem))
+        };
         match (&self.policy.file, &self.policy.formula) {
             (Some(file), _) => PolicySource::read(folder.join(file)).map_err(|e| self.of_key(e)),
             (None, Some(FormulaSection::Name(name))) => Ok(PolicySource::Formula(name.clone())),
@@ -87,7 +91,7 @@ impl Config {
                 None => self.built_in()?.under_formula(name),
             },
             PolicySource::Network { path, network, .. } => {
-                let model = self.carried_model()?;
+                let model = self.plain_model()?;
                 let controller = Controller::network_of(&model, network.clone());
                 let controller = controller.map_err(|problem| Error::file(path, problem))?;
                 Ok(Plant::new(model, controller))
@@ -106,11 +110,14 @@ impl Config {
         }
     }
 
-    /// The model of a system that the program carries or registers, its parameters checked.
+    /// The model by itself, its parameters checked.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a parameter out of range, and for a model that is given as text.
-    pub fn carried_model(&self) -> Result<Model> {
+    /// [`Error::Invalid`] for a parameter out of range, and those of a description.
+    pub fn plain_model(&self) -> Result<Model> {
+        if let Some(model) = self.described_model() {
+            return model.map_err(|error| self.placed(error));
+        }
         match self.registered()? {
             Some(plant) => Ok(Model::clone(plant.model())),
             None => self.built_in().map(|system| system.model()),
@@ -121,7 +128,7 @@ impl Config {
     pub(crate) fn built_in(&self) -> Result<BuiltIn> {
         let carried = || {
             let problem = "works for the systems that the program carries, not yet for a model; \
-                           `certify`, `rollout`, `query` and `check` do, and `sweep --of certificate`";
+                           `certify`, `rollout`, `train`, `query` and `check` do, and `sweep --of certificate`";
             Error::invalid("this command", problem)
         };
         match &self.system {

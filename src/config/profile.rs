@@ -2,6 +2,7 @@
 
 use super::deterministic::DeterministicSection;
 use super::drops::{self, CalibrationSection, DropsSection, TighteningSource};
+use super::learning;
 use super::named_system::NamedSystem;
 use super::registry::Registry;
 use super::section::{
@@ -12,6 +13,7 @@ use super::sequential::SequentialSection;
 use super::sources::Sources;
 use super::train;
 use super::value::{Constant, Coordinates, Named};
+use crate::plan::PlanSettings;
 use crate::rollout::PairControl;
 use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::decimal;
@@ -62,6 +64,7 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     let mut config = common(profile, None, states, &state, SliceSection { x, y });
     config.deviation.radius = narrowest / 50.0;
     config.growth.radius = narrowest / 4.0;
+    config.train = Some(learning::described());
     config
 }
 
@@ -145,6 +148,7 @@ pub(crate) fn common(
         study: None,
         train: None,
         registry: Registry::default(),
+        plan: Some(PlanSettings::default()),
         sources: Sources::default(),
     }
 }

@@ -11,6 +11,7 @@ use super::sources::Sources;
 use super::value::{Constant, Coordinates, Named};
 use crate::error::{Error, Result};
 use crate::model::text::NetworkFile;
+use crate::plan::PlanSettings;
 use crate::rollout::PairControl;
 use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
 use crate::scenario::record::Assumption;
@@ -83,6 +84,9 @@ pub struct Config {
     /// Plants that `system` may name beside the carried ones; no part of what is stored.
     #[serde(skip)]
     pub(super) registry: Registry,
+    /// Plans in closed loop; what a certificate, a race or a training stores of its configuration has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanSettings>,
     /// Where the values were written; nowhere for a configuration that was stored.
     #[serde(skip)]
     pub(super) sources: Sources,

@@ -275,7 +275,7 @@ pub(super) fn state_index(place: &str, name: &str, axes: &[Axis]) -> Result<usiz
 }
 
 /// The values of all states in order, each checked with its key.
-fn in_order<T: Copy, U>(
+pub(super) fn in_order<T: Copy, U>(
     section: &str,
     values: &Named<T>,
     axes: &[Axis],

@@ -11,7 +11,7 @@ pub(super) type Layer = (String, Table);
 /// What errors about a described plant call the configuration where its text is not at hand.
 pub(super) const UNNAMED: &str = "configuration";
 /// Sections and keys that a configuration begins with.
-const SECTIONS: [&str; 20] = [
+const SECTIONS: [&str; 21] = [
     "profile",
     "seed",
     "attempt",
@@ -32,6 +32,7 @@ const SECTIONS: [&str; 20] = [
     "sequential",
     "race",
     "train",
+    "plan",
 ];
 
 /// The file and the settings over it; neither for a configuration that was stored.

@@ -287,7 +287,7 @@ fn stored_configurations_are_read_back() {
             let set = format!("profile={profile}");
             let config = load(text, &[&set]).unwrap();
             let json = config.to_json().unwrap();
-            let stored = Config { train: None, ..config };
+            let stored = Config { train: None, plan: None, ..config };
             assert_eq!(Config::from_json(&json).unwrap(), stored);
             let mut damaged = json.clone();
             damaged["rollout"]["pace"] = 1.into();

@@ -43,6 +43,9 @@ pub(crate) fn common(hidden: Vec<usize>) -> TrainSettings {
             scale: 2.0,
             slope: 0.05,
             certified: 0.5,
+            unit: None,
+            stepwise: None,
+            gamma: None,
             optimiser,
         },
         value: ValueSettings {
@@ -142,7 +145,7 @@ impl Config {
         Ok(Mixture { parts: parts.collect::<Result<_>>()? })
     }
 
-    /// The coordinates that a disturbance acts on in training, in order, with its scales.
+    /// The coordinates that a disturbance pushes in training, in order, with its scales.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the key of no state, and those of [`Self::train_settings`].

@@ -95,6 +95,12 @@ impl CostMap {
         row * R::lit((self.grid.size[0] + 2) as f32) + self.grid.cell_along(0, x)
     }
 
+    /// The cost of the cell of this number; NaN for one that is no number.
+    pub fn at_cell(&self, cell: f32) -> f32 {
+        let last = self.cells.len() - 1;
+        if cell.is_nan() { cell } else { self.cells[(cell as usize).min(last)] }
+    }
+
     /// The costs of the cells, the border's included, in order of their numbers.
     pub fn cells(&self) -> &[f32] {
         &self.cells

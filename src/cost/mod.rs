@@ -19,6 +19,13 @@ pub trait Cost<const NX: usize, const NU: usize, const NC: usize>: Sync {
     /// The cost of the stage; lower is better.
     fn stage<R: Real>(&self, x: [R; NX], u: [R; NU], context: [R; NC]) -> R;
 
+    /// The cost of the state after the last control of a plan, if it has one; the context is a row of its
+    /// own, behind those of the stages. Whether there is one depends on neither.
+    #[inline(always)]
+    fn terminal<R: Real>(&self, _x: [R; NX], _context: [R; NC]) -> Option<R> {
+        None
+    }
+
     /// The map that charges a stage besides, if there is one, and the point where it is looked up;
     /// only the point may depend on the state. A map is data of the kernels, not part of their
     /// text.

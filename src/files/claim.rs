@@ -20,9 +20,18 @@ struct Kind {
 }
 
 /// Every kind of results that has a folder for itself.
-const KINDS: [Kind; 5] = [
-    Kind { words: "a certificate", files: &CERTIFICATE, folder: None },
+const KINDS: [Kind; 6] = [
+    Kind {
+        words: "a certificate",
+        files: &CERTIFICATE,
+        folder: Some((COST_COPIES, &[".csv", ".npy", ".safetensors"])),
+    },
     Kind { words: "a search for failures", files: &["falsify.json"], folder: None },
+    Kind {
+        words: "plans in closed loop",
+        files: &["plan.json", "steps.csv", "trajectories.npz"],
+        folder: None,
+    },
     Kind {
         words: "races",
         files: &["results.json", "timing.json"],
@@ -58,6 +67,9 @@ pub(crate) const NETWORK_COPIES: [&str; 8] = [
     "network_7.safetensors",
     "network_8.safetensors",
 ];
+
+/// Folder of the copies of what costs of a certified model name, in the order of its text.
+pub(crate) const COST_COPIES: &str = "costs";
 
 /// Files of a certificate.
 const CERTIFICATE: [&str; 12] = {

@@ -16,6 +16,7 @@ mod made;
 mod npz;
 pub(crate) mod number;
 mod plain;
+mod sheet;
 mod states;
 #[cfg(feature = "cli")]
 mod table;
@@ -25,7 +26,9 @@ mod temporary;
 pub(crate) use archive::Archive;
 pub use array::{MeasureWriter, npy_bytes};
 #[cfg(feature = "cli")]
-pub(crate) use claim::{Claim, MANIFEST, NETWORK_COPIES, is_free, make_way, spare_results};
+pub(crate) use claim::{
+    COST_COPIES, Claim, MANIFEST, NETWORK_COPIES, is_free, make_way, spare_results,
+};
 pub use disk::check_room;
 pub use existing::Existing;
 #[cfg(feature = "cli")]
@@ -39,6 +42,7 @@ pub(crate) use plain::ARCHIVE_BYTES;
 #[cfg(feature = "gpu")]
 pub(crate) use plain::is_denied;
 pub(crate) use plain::{CONFIG_BYTES, RECORD_BYTES, open, read, read_text};
+pub use sheet::Sheet;
 pub use states::StateReader;
 #[cfg(feature = "cli")]
 pub use table::{Column, Table};

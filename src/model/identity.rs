@@ -71,6 +71,23 @@ impl Plant {
 }
 
 impl Model {
+    /// Every formula of the model as a function, its task and the values of its parameters, whoever
+    /// drives it: equal texts are equal models.
+    pub fn text(&self) -> String {
+        let formulas =
+            [("step", &self.step), ("target", &self.target), ("constraint", &self.constraint)];
+        let formulas = formulas.map(|(name, graph)| self.function(name, graph, 0));
+        let bits = |value: f32| format!("{:08x}", value.to_bits());
+        let values: Vec<String> = self.values().into_iter().map(bits).collect();
+        let period = self.period.map_or_else(|| "none".to_owned(), bits);
+        format!(
+            "{}// task {}\n// parameters {}\n// period {period}\n",
+            formulas.concat(),
+            self.task,
+            values.join(" ")
+        )
+    }
+
     /// A formula of the model as a function `name`, with `more` inputs behind the model's.
     fn function(&self, name: &str, graph: &Graph, more: usize) -> String {
         let (x, u) = (self.states.len(), self.controls.len());

@@ -2,28 +2,40 @@
 
 mod compiled;
 mod controller;
+mod costs;
 mod fit;
 mod identity;
+mod interface;
+mod lookups;
+mod picture;
 mod plant;
 mod points;
 mod recorded;
+mod reference;
 mod role;
 mod stage;
 mod task;
 mod task_words;
+mod terminal;
 pub mod text;
 
 use std::sync::Arc;
 
 pub use controller::{Controller, Law};
+pub use costs::{Costs, Term, TermKind};
+pub use interface::Interface;
+pub use lookups::Lookups;
+pub use picture::{Outline, Picture, PlacedBody, Shape, ShapeKind};
 pub use plant::Plant;
 pub use points::Moment;
 #[cfg(feature = "gpu")]
 pub(crate) use points::share;
+pub use reference::{Reference, ReferenceSource};
 pub use role::Role;
 pub use stage::{MapCost, StageCost};
 pub use task::{Task, Window};
 pub use task_words::Form;
+pub use terminal::TerminalCost;
 
 use self::compiled::CompiledForm;
 use crate::formula::Graph;
@@ -59,6 +71,8 @@ pub struct Model {
     pub constraint: Graph,
     /// The bodies that a picture shows.
     pub bodies: Vec<Body>,
+    /// What else a picture shows.
+    pub picture: Picture,
     /// The narrowest thing that the margins know of, where it is known.
     pub smallest_feature: Option<Feature>,
     /// The system as compiled, where it is written in Rust.
@@ -81,6 +95,7 @@ impl PartialEq for Model {
             && same_data
             && same_formulas
             && self.bodies == other.bodies
+            && self.picture == other.picture
     }
 }
 

@@ -111,17 +111,11 @@ impl Model {
         states
     }
 
-    /// The state a period after `x` under the control `u`, `[states]`, where each lane may be at a step of
-    /// its own.
-    pub(crate) fn next_at<R: Real>(&self, x: &[R], u: &[R], step: R) -> Vec<R> {
-        let part = |x: Vec<R>, point| self.part_at(&x, u, step, point);
-        (0..self.points).fold(x.to_vec(), part)
-    }
-
-    /// The state a part of a period after `x`, which is that of point number `point` of the period that begins
-    /// at `step`, `[states]`.
-    pub(crate) fn part_at<R: Real>(&self, x: &[R], u: &[R], step: R, point: u32) -> Vec<R> {
-        self.step.eval(&self.arguments_at(x, u, [self.elapsed_at(step, point), step]))
+    /// The inputs of the formulas at point number `point` of the period that begins at `step`, where each lane may
+    /// be at a step of its own.
+    #[cfg(feature = "cli")]
+    pub(crate) fn part_inputs<R: Real>(&self, x: &[R], u: &[R], step: R, point: u32) -> Vec<R> {
+        self.arguments_at(x, u, [self.elapsed_at(step, point), step])
     }
 
     /// Periods since the start at a point of the period that begins at `step`.

@@ -4,7 +4,7 @@ use std::array::from_fn;
 use std::sync::Arc;
 
 use super::compiled::CompiledForm;
-use super::{Model, Task};
+use super::{Model, Picture, Task};
 use crate::formula::{Expr, Graph, record_with};
 use crate::system::System;
 use crate::tile::{CompiledSystem, NativeSystem};
@@ -49,6 +49,7 @@ impl Model {
             target: record(&|x, _| vec![system.target(x)]),
             constraint: record(&|x, _| vec![system.constraint(x)]),
             bodies: system.bodies(),
+            picture: Picture::default(),
             smallest_feature: system.smallest_feature(),
             native: None,
         }

@@ -1,4 +1,4 @@
-//! What a stage of a plan costs, as data.
+//! What the stages of a plan and its end cost, as data.
 
 use std::array::from_fn;
 use std::fmt;
@@ -6,9 +6,11 @@ use std::sync::Arc;
 
 use super::Model;
 use super::compiled::CompiledForm;
+use super::lookups::{Lookups, fits};
 use super::recorded::recorded_with;
+use super::terminal::TerminalCost;
 use crate::cost::{Cost, CostMap, Lookup};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formula::{Expr, Graph};
 use crate::system::System;
 use crate::tile::{CompiledStages, NativeStages};
@@ -21,10 +23,15 @@ use crate::tile::{CompiledStages, NativeStages};
 pub struct StageCost {
     /// The cost of a stage, a single output; lower is better.
     pub stage: Graph,
-    /// Numbers that the stage wants to know besides, one row for each stage of a problem.
+    /// Numbers that the cost wants to know besides, one row for each stage of a problem, and one for its
+    /// end where that costs.
     pub contexts: usize,
+    /// The maps that the formula of a stage asks, an input for each behind the contexts.
+    pub lookups: Option<Lookups>,
     /// What a map charges besides.
     pub map: Option<MapCost>,
+    /// What the end of a plan costs.
+    pub terminal: Option<TerminalCost>,
     /// System and cost as compiled, where they are written in Rust.
     native: Option<CompiledCost>,
 }
@@ -47,12 +54,15 @@ struct CompiledCost {
 
 impl fmt::Debug for StageCost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { stage, contexts, map, native } = self;
+        let Self { stage, contexts, map, terminal, native, .. } = self;
         let cells = map.as_ref().map(|map| map.map.cells().len());
+        let terminal = terminal.as_ref().map(|terminal| terminal.formula.nodes.len());
         f.debug_struct("StageCost")
             .field("nodes", &stage.nodes.len())
             .field("contexts", contexts)
             .field("cells", &cells)
+            .field("lookups", &self.lookups.as_ref().map(|lookups| lookups.maps.len()))
+            .field("terminal", &terminal)
             .field("compiled", &native.is_some())
             .finish()
     }
@@ -116,7 +126,52 @@ impl StageCost {
     /// # Ok::<(), reachcast::Error>(())
     /// ```
     pub fn new(stage: Graph, contexts: usize, map: Option<MapCost>) -> Self {
-        Self { stage, contexts, map, native: None }
+        Self { stage, contexts, lookups: None, map, terminal: None, native: None }
+    }
+
+    /// The same whose stage asks `lookups`, if there are any.
+    #[must_use]
+    pub fn with_lookups(self, lookups: Option<Lookups>) -> Self {
+        Self { lookups, ..self }
+    }
+
+    /// The same with what the end of a plan costs, if it does.
+    #[must_use]
+    pub fn with_terminal(self, terminal: Option<TerminalCost>) -> Self {
+        Self { terminal, ..self }
+    }
+
+    /// Rows of contexts of a plan of `horizon` stages.
+    pub fn rows(&self, horizon: usize) -> usize {
+        horizon + usize::from(self.terminal.is_some())
+    }
+
+    /// The maps that it charges by and asks, each once: that which charges a stage, those that a stage
+    /// asks, those that the end asks.
+    pub fn maps(&self) -> Vec<Arc<CostMap>> {
+        let terminal = self.terminal.as_ref().and_then(|terminal| terminal.lookups.as_ref());
+        let asked = self.lookups.iter().chain(terminal).flat_map(|lookups| &lookups.maps);
+        let mut maps: Vec<Arc<CostMap>> = Vec::new();
+        for map in self.map.iter().map(|map| &map.map).chain(asked) {
+            if !maps.iter().any(|known| Arc::ptr_eq(known, map)) {
+                maps.push(Arc::clone(map));
+            }
+        }
+        maps
+    }
+
+    /// The formulas, those of cells included.
+    pub(crate) fn graphs(&self) -> impl Iterator<Item = &Graph> {
+        let terminal = self.terminal.iter().flat_map(|terminal| {
+            let cells = terminal.lookups.iter().map(|lookups| &lookups.cells);
+            cells.chain([&terminal.formula])
+        });
+        let cells = self.lookups.iter().map(|lookups| &lookups.cells);
+        [&self.stage]
+            .into_iter()
+            .chain(self.map.iter().map(|map| &map.cell))
+            .chain(cells)
+            .chain(terminal)
     }
 
     /// The cost of a stage of `system`: recorded, and compiled together with its dynamics.
@@ -146,13 +201,19 @@ impl StageCost {
                 lookup.into_iter().map(|Lookup { map, place }| map.cell(place)).collect()
             }),
         });
+        let terminal = cost.terminal([0.0_f32; NX], [0.0; NC]).map(|_| {
+            TerminalCost::new(recorded_with(&system, NC, |x, _, context| {
+                let terminal = cost.terminal::<Expr>(from_fn(|i| x[i]), from_fn(|i| context[i]));
+                terminal.into_iter().collect()
+            }))
+        });
         let model = Model::recorded(&system);
         let code: Arc<dyn NativeStages> = Arc::new(CompiledStages { system, cost });
-        let formulas: Vec<&Graph> =
-            [&model.step, &stage].into_iter().chain(map.iter().map(|map| &map.cell)).collect();
+        let whole = Self::new(stage, NC, map).with_terminal(terminal);
+        let formulas: Vec<&Graph> = [&model.step].into_iter().chain(whole.graphs()).collect();
         let stages = CompiledForm::new(code, &formulas, model.values());
-        let charged = map.as_ref().map(|map| Arc::clone(&map.map));
-        Self { stage, contexts: NC, map, native: Some(CompiledCost { stages, map: charged }) }
+        let map = whole.map.as_ref().map(|map| Arc::clone(&map.map));
+        Self { native: Some(CompiledCost { stages, map }), ..whole }
     }
 
     /// The compiled form of the stages of `model`, where its dynamics, its parameters and this cost are
@@ -162,8 +223,7 @@ impl StageCost {
         model.compiled()?;
         let CompiledCost { stages, map } = self.native.as_ref()?;
         let at = |map: Option<&Arc<CostMap>>| map.map(Arc::as_ptr);
-        let cells = self.map.iter().map(|map| &map.cell);
-        let formulas: Vec<&Graph> = [&model.step, &self.stage].into_iter().chain(cells).collect();
+        let formulas: Vec<&Graph> = [&model.step].into_iter().chain(self.graphs()).collect();
         let same = at(map.as_ref()) == at(self.map.as_ref().map(|map| &map.map));
         stages.of(&formulas, &model.values()).filter(|_| same)
     }
@@ -180,18 +240,18 @@ impl StageCost {
     /// # Errors
     /// [`Error::Invalid`] with both numbers.
     pub(crate) fn check(&self, model: &Model) -> Result<()> {
-        let cell = self.map.as_ref().map(|map| ("map", &map.cell, 0));
-        for (name, graph, more) in [("stage", &self.stage, self.contexts)].into_iter().chain(cell) {
-            let (inputs, outputs) = (model.inputs() + more, graph.outputs.len());
-            if (graph.inputs, outputs) != (inputs, 1) {
-                let has = graph.inputs;
-                let text = format!(
-                    "the {name} takes {has} inputs and gives {outputs} numbers; {inputs} and one \
-                     are needed"
-                );
-                return Err(Error::invalid("cost", text));
-            }
+        let own = model.inputs() + self.contexts;
+        let asked =
+            |lookups: &Option<Lookups>| lookups.as_ref().map_or(0, |asked| asked.maps.len());
+        fits("stage", &self.stage, [own + asked(&self.lookups), 1])?;
+        if let Some(map) = &self.map {
+            fits("map", &map.cell, [model.inputs(), 1])?;
         }
-        Ok(())
+        if let Some(terminal) = &self.terminal {
+            fits("terminal cost", &terminal.formula, [own + asked(&terminal.lookups), 1])?;
+            terminal.check(model)?;
+        }
+        let terminal = self.terminal.as_ref().and_then(|terminal| terminal.lookups.as_ref());
+        self.lookups.iter().chain(terminal).try_for_each(|lookups| lookups.check(own))
     }
 }

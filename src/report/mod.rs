@@ -1,5 +1,5 @@
 //! The reports: one self-contained HTML page made from the record of a certificate, a race study, a
-//! sweep, a run of training or a search for failures.
+//! sweep, a run of training, a search for failures or plans in closed loop.
 //!
 //! Figures are written as SVG here rather than with a plot library: `plotters` writes each colour
 //! and text size as a fixed value and its legend into the plot, so that the page could follow
@@ -15,6 +15,9 @@ mod figures;
 mod growth;
 mod html;
 pub(crate) mod palette;
+mod plan;
+mod plan_figures;
+mod plan_paths;
 pub(crate) mod plot;
 pub(crate) mod scale;
 mod sequential;
@@ -31,4 +34,5 @@ mod words;
 
 pub use falsify::{Search, falsify_html};
 pub use html::html;
+pub use plan::{PlanPage, plan_html};
 pub use train::train_html;

@@ -4,7 +4,8 @@ use super::contour::Field;
 use super::span::Span;
 use super::text::ordinary;
 use crate::rollout::HUGE;
-use crate::scenario::record::{Record, SliceAxisRecord};
+use crate::scenario::drawn_record::GroundRecord;
+use crate::scenario::record::Record;
 
 /// Where the cells of a slice lie.
 pub(super) struct Grid<'a> {
@@ -25,10 +26,25 @@ impl<'a> Grid<'a> {
         if cells == 0 || fields.iter().any(|field| field.len() != cells) {
             return None;
         }
-        let centers = [centers(&slice.x)?, centers(&slice.y)?];
-        let states = [slice.x.state, slice.y.state];
+        let centers = [centers(&slice.x.values)?, centers(&slice.y.values)?];
+        Some(Self::between(record, centers, [slice.x.state, slice.y.state]))
+    }
+
+    /// The grid of the ground of the record's picture; `None` if its arrays do not make one.
+    pub(super) fn of_ground(record: &'a Record, ground: &GroundRecord) -> Option<Self> {
+        let cells = ground.x.values.len() * ground.y.values.len();
+        let fields = [&ground.target_margin, &ground.constraint_margin];
+        if cells == 0 || fields.iter().any(|field| field.len() != cells) {
+            return None;
+        }
+        let centers = [centers(&ground.x.values)?, centers(&ground.y.values)?];
+        Some(Self::between(record, centers, [ground.x.state, ground.y.state]))
+    }
+
+    /// Cells around these middles along the axes of `states`.
+    fn between(record: &'a Record, centers: [Vec<f64>; 2], states: [usize; 2]) -> Self {
         let edges = [0, 1].map(|axis| edges(&centers[axis], lone_width(record, states[axis])));
-        Some(Self { record, centers, edges })
+        Self { record, centers, edges }
     }
 
     /// What the slice covers across and upwards.
@@ -99,8 +115,8 @@ fn neighbours(position: [usize; 2], counts: [usize; 2]) -> ([usize; 2], [usize; 
 }
 
 /// The values of an axis if they are numbers in ascending order.
-fn centers(axis: &SliceAxisRecord) -> Option<Vec<f64>> {
-    let values: Vec<f64> = axis.values.iter().map(|&value| f64::from(value)).collect();
+fn centers(values: &[f32]) -> Option<Vec<f64>> {
+    let values: Vec<f64> = values.iter().map(|&value| f64::from(value)).collect();
     let ascending = values.windows(2).all(|pair| pair[0] < pair[1]);
     (ascending && values.iter().all(|&value| ordinary(value))).then_some(values)
 }

@@ -21,16 +21,29 @@ pub fn train_html(record: &TrainRecord) -> String {
         "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{header}<main>\n\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Learning curves</h2>\n\
          <div class=\"gallery\">\n{figures}</div></section>\n\
-         <section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
+         {policy}<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <div class=\"tables\">\n{numbers}</div>\n{configuration}</section>\n\
          {adapter}</main>\n{footer}</body>\n</html>\n",
         head = shell::head("training", "", Scripts::None),
         header = header(record),
+        policy = policy(record),
         numbers = numbers(record),
         configuration = shell::configuration(provenance),
         adapter = shell::failures(&record.events),
         footer = shell::footer(provenance, "a second run on such a machine gives the same page"),
     )
+}
+
+/// How the policy is used, where it is that of a model as text.
+fn policy(record: &TrainRecord) -> String {
+    record.policy.as_ref().map_or_else(String::new, |section| {
+        format!(
+            "<section aria-labelledby=\"use\"><h2 id=\"use\">Using the policy</h2>\n\
+             <p>The configuration of the model uses it with this section, the file beside it:</p>\n\
+             <pre>{}</pre></section>\n",
+            escape(section)
+        )
+    })
 }
 
 /// The scores of the networks that were kept.

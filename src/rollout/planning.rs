@@ -55,7 +55,8 @@ pub struct MppiProblem {
     pub start: Vec<f32>,
     /// The nominal plan U, `[H, controls]`.
     pub plan: Vec<f32>,
-    /// What the cost wants to know at each stage, `[H, contexts]`.
+    /// What the cost wants to know at each stage, `[H, contexts]`; where the end of a plan costs, a
+    /// row for it behind them.
     pub context: Vec<f32>,
     /// Number of the step that the plan starts at: formulas of time count from it.
     pub first_step: u32,
@@ -259,14 +260,15 @@ impl Planning {
     /// number that is not finite.
     pub(crate) fn check_problems(&self, problems: &[MppiProblem]) -> Result<()> {
         let (horizon, states) = (self.spec.horizon(), self.model.states.len());
-        let sizes = [self.spec.controls(), self.cost.contexts];
+        let sizes =
+            [(horizon, self.spec.controls()), (self.cost.rows(horizon), self.cost.contexts)];
         for (number, problem) in problems.iter().enumerate() {
             let lengths = [("plan", &problem.plan), ("context", &problem.context)];
-            for ((name, numbers), size) in lengths.into_iter().zip(sizes) {
-                if numbers.len() != horizon * size {
+            for ((name, numbers), (rows, size)) in lengths.into_iter().zip(sizes) {
+                if numbers.len() != rows * size {
                     let has = numbers.len();
                     let text = format!(
-                        "problem {number} has {has} numbers, expected {horizon} steps of {size}"
+                        "problem {number} has {has} numbers, expected {rows} steps of {size}"
                     );
                     return Err(Error::invalid(name, text));
                 }

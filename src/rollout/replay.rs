@@ -134,7 +134,7 @@ pub fn pair_margins(
 }
 
 /// The margins at each of `states`, the looks of a rollout of `horizon` steps.
-fn margins<'a>(
+pub(crate) fn margins<'a>(
     model: &Model,
     horizon: u32,
     states: impl Iterator<Item = &'a [f64]>,

@@ -74,7 +74,10 @@ fn different(one: &Planning, other: &Planning) -> Option<&'static str> {
         models[0].period != models[1].period,
     ];
     let costs = [&one.cost, &other.cost];
-    let cost = costs[0].stage != costs[1].stage || costs[0].map != costs[1].map;
+    let cost = costs[0].stage != costs[1].stage
+        || costs[0].map != costs[1].map
+        || costs[0].lookups != costs[1].lookups
+        || costs[0].terminal != costs[1].terminal;
     let settings = [one.spec.settings(), other.spec.settings()];
     [
         ("model", model || period || sizes(one) != sizes(other)),

@@ -11,24 +11,20 @@ use super::growth_plan::Around;
 use super::origin::{provenance, system_record};
 use super::purpose;
 use super::record::{
-    GrowthRecord, PictureRecord, Provenance, Record, RolloutRecord, SCHEMA, StateRecord, Timing,
-    decimal, finite_margin,
+    GrowthRecord, Provenance, Record, SCHEMA, StateRecord, Timing, decimal, finite_margin,
 };
 use super::sets;
 use super::settings::Settings;
 use super::tier::tier;
 use super::tightened::{Tightened, tightened};
 use super::{
-    Context, Watch, boundary, claims, deterministic_set, deviation, global, growth, sequential,
-    whole_box,
+    Context, Watch, boundary, claims, deterministic_set, deviation, global, growth, picture,
+    sequential, whole_box,
 };
 use crate::backend::Program;
 use crate::error::Result;
-use crate::model::Plant;
-use crate::rollout::{Query, Region, States, Stream, Tightening, replay};
+use crate::rollout::{Query, Region, States};
 
-/// Rollouts drawn in the picture: the state's, and that many starts of the growth.
-const PICTURED: usize = 12;
 /// Certifies the plant: every number of the [`Record`] but the threads of its timing.
 ///
 /// `config` is stored as it is; it is what a later check starts from.
@@ -76,7 +72,7 @@ pub fn certify(
     let growth = growth::record(context, settings, center, global.band)?;
     let sequential = sequential::record(context, settings, &criterion, global.band)?;
     let state = state(context, settings, &criterion, &growth, global.band)?;
-    let picture = picture(plant, settings, &growth);
+    let picture = picture::picture(plant, settings, &growth);
     let deterministic = deterministic_set::record(context, settings)?;
     let rollouts = 2 * (settings.deviation.scenarios + deviation.pilot + global.draws)
         + whole_box.as_ref().map_or(0, |found| found.draws)
@@ -152,30 +148,4 @@ fn state(
     let tier = tier(&context.model().task, target_margin, check_margin, growth, x).number();
     let constraint_margin = decimal(finite_margin(context.model().constraint_at(x, 0)));
     Ok(StateRecord { x: x.to_vec(), tier, check_margin, target_margin, constraint_margin })
-}
-
-/// A few rollouts: the state's, then starts of the growth's last round.
-fn picture(plant: &Plant, settings: &Settings, growth: &GrowthRecord) -> PictureRecord {
-    let region = Region::Box { low: settings.low.to_vec(), high: settings.high.to_vec() };
-    let stream = Stream::new(settings.seed, purpose::PICTURE, 0);
-    let sampled = growth.samples.iter().take(PICTURED).map(|sample| sample.x.clone());
-    let mut starts: Vec<Vec<f32>> =
-        std::iter::once(settings.state.to_vec()).chain(sampled).collect();
-    let missing = (PICTURED + 1).saturating_sub(starts.len()) as u64;
-    for index in 0..missing {
-        starts.push(region.point(stream, index));
-    }
-    let none = Tightening::none(&settings.spec);
-    let rollouts = starts.into_iter().map(|start| RolloutRecord {
-        states: finite(replay::states(plant, &start, settings.spec.horizon)),
-        success: replay::measure(plant, &start, &settings.spec, &none) > 0.0,
-    });
-    PictureRecord { rollouts: rollouts.collect() }
-}
-
-/// The states before the first that is not finite, which no document holds.
-fn finite(mut states: Vec<Vec<f32>>) -> Vec<Vec<f32>> {
-    let end = states.iter().position(|x| x.iter().any(|value| !value.is_finite()));
-    states.truncate(end.unwrap_or(states.len()));
-    states
 }

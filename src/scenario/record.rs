@@ -9,6 +9,7 @@ use super::box_record::BoxRecord;
 pub use super::claim::Claim;
 pub use super::constant_record::{Assumption, ConstantRecord, ConstantsRecord, VisitedRecord};
 pub use super::deterministic_record::{DeterministicRecord, RadiiRecord};
+use super::drawn_record::DrawnRecord;
 use super::drops_record::{CalibrationRecord, DropsRecord, SequenceRecord, ShareRecord};
 pub use super::enclosed_record::EnclosedRecord;
 pub use super::growth_plan::{Around, UpwardRecord};
@@ -414,6 +415,9 @@ pub struct Spending {
 pub struct PictureRecord {
     /// Each: the states x_0..=x_T, `[T + 1, NX]`, up to one that is not finite, and whether it succeeded.
     pub rollouts: Vec<RolloutRecord>,
+    /// What else is drawn, of a model as text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drawn: Option<DrawnRecord>,
 }
 
 /// One rollout.

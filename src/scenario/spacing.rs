@@ -4,6 +4,7 @@ use super::sampling::spacing;
 use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::rollout::Ball;
+use crate::rounding::upper;
 
 /// Spacings of the largest coordinate that a radius has at least: with fewer, draws from a ball fall on
 /// a coarse grid, and are not the uniform ones that a claim speaks of.
@@ -21,18 +22,31 @@ pub(super) fn is_fine(ball: &Ball) -> bool {
     f64::from(ball.radius) >= least_radius(vary.map(|(x, _)| *x))
 }
 
-/// Refuses the radius at `key` where f32 is too coarse for it, `varies` in the box of `settings`.
-fn check_radius(key: &str, radius: f32, settings: &Settings, varies: &[bool]) -> Result<()> {
+/// Refuses the radius at `key` where f32 is too coarse for the `smallest` one that follows from it, `varies` in
+/// the box of `settings`.
+fn check_radius(
+    key: &str,
+    [radius, smallest]: [f32; 2],
+    settings: &Settings,
+    varies: &[bool],
+) -> Result<()> {
     let sides = settings.low.iter().zip(&settings.high).zip(varies);
     let vary = sides.filter(|(_, varies)| **varies);
     let least = least_radius(vary.flat_map(|((low, high), _)| [*low, *high]));
-    if f64::from(radius) >= least {
+    if f64::from(smallest) >= least {
         return Ok(());
     }
+    let what = if smallest < radius {
+        format!("of the radii up to {radius}, the first one, {smallest:.3e},")
+    } else {
+        radius.to_string()
+    };
+    let enough = upper(least * f64::from(radius) / f64::from(smallest));
     let problem = format!(
-        "{radius} is below {least:e}, {LEAST} times the distance of neighbouring f32 at the largest \
-         coordinate of the box: draws would not be uniform; take a larger radius, or coordinates relative \
-         to an origin nearby"
+        "{what} is below {}, {LEAST} times the distance of neighbouring f32 at the largest coordinate \
+         of the box: draws would not be uniform; take {enough} or more, or coordinates relative to an \
+         origin nearby",
+        upper(least)
     );
     Err(Error::invalid(key, problem))
 }
@@ -40,8 +54,10 @@ fn check_radius(key: &str, radius: f32, settings: &Settings, varies: &[bool]) ->
 /// Refuses radii that f32 is too coarse for; a perturbation moves every coordinate.
 pub(super) fn check(settings: &Settings) -> Result<()> {
     let all = vec![true; settings.low.len()];
-    check_radius("deviation.radius", settings.deviation.radius, settings, &all)?;
-    check_radius("growth.radius", settings.growth.first_radius(), settings, &settings.growth.varies)
+    let (deviation, growth) = (&settings.deviation, &settings.growth);
+    check_radius("deviation.radius", [deviation.radius; 2], settings, &all)?;
+    let radii = [growth.radius, growth.first_radius()];
+    check_radius("growth.radius", radii, settings, &growth.varies)
 }
 
 #[cfg(test)]

@@ -14,6 +14,9 @@ use crate::system::System;
 pub(crate) trait NativeStages: fmt::Debug + Send + Sync {
     /// Takes the samples through some stages.
     fn advance(&self, with: Instructions, stages: Stages<'_>);
+
+    /// Adds what the end of a plan costs, where it does, to samples that all stages were charged to.
+    fn end(&self, with: Instructions, stages: Stages<'_>);
 }
 
 /// Some stages of the samples of a tile.
@@ -35,7 +38,7 @@ pub(crate) struct Stages<'a> {
     pub(crate) first_step: u32,
     /// The nominal plan, `[H, controls]`.
     pub(crate) plan: &'a [f32],
-    /// What the cost wants to know, `[H, contexts]`.
+    /// What the cost wants to know, `[H, contexts]`, with a row behind them where the end costs.
     pub(crate) context: &'a [f32],
     /// Bounds of each control.
     pub(crate) bounds: &'a [[f32; 2]],
@@ -102,6 +105,34 @@ where
 {
     fn advance(&self, with: Instructions, stages: Stages<'_>) {
         with.call(Advance { formulas: self, stages });
+    }
+
+    fn end(&self, with: Instructions, stages: Stages<'_>) {
+        with.call(End { formulas: self, stages });
+    }
+}
+
+/// The end of all samples.
+struct End<'a, S, C, const NX: usize, const NU: usize, const NC: usize> {
+    formulas: &'a CompiledStages<S, C, NX, NU, NC>,
+    stages: Stages<'a>,
+}
+
+impl<S, C, const NX: usize, const NU: usize, const NC: usize> Formulas for End<'_, S, C, NX, NU, NC>
+where
+    C: Cost<NX, NU, NC>,
+{
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Stages { frame, total, lanes, context, .. } = self.stages;
+        let Some(context) = context.as_chunks::<NC>().0.last() else { return };
+        for at in (0..lanes).step_by(V::WIDTH) {
+            let row = |row: usize| V::load(&frame.row(row)[at..]);
+            let x: [V; NX] = std::array::from_fn(row);
+            if let Some(cost) = self.formulas.cost.terminal(x, lit(context)) {
+                (row(total) + cost).store(&mut frame.row_mut(total)[at..]);
+            }
+        }
     }
 }
 

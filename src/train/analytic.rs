@@ -5,21 +5,23 @@ use std::sync::Arc;
 use burn_tensor::Tensor;
 
 use super::adam::Adam;
-use super::device::{Device, number};
+use super::device::{self, Device};
 use super::network::{Bound, Network};
 use super::physics::apply;
 use super::purpose;
+use super::rows::Rows;
 use super::run::Learner;
-use super::score::{share, successes};
+use super::score::{mean_measure, share, successes};
 use super::settings::AnalyticSettings;
-use super::soft::{measure_tape, part_tapes};
+use super::soft::{Measured, further_tapes, measure_tape, observe_tape, step_tape};
 use super::starts::Mixture;
 use super::tape::Tape;
 use crate::backend::Backend;
-use crate::error::Result;
-use crate::model::{Model, Plant};
+use crate::error::{Error, Result};
+use crate::model::{Interface, Model, Role};
 use crate::policy::Mlp;
 use crate::rollout::{RolloutSpec, StateList, States, Tightening};
+use crate::rounding::number;
 
 /// Weights of the last layer at first, as a share of the others': no output is near saturation.
 pub const LAST: f32 = 0.1;
@@ -29,6 +31,8 @@ pub const LAST: f32 = 0.1;
 pub struct Task<'a> {
     /// The plant.
     pub model: Arc<Model>,
+    /// What stands between the policy's network and the plant.
+    pub interface: Interface,
     /// Who runs the rollouts that the policy is scored by.
     pub backend: &'a Backend,
     /// Where its tensors lie.
@@ -50,8 +54,13 @@ pub struct Task<'a> {
 pub struct Analytic<'a> {
     task: Task<'a>,
     settings: AnalyticSettings,
-    /// The parts of a step.
-    parts: Vec<Arc<Tape>>,
+    /// The first part of a step.
+    step: Arc<Tape>,
+    /// The parts behind it, where a period has several.
+    further: Vec<Arc<Tape>>,
+    observe: Option<Arc<Tape>>,
+    /// What temperature and scale are multiples of.
+    unit: f64,
     measure: Arc<Tape>,
     network: Network,
     adam: Adam,
@@ -59,9 +68,32 @@ pub struct Analytic<'a> {
 }
 
 impl Task<'_> {
-    /// Names of the states, in order.
-    pub(super) fn order(&self) -> Vec<String> {
-        self.model.states.iter().map(|axis| axis.name.clone()).collect()
+    /// Names of the inputs of the policy's network, where they are states.
+    pub(super) fn order(&self) -> Option<Vec<String>> {
+        self.interface.order(&self.model)
+    }
+
+    /// What the policy's network sees of `states`, and the states, as tensors of a row each.
+    pub(super) fn seen(&self, states: States<'_>) -> [Tensor<2>; 2] {
+        let rows = |numbers: Vec<f32>| {
+            let columns = numbers.len() / states.len();
+            self.device.tensor(numbers, [states.len(), columns])
+        };
+        let seen = Rows::new(&self.model, states.numbers()).seen(&self.interface);
+        [rows(seen), rows(states.numbers().to_vec())]
+    }
+
+    /// Refuses formulas around the network that read the time, for what is learned of states alone.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] saying so.
+    pub(super) fn check_interface(&self) -> Result<()> {
+        if self.interface.is_stationary(&self.model) {
+            return Ok(());
+        }
+        let problem = "`observe` or `act` reads the time; train with `analytic` or `ppo`, which know at \
+                       which step a state is met";
+        Err(Error::invalid("policy", problem))
     }
 
     /// Whether each of `starts` succeeds under `network`.
@@ -70,7 +102,8 @@ impl Task<'_> {
         network: impl Into<Arc<Mlp>>,
         starts: States<'_>,
     ) -> Result<Vec<bool>> {
-        successes(self.backend, &Plant::under(&self.model, network), self.spec, starts)
+        let plant = self.interface.plant(&self.model, network);
+        successes(self.backend, &plant, self.spec, starts)
     }
 }
 
@@ -78,9 +111,21 @@ impl<'a> Analytic<'a> {
     /// Trains `network` from the parameters that it has.
     pub fn new(task: Task<'a>, network: Network, settings: AnalyticSettings) -> Self {
         let held_out = task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize);
+        let unit = settings.unit.map_or(1.0, |unit| unit.number(&task.model, &held_out));
+        let measured = Measured {
+            spec: &task.spec,
+            tightening: task.tightening.as_ref(),
+            unit: stepwise(&task, &settings).map(|_| unit as f32),
+        };
         Self {
-            parts: part_tapes(&task.model).into_iter().map(Arc::new).collect(),
-            measure: Arc::new(measure_tape(&task.model, &task.spec, task.tightening.as_ref())),
+            unit,
+            step: Arc::new(step_tape(&task.model, &task.interface)),
+            further: further_tapes(&task.model, &task.interface)
+                .into_iter()
+                .map(Arc::new)
+                .collect(),
+            observe: observe_tape(&task.model, &task.interface).map(Arc::new),
+            measure: Arc::new(measure_tape(&task.model, measured)),
             adam: Adam::new(network.parameters.len()),
             network,
             held_out,
@@ -89,27 +134,46 @@ impl<'a> Analytic<'a> {
         }
     }
 
-    /// The softened measures `[starts, 1 or 2]` of rollouts under `network`: G and `V_check`.
+    /// The softened measures `[starts, 1 to 3]` of rollouts under `network`: G, `V_check` and the mean over
+    /// the steps, as far as they have a weight.
     pub fn measures(&self, network: &Bound, starts: States<'_>, temperature: f32) -> Tensor<2> {
         let (device, count) = (&self.task.device, starts.len());
         let mut x = device.tensor(starts.numbers().to_vec(), [count, starts.size()]);
         let mut states = vec![x.clone()];
         for step in 0..self.task.spec.horizon {
-            let u = network.forward(x.clone());
             let step = device.tensor(vec![step as f32; count], [count, 1]);
-            for part in &self.parts {
-                x = apply(part, temperature, [x, u.clone(), step.clone()]);
+            let seen = match &self.observe {
+                Some(observe) => apply(observe, temperature, [x.clone(), step.clone()]),
+                None => x.clone(),
+            };
+            let out = network.forward(seen);
+            let sample = x.clone();
+            x = apply(&self.step, temperature, [x, out.clone(), step.clone()]);
+            states.push(x.clone());
+            for part in &self.further {
+                x = apply(part, temperature, [x, sample.clone(), out.clone(), step.clone()]);
                 states.push(x.clone());
             }
         }
         apply(&self.measure, temperature, [Tensor::cat(states, 1)])
     }
 
-    /// Mean gain `tanh(g / scale) + slope g / scale` of the measures, the certified one weighted.
+    /// Mean gain `tanh(g / scale) + slope g / scale` of the measures, the certified one weighted, and with
+    /// it the weighted mean over the steps.
     fn gain(&self, measures: Tensor<2>) -> Tensor<1> {
+        let Some(weight) = stepwise(&self.task, &self.settings) else {
+            return self.gain_of(measures);
+        };
+        let [_, columns] = measures.dims();
+        let steps = measures.clone().narrow(1, columns - 1, 1).mean().mul_scalar(weight);
+        self.gain_of(measures.narrow(1, 0, columns - 1)) + steps
+    }
+
+    /// The same of G and `V_check` alone.
+    fn gain_of(&self, measures: Tensor<2>) -> Tensor<1> {
         let AnalyticSettings { scale, slope, certified, .. } = self.settings;
         let [rows, columns] = measures.dims();
-        let scaled = measures.div_scalar(scale);
+        let scaled = measures.div_scalar(scale * self.unit);
         let gains = scaled.clone().tanh() + scaled.mul_scalar(slope);
         let weights = [1.0, certified as f32][..columns].to_vec();
         (gains * self.task.device.tensor(weights, [1, columns])).sum().div_scalar(rows as f64)
@@ -119,13 +183,20 @@ impl<'a> Analytic<'a> {
     fn temperature(&self, iteration: u64) -> f32 {
         let AnalyticSettings { temperature: [first, last], iterations, .. } = self.settings;
         let share = iteration as f64 / (iterations.max(2) - 1) as f64;
-        (first * (last / first).powf(share)) as f32
+        (self.unit * first * (last / first).powf(share)) as f32
     }
 
     /// The policy as the engine takes it.
     pub fn policy(&self) -> Result<Mlp> {
         self.network.export(self.task.order())
     }
+}
+
+/// The weight of the mean over the steps, for a task that has to hold at every step.
+fn stepwise(task: &Task<'_>, settings: &AnalyticSettings) -> Option<f64> {
+    let roles = task.model.task.roles(task.spec.horizon);
+    let chosen = roles.iter().any(|role| role.has(Role::CHANCE));
+    settings.stepwise.filter(|weight| *weight > 0.0 && !chosen)
 }
 
 impl Learner for Analytic<'_> {
@@ -139,16 +210,29 @@ impl Learner for Analytic<'_> {
         let progress = [iteration, self.settings.iterations];
         let optimiser = &self.settings.optimiser;
         self.adam.update(&mut self.network.parameters, &gradient, optimiser, progress);
-        Ok(number(loss))
+        Ok(device::number(loss))
     }
 
     fn score_names(&self) -> Vec<String> {
-        vec!["share of held-out starts with G > 0".to_owned()]
+        let success = "share of held-out starts with G > 0".to_owned();
+        let size = format!("mean measure, in units of {} and within -1 to 1", number(self.unit));
+        std::iter::once(success).chain(self.settings.unit.map(|_| size)).collect()
     }
 
     fn scores(&self) -> Result<Vec<f64>> {
-        let found = self.task.succeeds(self.policy()?, self.held_out.view())?;
-        Ok(vec![share(found.into_iter())])
+        let (starts, policy) = (self.held_out.view(), Arc::new(self.policy()?));
+        let found = self.task.succeeds(Arc::clone(&policy), starts)?;
+        let mut scores = vec![share(found.into_iter())];
+        if self.settings.unit.is_some() {
+            let Task { model, interface, backend, spec, .. } = &self.task;
+            let plant = interface.plant(model, policy);
+            scores.push(mean_measure(backend, &plant, *spec, starts, self.unit)?);
+        }
+        Ok(scores)
+    }
+
+    fn is_better(&self, new: &[f64], old: &[f64]) -> bool {
+        new.partial_cmp(old).is_some_and(std::cmp::Ordering::is_gt)
     }
 
     fn networks(&self) -> Result<Vec<(&'static str, Mlp)>> {

@@ -7,8 +7,8 @@ use burn_tensor::Tensor;
 
 use super::agent::Agent;
 use super::analytic::{LAST, Task};
+use super::contest::Contest;
 use super::device::{floats, number};
-use super::disturbed::{disturbed, pushed};
 use super::environments::Environments;
 use super::network::{Architecture, Network};
 use super::purpose;
@@ -19,7 +19,6 @@ use super::score::{share, successes};
 use super::settings::DdpgSettings;
 use super::starts::check_stationary;
 use crate::error::Result;
-use crate::model::Plant;
 use crate::policy::{Activation, Mlp, OutputActivation};
 use crate::rollout::{RolloutSpec, StateList, States, Stream};
 
@@ -27,11 +26,11 @@ use crate::rollout::{RolloutSpec, StateList, States, Stream};
 /// long as those that are scored.
 const LONGER: u32 = 4;
 
-/// Where the disturbance acts and how far it moves a state per step, and what the networks see.
+/// What the disturbance does, and what the networks see.
 #[derive(Clone, Debug)]
 pub struct Game {
-    /// Coordinate and scale of each output of the disturbance.
-    pub entries: Vec<(usize, f32)>,
+    /// What each output of the disturbance does.
+    pub contest: Contest,
     /// Interval of each state.
     pub states: Vec<[f32; 2]>,
     /// Neurons of each hidden layer.
@@ -42,7 +41,7 @@ pub struct Game {
 #[derive(Debug)]
 pub struct Ddpg<'a> {
     task: Task<'a>,
-    entries: Vec<(usize, f32)>,
+    contest: Contest,
     settings: DdpgSettings,
     environments: Environments,
     /// Rows of state, control and disturbance: all else follows from them.
@@ -60,8 +59,9 @@ impl<'a> Ddpg<'a> {
     /// [`crate::Error::Invalid`] for a model whose formulas read the time: the backup knows none.
     pub fn new(task: Task<'a>, game: Game, settings: DdpgSettings) -> Result<Self> {
         check_stationary(&task.model)?;
-        let Game { entries, states, hidden } = game;
-        let controls = task.model.controls.len();
+        task.check_interface()?;
+        let Game { contest, states, hidden } = game;
+        let (outputs, pushes) = (task.interface.outputs, contest.names.len());
         let random = |number: u32, inputs: Vec<[f32; 2]>, outputs, output, last| {
             let (hidden, activation) = (hidden.clone(), Activation::Relu);
             let shape = Architecture { inputs, hidden, outputs, activation, output };
@@ -69,13 +69,14 @@ impl<'a> Ddpg<'a> {
             Agent::new(Network::random(shape, stream, last))
         };
         let actor =
-            |number, outputs| random(number, states.clone(), outputs, OutputActivation::Tanh, LAST);
-        let acts = vec![[-1.0, 1.0]; controls + entries.len()];
+            |number, inputs, outputs| random(number, inputs, outputs, OutputActivation::Tanh, LAST);
+        let seen = task.interface.intervals(&states);
+        let acts = vec![[-1.0, 1.0]; outputs + pushes];
         let joint = [states.clone(), acts].concat();
         let horizon = task.spec.horizon;
         Ok(Self {
-            control: actor(0, controls),
-            disturbance: actor(1, entries.len()),
+            control: actor(0, seen, outputs),
+            disturbance: actor(1, states, pushes),
             replay: Replay::new(settings.replay, joint.len()),
             critic: random(2, joint, 1, OutputActivation::Identity, 1.0),
             environments: Environments::new(
@@ -85,27 +86,25 @@ impl<'a> Ddpg<'a> {
                 settings.environments,
             ),
             held_out: task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize),
-            entries,
+            contest,
             settings,
             task,
         })
     }
 
-    /// Acts of both players at a state: controls, then disturbances.
+    /// Acts of both players at a state: outputs of the policy, then disturbances.
     fn acts(&self) -> usize {
-        self.task.model.controls.len() + self.entries.len()
+        self.task.interface.outputs + self.contest.names.len()
     }
 
     /// The states after `states` under the acts of each.
     fn next(&self, states: States<'_>, acts: &[f32]) -> Vec<f32> {
-        let controls = self.task.model.controls.len();
+        let outputs = self.task.interface.outputs;
         let acts = || acts.chunks_exact(self.acts());
-        let u: Vec<f32> = acts().flat_map(|acts| &acts[..controls]).copied().collect();
-        let mut next = Rows::new(&self.task.model, states.numbers()).next(&u);
-        for (x, acts) in next.chunks_exact_mut(states.size()).zip(acts()) {
-            pushed(x, &self.entries, &acts[controls..]);
-        }
-        next
+        let out: Vec<f32> = acts().flat_map(|acts| &acts[..outputs]).copied().collect();
+        let d: Vec<f32> = acts().flat_map(|acts| &acts[outputs..]).copied().collect();
+        let rows = Rows::new(&self.task.model, states.numbers());
+        rows.disturbed(&self.contest.step, &rows.controls(&self.task.interface, &out), &d)
     }
 
     /// One step of every plant, remembered.
@@ -130,9 +129,9 @@ impl<'a> Ddpg<'a> {
     fn tried(&self, first: u64, states: States<'_>) -> Vec<f32> {
         let size = self.acts();
         let device = &self.task.device;
-        let rows = device.tensor(states.numbers().to_vec(), [states.len(), states.size()]);
-        let [u, d] = [&self.control, &self.disturbance]
-            .map(|actor| actor.network.fixed(device).forward(rows.clone()));
+        let [seen, rows] = self.task.seen(states);
+        let u = self.control.network.fixed(device).forward(seen);
+        let d = self.disturbance.network.fixed(device).forward(rows);
         let own = floats(Tensor::cat(vec![u, d], 1).inner());
         let noise = Stream::new(self.task.seed, purpose::NOISE, 0);
         let uniform = Stream::new(self.task.seed, purpose::CONTROL, 0);
@@ -185,8 +184,9 @@ impl<'a> Ddpg<'a> {
     /// What `critic` tells of `states` under the acts of both players.
     fn told(&self, [control, disturbance, critic]: [&Network; 3], states: States<'_>) -> Vec<f32> {
         let device = &self.task.device;
-        let x = device.tensor(states.numbers().to_vec(), [states.len(), states.size()]);
-        let acts = [control, disturbance].map(|actor| actor.fixed(device).forward(x.clone()));
+        let [seen, x] = self.task.seen(states);
+        let u = control.fixed(device).forward(seen);
+        let acts = [u, disturbance.fixed(device).forward(x.clone())];
         floats(critic.fixed(device).forward(joint(&x, acts)).inner())
     }
 
@@ -209,12 +209,13 @@ impl<'a> Ddpg<'a> {
     fn play(&mut self, rows: &[f32], progress: [u64; 2]) {
         let size = self.task.model.states.len();
         let columns = size + self.acts();
-        let states = rows.chunks_exact(columns).flat_map(|row| &row[..size]).copied().collect();
+        let states: Vec<f32> =
+            rows.chunks_exact(columns).flat_map(|row| &row[..size]).copied().collect();
         let device = &self.task.device;
-        let x = device.tensor(states, [rows.len() / columns, size]);
+        let [seen, x] = self.task.seen(States::of(&states, size));
         let [control, disturbance] =
             [&self.control, &self.disturbance].map(|actor| actor.network.bind(device));
-        let acts = [&control, &disturbance].map(|actor| actor.forward(x.clone()));
+        let acts = [control.forward(seen), disturbance.forward(x.clone())];
         let worth = self.critic.network.fixed(device).forward(joint(&x, acts)).mean();
         let slopes = worth.backward();
         let rises: Vec<f32> = control.gradient(&slopes).into_iter().map(|slope| -slope).collect();
@@ -229,13 +230,16 @@ impl<'a> Ddpg<'a> {
     /// # Errors
     /// [`crate::Error::Invalid`] if a parameter is not finite.
     pub fn exported(&self) -> Result<[Mlp; 3]> {
-        let order = self.task.order();
-        let controls = self.task.model.controls.iter().map(|axis| axis.name.clone());
-        let pushes = self.entries.iter().map(|(i, _)| format!("push_{}", order[*i]));
-        let joint = order.iter().cloned().chain(controls).chain(pushes).collect();
+        let Task { model, interface, .. } = &self.task;
+        let states: Vec<String> = model.states.iter().map(|axis| axis.name.clone()).collect();
+        let outputs: Vec<String> = match &interface.act {
+            None => model.controls.iter().map(|axis| axis.name.clone()).collect(),
+            Some(_) => (0..interface.outputs).map(|number| format!("out[{number}]")).collect(),
+        };
+        let joint = [states.clone(), outputs, self.contest.names.clone()].concat();
         Ok([
-            self.control.network.export(order.clone())?,
-            self.disturbance.network.export(order)?,
+            self.control.network.export(self.task.order())?,
+            self.disturbance.network.export(states)?,
             self.critic.network.export(joint)?,
         ])
     }
@@ -265,12 +269,12 @@ impl Learner for Ddpg<'_> {
     }
 
     fn scores(&self) -> Result<Vec<f64>> {
-        let Task { model, backend, spec, .. } = &self.task;
+        let Task { model, interface, backend, spec, .. } = &self.task;
         let [policy, disturbance, _] = self.exported()?.map(Arc::new);
         let starts = self.held_out.view();
         let calm = self.task.succeeds(Arc::clone(&policy), starts)?;
-        let model = Arc::new(disturbed(model, &disturbance, &self.entries));
-        let plant = Plant::under(&model, policy);
+        let model = Arc::new(self.contest.disturbed(model, &disturbance));
+        let plant = interface.plant(&model, policy);
         let pushed = successes(backend, &plant, *spec, starts)?;
         let longer = RolloutSpec::new(LONGER * spec.horizon, spec.gamma)?;
         let ever = successes(backend, &plant, longer, starts)?;

@@ -7,11 +7,11 @@ pub mod agent;
 pub mod analytic;
 pub mod backup;
 pub mod checkpoint;
+pub mod contest;
 #[cfg(feature = "train")]
 pub mod ddpg;
 #[cfg(feature = "train")]
 pub mod device;
-pub mod disturbed;
 pub mod environments;
 pub mod gae;
 #[cfg(feature = "train")]
@@ -34,5 +34,6 @@ pub mod settings;
 pub mod soft;
 pub mod starts;
 pub mod tape;
+pub mod unit;
 #[cfg(feature = "train")]
 pub mod value;

@@ -110,11 +110,11 @@ impl Network {
         [weight, bias]
     }
 
-    /// The network for the engine, whose inputs have the names `order`.
+    /// The network for the engine, whose inputs have the names `order`, where they have names.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if a parameter is not finite.
-    pub fn export(&self, order: Vec<String>) -> Result<Mlp> {
+    pub fn export(&self, order: impl Into<Option<Vec<String>>>) -> Result<Mlp> {
         let bound = self.fixed(&Device::cpu());
         let layers = bound.layers.into_iter().map(|[weight, bias]| {
             let [inputs, outputs] = weight.dims();
@@ -122,7 +122,10 @@ impl Network {
             Layer { weight, bias: floats(bias.inner()), inputs, outputs }
         });
         let mlp = Mlp::new(layers.collect(), self.shape.activation, self.shape.output)?;
-        mlp.with_state_order(order)
+        match order.into() {
+            Some(order) => mlp.with_state_order(order),
+            None => Ok(mlp),
+        }
     }
 }
 

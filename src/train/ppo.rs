@@ -31,8 +31,8 @@ pub struct Lesson {
 
 /// A Gaussian policy and the value of its states under training.
 ///
-/// The control is normal around the network's output, which goes through tanh, with one standard
-/// deviation per control for all states; the plant clips it. What is exported is the mean.
+/// What the policy says is normal around the network's output, which goes through tanh, with one standard
+/// deviation per output for all states; the plant clips the control that comes of it. What is exported is the mean.
 #[derive(Debug)]
 pub struct Ppo<'a> {
     task: Task<'a>,
@@ -53,8 +53,10 @@ pub struct Ppo<'a> {
 struct Experience {
     /// States, row by row.
     states: Vec<f32>,
-    /// Controls as drawn, not clipped, row by row.
-    controls: Vec<f32>,
+    /// What the policy's network sees of them, row by row.
+    seen: Vec<f32>,
+    /// Outputs as drawn, not clipped, row by row.
+    outputs: Vec<f32>,
     /// Logarithms of their densities, but for a constant.
     densities: Vec<f32>,
     /// Advantages.
@@ -67,20 +69,21 @@ impl<'a> Ppo<'a> {
     /// Random networks, and plants at their starts.
     pub fn new(task: Task<'a>, lesson: Lesson, settings: PpoSettings) -> Self {
         let Lesson { reward, states, hidden } = lesson;
-        let controls = task.model.controls.len();
-        let random = |number: u32, outputs, output, last| {
-            let (inputs, hidden, activation) = (states.clone(), hidden.clone(), Activation::Relu);
+        let width = task.interface.outputs;
+        let seen = task.interface.intervals(&states);
+        let random = |number: u32, inputs, outputs, output, last| {
+            let (hidden, activation) = (hidden.clone(), Activation::Relu);
             let shape = Architecture { inputs, hidden, outputs, activation, output };
             Network::random(shape, Stream::new(task.seed, purpose::WEIGHT, number), last)
         };
-        let policy = random(0, controls, OutputActivation::Tanh, LAST);
-        let value = random(1, 1, OutputActivation::Identity, 1.0);
-        let moments = [policy.parameters.len(), controls, value.parameters.len()].map(Adam::new);
+        let policy = random(0, seen, width, OutputActivation::Tanh, LAST);
+        let value = random(1, states, 1, OutputActivation::Identity, 1.0);
+        let moments = [policy.parameters.len(), width, value.parameters.len()].map(Adam::new);
         let (horizon, count) = (task.spec.horizon, settings.environments);
         Self {
             environments: Environments::new(task.mixture.clone(), task.seed, horizon, count),
             held_out: task.mixture.draw(task.seed, purpose::HELD_OUT, 0, task.held_out as usize),
-            spread: vec![settings.spread.ln() as f32; controls],
+            spread: vec![settings.spread.ln() as f32; width],
             policy,
             value,
             moments,
@@ -142,25 +145,29 @@ impl<'a> Ppo<'a> {
         seen
     }
 
-    /// One step of all plants, number `number`: draws their controls, notes them, and returns the
+    /// One step of all plants, number `number`: draws what the policy says, notes it, and returns the
     /// next states.
     fn step(&self, number: u64, [states, ages]: [&[f32]; 2], seen: &mut Experience) -> Vec<f32> {
         let (device, model) = (&self.task.device, &self.task.model);
-        let (count, width) = (ages.len(), model.controls.len());
-        let rows = device.tensor(states.to_vec(), [count, model.states.len()]);
-        let means = floats(self.policy.fixed(device).forward(rows).inner());
+        let (count, width) = (ages.len(), self.spread.len());
+        let rows = Rows { steps: ages, ..Rows::new(model, states) };
+        let observed = rows.seen(&self.task.interface);
+        let columns = observed.len() / count;
+        let inputs = device.tensor(observed.clone(), [count, columns]);
+        let means = floats(self.policy.fixed(device).forward(inputs).inner());
         let noise = Stream::new(self.task.seed, purpose::NOISE, 0);
         let first = number * count as u64;
-        let mut controls = Vec::with_capacity(count * width);
+        let mut outputs = Vec::with_capacity(count * width);
         for (i, mean) in means.chunks_exact(width).enumerate() {
             let z = noise.normals(first + i as u64, width);
-            controls.extend((0..width).map(|j| mean[j] + self.spread[j].exp() * z[j]));
+            outputs.extend((0..width).map(|j| mean[j] + self.spread[j].exp() * z[j]));
             let density = z.iter().zip(&self.spread).map(|(z, spread)| -0.5 * z * z - spread);
             seen.densities.push(density.sum());
         }
-        let next = Rows { steps: ages, ..Rows::new(model, states) }.next(&controls);
+        let next = rows.next(&rows.controls(&self.task.interface, &outputs));
         seen.states.extend_from_slice(states);
-        seen.controls.extend(controls);
+        seen.seen.extend(observed);
+        seen.outputs.extend(outputs);
         next
     }
 
@@ -185,11 +192,12 @@ impl<'a> Ppo<'a> {
             let row = |&i: &usize| from[i * columns..(i + 1) * columns].iter().copied();
             device.tensor(chosen.iter().flat_map(row).collect(), [rows, columns])
         };
-        let controls = self.spread.len();
+        let width = self.spread.len();
         let states = take(&seen.states, self.task.model.states.len());
+        let observed = take(&seen.seen, seen.seen.len() / seen.returns.len());
         let (policy, value) = (self.policy.bind(device), self.value.bind(device));
-        let spread = device.tensor(self.spread.clone(), [1, controls]).require_grad();
-        let apart = take(&seen.controls, controls) - policy.forward(states.clone());
+        let spread = device.tensor(self.spread.clone(), [1, width]).require_grad();
+        let apart = take(&seen.outputs, width) - policy.forward(observed);
         let density = density(apart, &spread);
         let ratio = (density - take(&seen.densities, 1)).exp();
         let gain = clipped(ratio, scaled(take(&seen.advantages, 1)), self.settings.clip);
@@ -197,7 +205,7 @@ impl<'a> Ppo<'a> {
         let missed = value.forward(states) - take(&seen.returns, 1);
         let loss = (missed.clone() * missed).mean().mul_scalar(0.5) - gain - entropy;
         let slopes = loss.backward();
-        let spreads = spread.grad(&slopes).map_or(vec![0.0; controls], floats);
+        let spreads = spread.grad(&slopes).map_or(vec![0.0; width], floats);
         let gradients = [policy.gradient(&slopes), spreads, value.gradient(&slopes)];
         let parameters =
             [&mut self.policy.parameters, &mut self.spread, &mut self.value.parameters];

@@ -30,6 +30,9 @@ pub struct TrainRecord {
     pub curve: Vec<CurvePoint>,
     /// The networks.
     pub networks: Vec<NetworkRecord>,
+    /// The section of a model as text that uses the policy, in TOML; none for other plants and networks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<String>,
     /// What failed on the adapter and was worked around.
     #[serde(default)]
     pub events: Vec<Event>,

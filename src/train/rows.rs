@@ -5,7 +5,7 @@ use std::array::from_fn;
 
 use super::backup::Margins;
 use crate::formula::Graph;
-use crate::model::Model;
+use crate::model::{Interface, Model};
 use crate::real::Lanes;
 use crate::rollout::States;
 
@@ -31,36 +31,52 @@ impl<'a> Rows<'a> {
 
     /// The next states under `controls`, row by row like them.
     pub fn next(&self, controls: &[f32]) -> Vec<f32> {
-        self.each(self.model.states.len(), controls, |x, u, step| self.model.next_at(x, u, step))
+        self.each(&self.model.sampled().step, controls, &[])
+    }
+
+    /// The next states by `step`, of the inputs of the model and the numbers of a disturbance, under
+    /// `controls` and `disturbances`.
+    pub fn disturbed(&self, step: &Graph, controls: &[f32], disturbances: &[f32]) -> Vec<f32> {
+        self.each(step, controls, disturbances)
+    }
+
+    /// What the network behind `interface` sees of each.
+    pub fn seen(&self, interface: &Interface) -> Vec<f32> {
+        match &interface.observe {
+            Some(observe) => self.each(observe, &[], &[]),
+            None => self.states.numbers().to_vec(),
+        }
+    }
+
+    /// The controls that the `outputs` of the network behind `interface` are.
+    pub fn controls(&self, interface: &Interface, outputs: &[f32]) -> Vec<f32> {
+        match &interface.act {
+            Some(act) => self.each(act, &[], outputs),
+            None => outputs.to_vec(),
+        }
     }
 
     /// The margins of each state.
     pub fn margins(&self) -> Vec<Margins<f32>> {
-        let of = |margin: &Graph| {
-            self.each(1, &[], |x, u, step| {
-                margin.eval(&self.model.arguments_at(x, u, [step, step]))
-            })
-        };
-        let [targets, constraints] = [of(&self.model.target), of(&self.model.constraint)];
+        let [targets, constraints] =
+            [&self.model.target, &self.model.constraint].map(|margin| self.each(margin, &[], &[]));
         let pairs = targets.into_iter().zip(constraints);
         pairs.map(|(target, constraint)| Margins { target, constraint }).collect()
     }
 
-    /// The `outputs` numbers that `of` makes of the state, the controls and the step of each, row by row; a
-    /// control that is not given is 0.
-    fn each(
-        &self,
-        outputs: usize,
-        controls: &[f32],
-        of: impl Fn(&[Lanes<WIDTH>], &[Lanes<WIDTH>], Lanes<WIDTH>) -> Vec<Lanes<WIDTH>>,
-    ) -> Vec<f32> {
-        let states = self.states.size();
+    /// What `graph` makes of each and of `more` numbers for each, row by row; a control that is not given
+    /// is 0.
+    fn each(&self, graph: &Graph, controls: &[f32], more: &[f32]) -> Vec<f32> {
+        let beyond = graph.inputs - self.model.inputs();
+        let (states, outputs) = (self.states.size(), graph.outputs.len());
         let mut found = vec![0.0; self.states.len() * outputs];
         for (tile, found) in found.chunks_mut(WIDTH * outputs).enumerate() {
             let x = columns(self.states.numbers(), states, tile);
             let u = columns(controls, self.model.controls.len(), tile);
             let step = columns(self.steps, 1, tile);
-            store(of(&x, &u, step[0]).into_iter(), found, outputs);
+            let mut inputs = self.model.arguments_at(&x, &u, [step[0]; 2]);
+            inputs.extend(columns(more, beyond, tile));
+            store(graph.eval(&inputs).into_iter(), found, outputs);
         }
         found
     }

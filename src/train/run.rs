@@ -32,6 +32,11 @@ pub trait Learner {
     /// Those of the device.
     fn scores(&self) -> Result<Vec<f64>>;
 
+    /// Whether networks with the scores `new` are better than those with the scores `old`.
+    fn is_better(&self, new: &[f64], old: &[f64]) -> bool {
+        new[0] > old[0]
+    }
+
     /// The networks, each with the name of its file without ending, in the order of the names.
     ///
     /// # Errors
@@ -161,8 +166,8 @@ impl Run<'_> {
     ) -> Result<()> {
         let scores = learner.scores()?;
         let RunProgress { iteration, curve, best, stopped_early, .. } = &mut standing.progress;
-        let record = curve.iter().map(|point| point.scores[0]).fold(f64::NEG_INFINITY, f64::max);
-        if scores[0] > record || standing.best.is_empty() {
+        let record = curve.iter().find(|point| point.iteration == *best);
+        if record.is_none_or(|record| learner.is_better(&scores, &record.scores)) {
             *best = *iteration;
             let networks = learner.networks()?.into_iter();
             standing.best = networks.map(|(name, mlp)| (name.to_owned(), mlp.to_bytes())).collect();
@@ -197,6 +202,7 @@ impl Run<'_> {
             scores: learner.score_names(),
             curve: progress.curve,
             networks,
+            policy: None,
             events: Vec::new(),
         };
         Ok(Trained { record, files })

@@ -4,9 +4,11 @@ use super::purpose;
 use super::rows::{Rows, WIDTH, columns};
 use super::starts::{Mixture, check_stationary};
 use crate::backend::Program;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::model::Model;
 use crate::real::Lanes;
 use crate::rollout::{NON_FINITE, Purpose, RolloutSpec, StateList, States, Stream};
+use crate::system::Axis;
 
 /// Inputs `[count, columns]`, row by row, and the measure of each row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,6 +56,7 @@ impl Source<'_> {
     pub fn action_values(&self, purpose: Purpose, count: usize) -> Result<Samples> {
         let model = &*self.program.plant().model;
         check_stationary(model)?;
+        check_bounded(model)?;
         let states = self.states(purpose, count);
         let (controls, states) = (self.controls(purpose, count), states.view());
         let rows = Rows { model, states, steps: &[] };
@@ -104,6 +107,14 @@ impl Source<'_> {
         }
         states
     }
+}
+
+/// Refuses controls that have an open bound: none can be drawn between their bounds.
+fn check_bounded(model: &Model) -> Result<()> {
+    let open = |axis: &&Axis| !(axis.low.is_finite() && axis.high.is_finite());
+    let Some(axis) = model.controls.iter().find(open) else { return Ok(()) };
+    let problem = "open: `action-value` draws controls between their bounds; give finite ones";
+    Err(Error::invalid(format!("model.controls.{}.bounds", axis.name), problem))
 }
 
 impl Samples {

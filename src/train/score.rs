@@ -30,6 +30,26 @@ pub fn successes(
     Ok(successes)
 }
 
+/// The mean over `starts` of the measure in multiples of `unit`, none of them beyond 1 in size, so that no
+/// start outweighs another; a rollout that is not finite counts -1.
+///
+/// # Errors
+/// Those of the device.
+pub fn mean_measure(
+    backend: &Backend,
+    plant: &Plant,
+    spec: RolloutSpec,
+    starts: States<'_>,
+    unit: f64,
+) -> Result<f64> {
+    let measures = backend.prepare(plant)?.measures(starts, &spec)?;
+    let scaled = |measure: &f32| match measure.is_nan() {
+        true => -1.0,
+        false => (f64::from(*measure) / unit).clamp(-1.0, 1.0),
+    };
+    Ok(measures.iter().map(scaled).sum::<f64>() / measures.len() as f64)
+}
+
 /// The share of those that hold.
 pub fn share(successes: impl ExactSizeIterator<Item = bool>) -> f64 {
     let all = successes.len() as f64;

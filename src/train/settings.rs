@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::adam::Optimiser;
+use super::unit::Unit;
 use crate::error::{Error, Result};
 use crate::model::Task;
 
@@ -68,15 +69,15 @@ impl Method {
         }
     }
 
-    /// Refuses a method that knows the backup or the reward of reach-avoid alone for another task.
+    /// Refuses a method that knows the backup of reach-avoid alone for another task.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the method, the task, and the methods that know every task.
     pub fn check_task(self, task: &Task) -> Result<()> {
-        if task.is_plain() || matches!(self, Self::Analytic | Self::Value) {
+        if task.is_plain() || matches!(self, Self::Analytic | Self::Value | Self::Ppo) {
             return Ok(());
         }
-        let (name, kinds) = (self.name(), "`analytic` and `value`");
+        let (name, kinds) = (self.name(), "`analytic`, `ppo` and `value`");
         let problem = format!(
             "`{name}` learns the task `reach-avoid` without a window alone, this one is `{task}`; \
              {kinds} learn any"
@@ -129,6 +130,18 @@ pub struct AnalyticSettings {
     pub slope: f64,
     /// Weight of the certified measure `V_check` beside G.
     pub certified: f64,
+    /// What temperature and scale are multiples of; 1 if nothing is said. With it, policies are compared
+    /// by their success, and where that is equal by their mean measure in this unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    /// Weight of the mean over the steps of `tanh(margin / unit)` of what has to hold at each, beside G; for
+    /// tasks that have to hold at every step. A rollout that ends badly says little by its worst moment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stepwise: Option<f64>,
+    /// Discount of the measure that is trained on, in (0, 1]; that of the rollouts if nothing is said. It
+    /// changes no success.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gamma: Option<f64>,
     /// How the parameters follow their gradients.
     pub optimiser: Optimiser,
 }
@@ -167,7 +180,7 @@ pub struct DdpgSettings {
     pub random: f64,
     /// Share by which the slow copies follow at each update.
     pub polyak: f64,
-    /// What a full disturbance adds to a state at each step, by state name.
+    /// What a full disturbance adds to a state at each step, by state name; beside those of the model.
     pub disturbance: BTreeMap<String, f64>,
     /// How the critic's parameters follow their gradients.
     pub critic: Optimiser,
@@ -207,7 +220,7 @@ pub struct PpoSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RewardSettings {
-    /// Where to go, by state name.
+    /// Where to go, by state name; if nothing is said, toward larger target margins.
     pub goal: BTreeMap<String, f64>,
     /// What a unit of distance toward the goal is worth.
     pub progress: f64,
@@ -252,6 +265,14 @@ impl AnalyticSettings {
         positive("train.analytic.scale", self.scale)?;
         not_negative("train.analytic.slope", self.slope)?;
         not_negative("train.analytic.certified", self.certified)?;
+        if let Some(Unit::Given(unit)) = self.unit {
+            positive("train.analytic.unit", unit)?;
+        }
+        not_negative("train.analytic.stepwise", self.stepwise.unwrap_or(0.0))?;
+        if let Some(gamma) = self.gamma {
+            positive("train.analytic.gamma", gamma)?;
+            share("train.analytic.gamma", gamma)?;
+        }
         optimiser("train.analytic.optimiser", &self.optimiser)
     }
 }
@@ -275,10 +296,6 @@ impl DdpgSettings {
         not_negative("train.ddpg.noise", self.noise)?;
         share("train.ddpg.random", self.random)?;
         share("train.ddpg.polyak", self.polyak)?;
-        if self.disturbance.is_empty() {
-            let problem = "empty; name a state, with 0 for a disturbance that does nothing";
-            return Err(Error::invalid("train.ddpg.disturbance", problem));
-        }
         for (state, &scale) in &self.disturbance {
             not_negative(&format!("train.ddpg.disturbance.{state}"), scale)?;
         }
@@ -301,9 +318,6 @@ impl PpoSettings {
         not_negative("train.ppo.reward.progress", self.reward.progress)?;
         not_negative("train.ppo.reward.target", self.reward.target)?;
         not_negative("train.ppo.reward.violation", self.reward.violation)?;
-        if self.reward.goal.is_empty() {
-            return Err(Error::invalid("train.ppo.reward.goal", "empty; name a state"));
-        }
         optimiser("train.ppo.optimiser", &self.optimiser)
     }
 }

@@ -18,7 +18,12 @@ fn value(text: &str) -> f64 {
     let formula =
         Formula::parse(text, &names()).unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
     let networks = Networks::default();
-    formula.value(Values { names: &[3.0, -2.0, 0.5], outputs: &[10.0, 20.0], networks: &networks })
+    formula.value(Values {
+        names: &[3.0, -2.0, 0.5],
+        outputs: &[10.0, 20.0],
+        looked: &[],
+        networks: &networks,
+    })
 }
 
 /// The column and the words of the fault of `text`.
@@ -243,7 +248,7 @@ proptest! {
             Ok(formula) if formula.networks().is_empty() && formula.outputs().next().is_none() => {
                 let networks = Networks::default();
                 let names = &[3.0_f32, -2.0, 0.5];
-                formula.value(Values { names, outputs: &[], networks: &networks });
+                formula.value(Values { names, outputs: &[], looked: &[], networks: &networks });
             }
             Ok(_) => {}
             Err(fault) => prop_assert!(fault.column(&text) <= text.chars().count() + 1),

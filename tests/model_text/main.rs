@@ -1,11 +1,13 @@
 //! Models from text: against the same plants in Rust, against loops in f64, and what is refused.
 
 mod carried;
+mod costs;
 mod formulas;
 mod integrators;
 #[path = "../learned/mod.rs"]
 mod learned;
 mod networks;
+mod pictures;
 mod policies;
 mod refused;
 

@@ -91,7 +91,9 @@ where
             }
         }
     }
-    total
+    let end = problem.context.len() - NC;
+    let terminal = cost.terminal(x, from_fn(|i| f64::from(problem.context[end + i])));
+    total + terminal.unwrap_or(0.0)
 }
 
 /// The result of `problem` in an iteration, all samples of which have finite costs.

@@ -6,10 +6,12 @@ mod command;
 mod common;
 
 mod asked;
+mod costs;
 mod disk;
 mod earlier;
 mod endless;
 mod faults;
+mod init;
 mod kept;
 mod killed;
 mod learned;

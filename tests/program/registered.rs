@@ -54,7 +54,7 @@ fn a_plant_of_ones_own_is_certified_checked_queried_and_rolled_out() {
 
 #[test]
 fn its_numbers_are_keys() {
-    let drag = |config: &Config| config.carried_model().unwrap().parameters[0].value;
+    let drag = |config: &Config| config.plain_model().unwrap().parameters[0].value;
     assert_eq!(drag(&sled(&[]).unwrap()), 0.3);
     assert_eq!(drag(&sled(&["system.drag=0.5"]).unwrap()), 0.5);
     for (set, words) in [

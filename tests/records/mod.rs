@@ -192,7 +192,7 @@ impl<const NX: usize, const NU: usize, S: System<NX, NU>> Study<'_, NX, NU, S> {
             attempt: None,
             ledger: ledger(),
             beta_total: 4e-3,
-            picture: PictureRecord { rollouts: rollouts.collect() },
+            picture: PictureRecord { rollouts: rollouts.collect(), drawn: None },
             events: Vec::new(),
             timing: Timing { wall_seconds: 1.2346, threads: 2, rollouts: 123_456 },
         }

@@ -10,6 +10,7 @@ mod records;
 mod sweeps;
 
 mod certificate;
+mod pictures;
 mod race;
 mod sweep;
 mod train;

@@ -39,6 +39,7 @@ fn record() -> TrainRecord {
             sha256: words("ccc333"),
             widths: vec![2, 32, 1],
         }],
+        policy: None,
         events: vec![],
     }
 }

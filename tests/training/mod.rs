@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
-use reachcast::model::Model;
+use reachcast::model::{Interface, Model};
 use reachcast::policy::{Activation, OutputActivation};
 use reachcast::rollout::{RolloutSpec, Stream, Tightening};
 use reachcast::system::System;
@@ -63,6 +63,7 @@ pub(crate) fn task<
 ) -> Task<'a> {
     Task {
         model: Arc::new(Model::of(system.clone())),
+        interface: Interface::plain(&Model::of(system.clone())),
         backend,
         device: device.clone(),
         spec: config.spec().unwrap(),

@@ -5,11 +5,13 @@ mod deviation;
 mod dispatch;
 mod early_exit;
 mod interpreted;
+mod interpreted_cost;
 mod interpreted_stages;
 mod kernel;
 #[cfg(target_arch = "x86_64")]
 mod kernel_x86;
 mod load;
+mod lookups;
 mod mlp;
 mod mppi;
 mod mppi_rollout;

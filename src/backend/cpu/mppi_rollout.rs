@@ -143,6 +143,10 @@ impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
                 self.with.call(Said { prepared: self.prepared, frame: &mut self.frame, live });
             }
         }
+        if self.prepared.planning.cost.terminal.is_some() {
+            let prepared = self.prepared;
+            prepared.stages.end(self.with, self.stages(problem, horizon..horizon, live));
+        }
     }
 
     /// Evaluates the networks at the states.
@@ -158,8 +162,19 @@ impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
 
     /// Takes the first `live` samples through the stages `steps`.
     fn advance(&mut self, problem: &MppiProblem, steps: Range<usize>, live: usize) {
+        let prepared = self.prepared;
+        prepared.stages.advance(self.with, self.stages(problem, steps, live));
+    }
+
+    /// The stages `steps` of the first `live` samples.
+    fn stages<'b>(
+        &'b mut self,
+        problem: &'b MppiProblem,
+        steps: Range<usize>,
+        live: usize,
+    ) -> Stages<'b> {
         let spec = &self.prepared.planning.spec;
-        let stages = Stages {
+        Stages {
             frame: &mut self.frame,
             total: self.prepared.total,
             controls: self.controls.all_mut(),
@@ -171,8 +186,7 @@ impl<'a, K: Kernel, const N: usize> Tile<'a, K, N> {
             context: &problem.context,
             bounds: &spec.settings().bounds,
             penalty: spec.penalty(),
-        };
-        self.prepared.stages.advance(self.with, stages);
+        }
     }
 
     /// Costs and controls of a group.

@@ -78,7 +78,8 @@ impl Chunk<'_> {
         samples: Range<u32>,
         delivery: &mut Delivery<'_>,
     ) -> Result<()> {
-        space.inputs.set(self.problems, self.source.planning.spec.horizon());
+        let horizon = self.source.planning.spec.horizon();
+        space.inputs.set(self.problems, horizon, self.source.planning.cost.rows(horizon));
         let most = space.shape.chunking.samples;
         for first in samples.clone().step_by(most as usize) {
             let end = samples.end.min(first + most);
@@ -136,6 +137,10 @@ impl Chunk<'_> {
             }
             let params = params.over(step, steps);
             batch.dispatches.push_columns(&kernels.rollout, &params);
+        }
+        if let Some(terminal) = &kernels.terminal {
+            room(&mut batch, 1)?;
+            batch.dispatches.push_columns(terminal, &params);
         }
         for step in (0..settings.horizon).step_by(chunking.update_steps as usize) {
             let steps = chunking.update_steps.min(settings.horizon - step);

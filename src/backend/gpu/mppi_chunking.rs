@@ -35,12 +35,14 @@ pub(super) struct Size<'a> {
     pub(super) controls: usize,
     /// Numbers of context per stage.
     pub(super) contexts: usize,
-    /// Cells of the cost's map; 0 without one.
+    /// Cells of the cost's maps; 0 without one.
     pub(super) cells: usize,
     /// Parameters of the model.
     pub(super) values: usize,
     /// Steps of a plan.
     pub(super) horizon: u32,
+    /// Rows of a plan: its steps, and one for its end where that costs.
+    pub(super) rows: u32,
     /// Samples of each problem.
     pub(super) samples: u32,
     /// Problems.
@@ -55,7 +57,7 @@ impl Size<'_> {
     /// Bytes that the host sends for `problems` problems: parameters of the model, streams, starts,
     /// plans with their contexts.
     pub(super) fn parts(&self, problems: u64) -> [u64; 4] {
-        let stages = 4 * problems * u64::from(self.horizon);
+        let stages = 4 * problems * u64::from(self.rows);
         [
             16 * self.values.div_ceil(4) as u64,
             16 * problems,
@@ -149,7 +151,8 @@ impl MppiChunking {
     pub(super) fn dispatches(&self, size: &Size<'_>) -> u64 {
         let rollouts = u64::from(size.horizon.div_ceil(self.rollout_steps));
         let updates = u64::from(size.horizon.div_ceil(self.update_steps));
-        let all = 1 + rollouts * (1 + size.layers()) + updates;
+        let end = u64::from(size.rows - size.horizon);
+        let all = 1 + rollouts * (1 + size.layers()) + end + updates;
         all.min(DISPATCHES + size.layers() + 1)
     }
 }
@@ -184,7 +187,7 @@ fn column_bytes(size: &Size<'_>) -> Vec<u64> {
 /// Bytes of a problem in its largest buffer.
 fn problem_row_bytes(size: &Size<'_>) -> u64 {
     let stage = (size.controls + size.contexts) as u64;
-    (4 * u64::from(size.horizon) * stage).max(4 * size.states as u64).max(16)
+    (4 * u64::from(size.rows) * stage).max(4 * size.states as u64).max(16)
 }
 
 /// Bytes of a problem in all of them: stream, start, plan and contexts.
@@ -281,6 +284,7 @@ mod tests {
             cells,
             values,
             horizon,
+            rows: horizon,
             samples,
             problems,
             flops,

@@ -20,7 +20,7 @@ pub(super) struct PlanCompiled {
     pub(super) source: Arc<PlanSource>,
     /// Parameters of value network and disturbance network.
     pub(super) weights: [Option<Buffer>; 2],
-    /// The cells of a map.
+    /// The cells of all maps.
     pub(super) cells: Option<Buffer>,
     /// The rows of a spline.
     pub(super) spline: Buffer,
@@ -41,7 +41,7 @@ impl PlanCompiled {
             buffer.write(device, words);
             buffer
         };
-        let cells: &[u32] = bytemuck::cast_slice(source.cells());
+        let cells: &[u32] = bytemuck::cast_slice(&source.cells);
         Self {
             weights: source.networks().map(|mlp| mlp.map(|mlp| upload(device, pool, mlp))),
             cells: (!cells.is_empty()).then(|| table(cells)),

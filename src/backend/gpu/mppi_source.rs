@@ -15,6 +15,8 @@ pub(super) struct PlanSource {
     pub(super) planning: Planning,
     /// The values of the model's parameters.
     pub(super) values: Vec<f32>,
+    /// The costs of the cells of all maps, one after the other; none without a map.
+    pub(super) cells: Vec<f32>,
     /// Operations of the formulas for one step of one sample.
     flops: u64,
 }
@@ -24,7 +26,8 @@ impl PlanSource {
     pub(super) fn new(planning: &Planning) -> Self {
         let text = MppiText::new(planning);
         let (values, flops) = (planning.model.values(), text.operations());
-        Self { text, planning: planning.clone(), values, flops }
+        let cells = planning.cost.maps().iter().flat_map(|map| map.cells().to_vec()).collect();
+        Self { text, planning: planning.clone(), values, cells, flops }
     }
 
     /// Whether both have the same kernels, samples and tables, bit by bit.
@@ -36,18 +39,13 @@ impl PlanSource {
         self.text == other.text
             && self.planning.spec == other.planning.spec
             && bits(&self.values, &other.values)
-            && bits(self.cells(), other.cells())
+            && bits(&self.cells, &other.cells)
             && self.spline() == other.spline()
             && networks.all(|networks| match networks {
                 (None, None) => true,
                 (Some(one), Some(other)) => same_bits(one, other),
                 _ => false,
             })
-    }
-
-    /// The costs of the map's cells; none without a map.
-    pub(super) fn cells(&self) -> &[f32] {
-        self.planning.cost.map.as_ref().map_or(&[], |map| map.map.cells())
     }
 
     /// Value network and disturbance network.
@@ -62,9 +60,10 @@ impl PlanSource {
             states: model.states.len(),
             controls: model.controls.len(),
             contexts: cost.contexts,
-            cells: self.cells().len(),
+            cells: self.cells.len(),
             values: self.values.len(),
             horizon: spec.settings().horizon,
+            rows: cost.rows(spec.horizon()) as u32,
             samples,
             problems,
             flops: self.flops,

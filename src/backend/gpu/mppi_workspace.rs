@@ -84,8 +84,8 @@ impl PlanWorkspace {
 pub(super) struct PlanInputs(pub(super) Upload);
 
 impl PlanInputs {
-    /// Sets the problems of a chunk.
-    pub(super) fn set(&mut self, problems: &[MppiProblem], horizon: usize) {
+    /// Sets the problems of a chunk, plans of `horizon` stages with `rows` rows of contexts.
+    pub(super) fn set(&mut self, problems: &[MppiProblem], horizon: usize, rows: usize) {
         let stream = |problem: &MppiProblem| {
             let [low, high] = problem.stream.key();
             [low, high, problem.stream.id(), problem.first_step]
@@ -94,8 +94,10 @@ impl PlanInputs {
         self.0.put(STREAMS, 0, &streams);
         for (number, MppiProblem { start, plan, context, .. }) in problems.iter().enumerate() {
             self.0.put(STARTS, number * start.len(), start);
-            let rows = stages(horizon, plan, context);
-            self.0.put(PLANS, number * rows.len(), &rows);
+            let Rows { stages, end } = Rows::new(horizon, rows, [plan, context]);
+            self.0.put(PLANS, number * stages.len(), &stages);
+            let behind = problems.len() * stages.len();
+            self.0.put(PLANS, behind + number * end.len(), &end);
         }
     }
 
@@ -112,14 +114,28 @@ impl PlanInputs {
     }
 }
 
-/// The nominal controls and the contexts of each of `horizon` stages, side by side.
-fn stages(horizon: usize, plan: &[f32], context: &[f32]) -> Vec<f32> {
-    let (controls, contexts) = (plan.len() / horizon, context.len() / horizon);
-    let stage = |t: usize| {
-        let nominal = &plan[t * controls..][..controls];
-        nominal.iter().chain(&context[t * contexts..][..contexts]).copied()
-    };
-    (0..horizon).flat_map(stage).collect()
+/// The rows of a plan.
+struct Rows {
+    /// The nominal controls and the contexts of each stage, side by side.
+    stages: Vec<f32>,
+    /// The contexts of the end behind as many zeros as there are controls; none where it costs nothing.
+    end: Vec<f32>,
+}
+
+impl Rows {
+    /// Those of a plan of `horizon` stages, whose contexts have `rows` rows.
+    fn new(horizon: usize, rows: usize, [plan, context]: [&[f32]; 2]) -> Self {
+        let (controls, contexts) = (plan.len() / horizon, context.len() / rows);
+        let stage = |t: usize| {
+            let nominal = &plan[t * controls..][..controls];
+            nominal.iter().chain(&context[t * contexts..][..contexts]).copied()
+        };
+        let end = |t: usize| [&vec![0.0; controls], &context[t * contexts..]].concat();
+        Self {
+            stages: (0..horizon).flat_map(stage).collect(),
+            end: (horizon..rows).flat_map(end).collect(),
+        }
+    }
 }
 
 /// The buffers that only kernels write to.
@@ -176,6 +192,8 @@ pub(super) fn words(spec: &crate::rollout::MppiSpec) -> usize {
 pub(super) struct PlanKernels {
     pub(super) start: Bound,
     pub(super) rollout: Bound,
+    /// What the end costs, where it does.
+    pub(super) terminal: Option<Bound>,
     pub(super) update: Bound,
     /// Layers of value network and disturbance network.
     pub(super) layers: [Vec<Bound>; 2],
@@ -191,9 +209,11 @@ struct Binder<'a> {
 
 impl Binder<'_> {
     fn kernels(&self) -> Result<PlanKernels> {
+        let terminal = self.compiled.source.planning.cost.terminal.is_some();
         Ok(PlanKernels {
             start: self.bind(Kernel::MppiStart)?,
             rollout: self.bind(Kernel::MppiRollout)?,
+            terminal: terminal.then(|| self.bind(Kernel::MppiTerminal)).transpose()?,
             update: self.bind(Kernel::MppiUpdate)?,
             layers: [self.layers(0)?, self.layers(1)?],
         })

@@ -87,7 +87,6 @@ impl PreparedPlanning<'_> {
 
 /// Whether a formula of `planning` calls a network.
 fn calls(planning: &Planning) -> bool {
-    let cell = planning.cost.map.iter().map(|map| &map.cell);
-    let mut graphs = [&planning.model.step, &planning.cost.stage].into_iter().chain(cell);
+    let mut graphs = [&planning.model.step].into_iter().chain(planning.cost.graphs());
     graphs.any(|graph| !graph.calls.is_empty())
 }

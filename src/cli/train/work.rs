@@ -1,6 +1,7 @@
 //! Training in a program that was built with it.
 
 mod reinforced;
+mod use_of;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,7 @@ use crate::files::{Existing, Staged, json};
 use crate::model::{Model, Plant};
 use crate::policy::{Activation, OutputActivation};
 use crate::report::train_html;
-use crate::rollout::{Purpose, Stream};
+use crate::rollout::{Purpose, RolloutSpec, Stream};
 use crate::rounding::number;
 use crate::scenario::settings::Settings;
 use crate::scenario::{Context, provenance, tightened};
@@ -50,9 +51,11 @@ pub(super) fn run(global: &Global, config: &Config, folder: &Path, out: &Path) -
     progress.finish();
     devices::note_events(global, &backend);
     trained.record.events = backend.events();
+    trained.record.policy = use_of::section(config)?;
     let files = write(out, &trained)?;
     let seconds = begun.elapsed().as_secs_f64();
-    report(global, &trained.record, || text(&trained.record, &files, seconds))?;
+    let used = use_of::words(config, folder, out)?;
+    report(global, &trained.record, || text(&trained.record, &files, seconds) + &used)?;
     Ok(Outcome::Done)
 }
 
@@ -118,7 +121,7 @@ impl Training<'_> {
 impl Training<'_> {
     /// Does the work.
     fn run(self, folder: &Path) -> Result<Trained> {
-        let model = Arc::new(self.config.carried_model()?);
+        let model = Arc::new(self.config.plain_model()?);
         self.settings.method.check_task(&model.task)?;
         self.settings.method.check_points(model.points)?;
         match self.settings.method {
@@ -135,12 +138,14 @@ impl Training<'_> {
     /// A policy of `model` through its dynamics.
     fn analytic(self, model: &Arc<Model>) -> Result<Trained> {
         let Self { config, settings, backend, watch, .. } = self;
-        let (inputs, controls) = (self.intervals(model)?, model.controls.len());
-        let network = self.network(inputs, controls, OutputActivation::Tanh, LAST);
+        let task = self.task(model)?;
+        let interface = task.interface.clone();
+        let inputs = interface.intervals(&self.intervals(model)?);
+        let network = self.network(inputs, interface.outputs, OutputActivation::Tanh, LAST);
         // On a plant that is linear in the state, replayed controls deviate by the same under any
         // policy; on others this is the deviation under the untrained one.
-        let policy = network.export(names(&model.states))?;
-        let program = backend.prepare(&Plant::under(model, policy))?;
+        let policy = network.export(interface.order(model))?;
+        let program = backend.prepare(&interface.plant(model, policy))?;
         let context = Context { program: &program, watch };
         let tightening = match settings.analytic.certified > 0.0 {
             true => {
@@ -151,7 +156,9 @@ impl Training<'_> {
             }
             false => None,
         };
-        let task = Task { tightening, ..self.task(model)? };
+        let gamma = settings.analytic.gamma.unwrap_or(f64::from(task.spec.gamma));
+        let spec = RolloutSpec::new(task.spec.horizon, gamma as f32)?;
+        let task = Task { tightening, spec, ..task };
         let mut learner = Analytic::new(task, network, settings.analytic);
         self.train(&mut learner, settings.analytic.iterations, &program)
     }

@@ -13,6 +13,7 @@ pub struct Formula {
     /// Where each term stands in the text, in bytes.
     pub(super) places: Vec<u32>,
     pub(super) calls: Vec<NetworkCall>,
+    pub(super) lookups: Vec<Lookup>,
 }
 
 /// A network that a formula calls like a function.
@@ -36,6 +37,17 @@ impl NetworkCall {
     }
 }
 
+/// A map that a formula asks like a function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lookup {
+    /// The number of the map.
+    pub map: u32,
+    /// The terms that are the coordinates.
+    pub arguments: [u32; 2],
+    /// Where it stands, in bytes.
+    pub at: usize,
+}
+
 /// Something that a formula uses, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
@@ -51,6 +63,23 @@ impl Formula {
     /// # Panics
     /// If a name or output has no value, or a network is missing or has other inputs.
     pub fn value<R: Scalar>(&self, values: Values<'_, R>) -> R {
+        let earlier = self.all(values);
+        earlier[earlier.len() - 1]
+    }
+
+    /// The point where each lookup asks its map; what maps say enters none of them.
+    ///
+    /// # Panics
+    /// As [`Formula::value`].
+    pub fn places<R: Scalar>(&self, values: Values<'_, R>) -> Vec<[R; 2]> {
+        let looked = vec![R::lit(0.0); self.lookups.len()];
+        let earlier = self.all(Values { looked: &looked, ..values });
+        let place = |lookup: &Lookup| lookup.arguments.map(|i| earlier[i as usize]);
+        self.lookups.iter().map(place).collect()
+    }
+
+    /// The values of all terms.
+    fn all<R: Scalar>(&self, values: Values<'_, R>) -> Vec<R> {
         let mut earlier: Vec<R> = Vec::with_capacity(self.terms.len());
         for term in &self.terms {
             let value = match *term {
@@ -59,7 +88,7 @@ impl Formula {
             };
             earlier.push(value);
         }
-        earlier[earlier.len() - 1]
+        earlier
     }
 
     /// The number of its operations.
@@ -86,6 +115,11 @@ impl Formula {
     /// The networks that it calls.
     pub fn networks(&self) -> &[NetworkCall] {
         &self.calls
+    }
+
+    /// The maps that it asks.
+    pub fn lookups(&self) -> &[Lookup] {
+        &self.lookups
     }
 
     /// The name that the whole formula is.

@@ -14,12 +14,12 @@ pub use fault::Fault;
 #[cfg(feature = "cli")]
 pub(crate) use fault::meant;
 pub(crate) use fault::{nearest, shown};
-pub use formula::{Formula, MOST_NODES, NetworkCall, Use};
+pub use formula::{Formula, Lookup, MOST_NODES, NetworkCall, Use};
 pub use function::Function;
 pub use names::Names;
 pub use networks::Networks;
 pub use term::{Comparison, Operation, Term, Values};
-pub(crate) use token::LONGEST_NAME;
+pub(crate) use token::{LONGEST_NAME, is_name};
 
 use parser::Parser;
 
@@ -35,7 +35,7 @@ impl Formula {
     /// names.add("x", "a state")?;
     /// let formula = Formula::parse("-x^2 + 2 * hypot(x, 4)", &names).expect("a formula");
     /// let networks = Networks::default();
-    /// let values = Values { names: &[3.0_f32], outputs: &[], networks: &networks };
+    /// let values = Values { names: &[3.0_f32], outputs: &[], looked: &[], networks: &networks };
     /// assert_eq!(formula.value(values), 1.0);
     /// let fault = Formula::parse("1 + cosh(x)", &names).expect_err("no such function");
     /// assert_eq!(fault.problem, "unknown function `cosh`; the nearest is `cos`");

@@ -19,6 +19,8 @@ const RESERVED: [(&str, &str); 4] = [
 pub struct Names {
     list: Vec<Entry>,
     places: HashMap<String, u32>,
+    /// Maps that formulas ask like functions of two numbers.
+    maps: Vec<String>,
 }
 
 /// A name, and what it is: `a state`.
@@ -34,13 +36,29 @@ impl Names {
     /// # Errors
     /// A sentence if it cannot be a name, or is one already.
     pub fn add(&mut self, name: &str, what: &'static str) -> Result<(), String> {
-        refuse_reserved(name)?;
-        if let Some(place) = self.place(name) {
-            let before = self.list[place as usize].what;
-            return Err(format!("two definitions: `{name}` is {before} already"));
-        }
+        self.refuse_taken(name)?;
         self.insert(name, what);
         Ok(())
+    }
+
+    /// Adds the map `name`, which formulas ask as `name(x, y)`, with the next number of maps.
+    ///
+    /// # Errors
+    /// As [`Names::add`].
+    pub fn add_map(&mut self, name: &str) -> Result<(), String> {
+        self.refuse_taken(name)?;
+        self.maps.push(name.to_owned());
+        Ok(())
+    }
+
+    /// Refuses what cannot be a name, or is one already.
+    fn refuse_taken(&self, name: &str) -> Result<(), String> {
+        refuse_reserved(name)?;
+        let place = self.place(name).map(|place| self.list[place as usize].what);
+        match place.or(self.map(name).map(|_| "a map")) {
+            Some(before) => Err(format!("two definitions: `{name}` is {before} already")),
+            None => Ok(()),
+        }
     }
 
     /// Adds a place that formulas reach by the word `name`, which nothing else may be called.
@@ -61,6 +79,16 @@ impl Names {
     /// The place of `name`.
     pub fn place(&self, name: &str) -> Option<u32> {
         self.places.get(name).copied()
+    }
+
+    /// The number of the map `name`.
+    pub fn map(&self, name: &str) -> Option<u32> {
+        self.maps.iter().position(|map| map == name).map(|number| number as u32)
+    }
+
+    /// The maps, in order of their numbers.
+    pub fn maps(&self) -> &[String] {
+        &self.maps
     }
 
     /// The name at `place`.

@@ -1,7 +1,9 @@
 //! From text to terms: recursive descent, weak operators first, and a limit to its depth.
 
+mod asked;
+
 use super::fault::{Fault, nearest};
-use super::formula::{Formula, MOST_NODES, NetworkCall};
+use super::formula::{Formula, Lookup, MOST_NODES, NetworkCall};
 use super::function::Function;
 use super::names::Names;
 use super::networks::Networks;
@@ -26,6 +28,7 @@ pub(super) struct Parser<'a> {
     /// Whether no name enters a term.
     fixed: Vec<bool>,
     calls: Vec<NetworkCall>,
+    lookups: Vec<Lookup>,
     /// None: what is fixed calls no network.
     networks: Networks,
 }
@@ -44,6 +47,7 @@ impl<'a> Parser<'a> {
             constants: Vec::new(),
             fixed: Vec::new(),
             calls: Vec::new(),
+            lookups: Vec::new(),
             networks: Networks::default(),
         })
     }
@@ -53,8 +57,8 @@ impl<'a> Parser<'a> {
         self.sum()?;
         match self.next.kind {
             Kind::End => {
-                let Self { terms, places, calls, .. } = self;
-                Ok(Formula { terms, places, calls })
+                let Self { terms, places, calls, lookups, .. } = self;
+                Ok(Formula { terms, places, calls, lookups })
             }
             Kind::Symbol(symbol) if Comparison::of(symbol).is_some() => Err(self.fault(format!(
                 "`{symbol}` stands outside a condition; comparisons stand in `if(a < b, yes, no)`"
@@ -107,7 +111,7 @@ impl<'a> Parser<'a> {
         }
         let fixed = self.is_fixed(term);
         let networks = &self.networks;
-        let none = Values { names: &[], outputs: &[], networks };
+        let none = Values { names: &[], outputs: &[], looked: &[], networks };
         self.constants.push(if fixed { term.value(none, &self.constants) } else { f32::NAN });
         self.fixed.push(fixed);
         self.terms.push(term);
@@ -117,7 +121,8 @@ impl<'a> Parser<'a> {
 
     /// Whether numbers alone enter `term`.
     fn is_fixed(&self, term: Term) -> bool {
-        let mut fixed = !matches!(term, Term::Name(_) | Term::Output(_) | Term::Network(_));
+        let mut fixed =
+            !matches!(term, Term::Name(_) | Term::Output(_) | Term::Network(_) | Term::Looked(_));
         term.operands(|i| fixed &= self.fixed[i as usize]);
         fixed
     }
@@ -269,6 +274,9 @@ impl<'a> Parser<'a> {
         if Function::names().any(|function| function == name) {
             return Fault::new(at, format!("`{name}` is a function: expected `{name}(...)`"));
         }
+        if self.names.map(name).is_some() {
+            return Fault::new(at, format!("`{name}` is a map: expected `{name}(x, y)`"));
+        }
         let problem = match name {
             "t" => "`t`, the time in seconds, needs `period` in `[model.time]`".to_owned(),
             _ => format!("unknown name `{name}`; the nearest is `{}`", self.names.nearest(name)),
@@ -281,13 +289,16 @@ impl<'a> Parser<'a> {
         match (name, Function::named(name)) {
             ("if", _) => self.condition(at),
             ("net", _) => self.network(at),
+            (_, None) if self.names.map(name).is_some() => self.lookup(name, at),
             (_, Some(function)) => self.function(function, at),
             (_, None) if self.names.place(name).is_some() => Err(Fault::new(
                 at,
                 format!("`{name}` is no function; a product is written with `*`"),
             )),
             (_, None) => {
-                let nearest = nearest(name, Function::names()).unwrap_or("abs");
+                let mut known: Vec<&str> = Function::names().collect();
+                known.extend(self.names.maps().iter().map(String::as_str));
+                let nearest = nearest(name, known.into_iter()).unwrap_or("abs");
                 let problem = format!("unknown function `{name}`; the nearest is `{nearest}`");
                 Err(Fault::new(at, problem))
             }
@@ -345,36 +356,6 @@ impl<'a> Parser<'a> {
         let no = self.sum()?;
         self.expect(")")?;
         self.add(Term::If(comparison, [a, b, yes, no]), at)
-    }
-
-    /// `'file', arguments...)[output]`, the rest of a `net`.
-    fn network(&mut self, at: usize) -> Result<u32, Fault> {
-        let Kind::Quoted(file) = self.next.kind else {
-            return Err(self.unexpected("the file of a network between quotes"));
-        };
-        self.advance()?;
-        let arguments = if self.accept(",")? {
-            self.arguments()?
-        } else {
-            self.expect(")")?;
-            Vec::new()
-        };
-        let output = self.index()?;
-        self.calls.push(NetworkCall { file: file.to_owned(), arguments, output, at });
-        self.add(Term::Network((self.calls.len() - 1) as u32), at)
-    }
-
-    /// `[number]`.
-    fn index(&mut self) -> Result<u32, Fault> {
-        self.expect("[")?;
-        let whole = match self.next.kind {
-            Kind::Number(text) => text.parse().ok(),
-            _ => None,
-        };
-        let index = whole.ok_or_else(|| self.unexpected("the number of an output, from 0"))?;
-        self.advance()?;
-        self.expect("]")?;
-        Ok(index)
     }
 }
 

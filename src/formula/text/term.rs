@@ -25,6 +25,8 @@ pub enum Term {
     If(Comparison, [u32; 4]),
     /// An output of a network: the call of that number in the formula.
     Network(u32),
+    /// What a map says: the lookup of that number in the formula.
+    Looked(u32),
 }
 
 /// An operation on two numbers.
@@ -91,6 +93,8 @@ pub struct Values<'a, R> {
     pub names: &'a [R],
     /// The outputs of the policy's network.
     pub outputs: &'a [R],
+    /// What the maps say, one for each lookup of the formula.
+    pub looked: &'a [R],
     /// The networks that formulas call.
     pub networks: &'a Networks,
 }
@@ -103,6 +107,7 @@ impl Term {
             Self::Number(number) => R::lit(number),
             Self::Name(place) => values.names[place as usize],
             Self::Output(i) => values.outputs[i as usize],
+            Self::Looked(i) => values.looked[i as usize],
             Self::Negative(a) => -at(a),
             Self::Binary(Operation::Add, a, b) => at(a) + at(b),
             Self::Binary(Operation::Sub, a, b) => at(a) - at(b),
@@ -118,7 +123,11 @@ impl Term {
     /// Calls `see` with each operand.
     pub(super) fn operands(self, mut see: impl FnMut(u32)) {
         match self {
-            Self::Number(_) | Self::Name(_) | Self::Output(_) | Self::Network(_) => {}
+            Self::Number(_)
+            | Self::Name(_)
+            | Self::Output(_)
+            | Self::Network(_)
+            | Self::Looked(_) => {}
             Self::Negative(a) | Self::Power(a, _) => see(a),
             Self::Binary(_, a, b) => [a, b].into_iter().for_each(see),
             Self::Call(function, operands) => {

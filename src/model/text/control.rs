@@ -29,7 +29,8 @@ impl Description {
     /// the network does not have, or calls a network that cannot be read or does not fit, or if the
     /// policy's network cannot be read or has another width.
     pub fn controller(&self) -> Result<Controller> {
-        let missing = || self.origin.refuse("policy", "missing; expected a section with a policy");
+        let missing =
+            || self.origin.refuse("policy", "no policy; expected `file`, a network, or `formula`");
         match self.policy.as_ref().ok_or_else(missing)? {
             Policy::Formulas(formulas) => {
                 let networks = self.table()?;
@@ -128,14 +129,19 @@ impl Description {
     }
 
     /// The controls over the inputs of the model and the `outputs` of the network behind them.
-    fn act(&self, formulas: &[Written], outputs: usize, networks: &Networks) -> Result<Graph> {
+    pub(super) fn act(
+        &self,
+        formulas: &[Written],
+        outputs: usize,
+        networks: &Networks,
+    ) -> Result<Graph> {
         let needed = self.lets.needed(formulas);
         let own: usize = formulas.iter().map(|written| written.formula.operations()).sum();
         self.check_size("policy.act", own + self.lets.operations(&needed))?;
         let graph = record(self.inputs() + outputs, |inputs| {
             let (inputs, outputs) = inputs.split_at(self.inputs());
             let names = self.lets.values(inputs, &needed, networks);
-            let values = Values { names: &names, outputs, networks };
+            let values = Values { names: &names, outputs, looked: &[], networks };
             formulas.iter().map(|written| written.formula.value(values)).collect()
         });
         self.check_size("policy.act", graph.nodes.len())?;

@@ -3,7 +3,9 @@
 use toml::Table;
 
 use super::axes::{self, State};
-use super::bodies;
+use super::bodies::{self, Bodies};
+use super::costs::{self, WrittenCosts};
+use super::disturbances::{self, Disturbance};
 use super::dynamics::{self, Dynamics};
 use super::lets::Lets;
 use super::names::{Scope, Seconds};
@@ -11,23 +13,33 @@ use super::network_file::NetworkFile;
 use super::origin::Origin;
 use super::policy::{self, Policy};
 use super::section::Section;
+use super::shapes;
 use super::task::{self, WrittenTask};
 use crate::error::Result;
 use crate::formula::text::{LONGEST_TEXT, shown};
-use crate::system::{Axis, Body, Parameter};
+use crate::model::Shape;
+use crate::system::{Axis, Parameter};
 
 /// Keys of `[model]`.
-const KEYS: [&str; 10] =
-    ["name", "states", "controls", "parameters", "let", "next", "flow", "time", "task", "bodies"];
-/// Sections of `[model]` that are refused by name, and what they would be.
-const LATER: [(&str, &str); 6] = [
-    ("disturbances", "numbers that are drawn at every step do"),
-    ("noise", "measurement noise does"),
-    ("costs", "costs of plans do"),
-    ("references", "references of costs do"),
-    ("maps", "maps of costs do"),
-    ("shapes", "shapes of pictures do"),
+const KEYS: [&str; 15] = [
+    "name",
+    "states",
+    "controls",
+    "parameters",
+    "disturbances",
+    "let",
+    "next",
+    "flow",
+    "time",
+    "task",
+    "bodies",
+    "shapes",
+    "costs",
+    "references",
+    "maps",
 ];
+/// Sections of `[model]` that are refused by name, and what they would be.
+const LATER: [(&str, &str); 1] = [("noise", "measurement noise does")];
 
 /// A model and its policy as a text describes them: every name known, every formula parsed.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,14 +52,20 @@ pub struct Description {
     pub controls: Vec<Axis>,
     /// Numbers that are fixed for a rollout.
     pub parameters: Vec<Parameter>,
+    /// Numbers that act at every step where a policy is trained against them.
+    pub disturbances: Vec<Disturbance>,
     /// Seconds between two steps, where the text says.
     pub period: Option<f32>,
     /// How the state moves on.
     pub dynamics: Dynamics,
     /// What a rollout has to do, and the margins.
     pub task: WrittenTask,
-    /// What pictures show.
-    pub bodies: Vec<Body>,
+    /// What plans cost, where the text says; no part of the plant and its task.
+    pub costs: Option<WrittenCosts>,
+    /// The bodies that pictures show.
+    pub bodies: Bodies,
+    /// The shapes that pictures show.
+    pub shapes: Vec<Shape>,
     /// What makes the controls, where the text says.
     pub policy: Option<Policy>,
     pub(super) lets: Lets,
@@ -72,12 +90,14 @@ impl Description {
         let parameters = axes::parameters(model.section("parameters")?, &mut scope)?;
         let time = dynamics::time(model.section("time")?.as_ref())?;
         scope.declare_time(if time.period.is_some() { Seconds::Known } else { Seconds::Unknown });
+        let disturbances = disturbances::disturbances(model.section("disturbances")?, &mut scope)?;
         let lets = Lets::read(model.section("let")?, &mut scope)?;
         let state_names: Vec<&str> = states.iter().map(|state| state.axis.name.as_str()).collect();
         let control_names: Vec<&str> = controls.iter().map(|axis| axis.name.as_str()).collect();
         let policy = root.section("policy")?;
         let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
         let dynamics = dynamics::dynamics(&model, &state_names, time, &scope)?;
+        let policy = policy.transpose()?.flatten();
         Ok(Self {
             task: task::task(
                 &model.required("task", "the kind and its margins")?,
@@ -86,12 +106,15 @@ impl Description {
                 time.period,
             )?,
             dynamics,
+            costs: costs::costs(&model, &scope)?,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
-            policy: policy.transpose()?,
+            shapes: shapes::shapes(model.section("shapes")?)?,
+            policy,
             name,
             states,
             controls,
             parameters,
+            disturbances,
             period: time.period,
             lets,
             networks: None,

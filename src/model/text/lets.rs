@@ -44,7 +44,7 @@ impl Lets {
         let formulas = section.entries().map(read).collect::<Result<Vec<_>>>()?;
         let mut lets = Self { formulas, order: Vec::new(), first };
         lets.sort(&section)?;
-        lets.note_controls(scope);
+        lets.note_deeds(scope);
         Ok(lets)
     }
 
@@ -61,7 +61,9 @@ impl Lets {
     /// Those of `uses` that are intermediate formulas, by their numbers.
     fn among(&self, uses: impl Iterator<Item = Use>) -> Vec<Use> {
         let first = self.first as u32;
-        uses.filter(|found| found.number >= first)
+        // Behind them are the references of costs.
+        let own = first..first + self.formulas.len() as u32;
+        uses.filter(|found| own.contains(&found.number))
             .map(|found| Use { number: found.number - first, ..found })
             .collect()
     }
@@ -114,17 +116,17 @@ impl Lets {
         self.formulas[last].refuse(section.origin, at, problem)
     }
 
-    /// Tells `scope` which intermediate formulas use a control.
-    fn note_controls(&self, scope: &mut Scope) {
+    /// Tells `scope` which intermediate formulas use a control or a disturbance.
+    fn note_deeds(&self, scope: &mut Scope) {
         for &i in &self.order {
             let mut uses = self.formulas[i].formula.names();
-            let control = uses.find_map(|found| scope.control_behind(found.number));
-            scope.note_control(self.first + i, control);
+            let deed = uses.find_map(|found| scope.deed_behind(found.number));
+            scope.note_deed(self.first + i, deed);
         }
     }
 
     /// Which of them `formulas` need, directly or through others.
-    pub(super) fn needed(&self, formulas: &[Written]) -> Vec<bool> {
+    pub(super) fn needed<'a>(&self, formulas: impl IntoIterator<Item = &'a Written>) -> Vec<bool> {
         let mut needed = vec![false; self.formulas.len()];
         let mark = |needed: &mut Vec<bool>, uses: Vec<Use>| {
             uses.iter().for_each(|found| needed[found.number as usize] = true);
@@ -148,6 +150,7 @@ impl Lets {
 
     /// The values of all names: the `inputs`, then the intermediate formulas that are `needed`, with the
     /// `networks` that they call; the others have the value of the first input, which nothing asks for.
+    /// Disturbances are 0 where `inputs` end before them.
     ///
     /// # Panics
     /// If there is no input.
@@ -158,9 +161,10 @@ impl Lets {
         networks: &Networks,
     ) -> Vec<R> {
         let mut names = inputs.to_vec();
+        names.resize(self.first, R::lit(0.0));
         names.resize(self.first + self.formulas.len(), inputs[0]);
         for &i in self.order.iter().filter(|i| needed[**i]) {
-            let values = Values { names: &names, outputs: &[], networks };
+            let values = Values { names: &names, outputs: &[], looked: &[], networks };
             names[self.first + i] = self.formulas[i].formula.value(values);
         }
         names

@@ -3,25 +3,38 @@
 mod axes;
 mod bodies;
 mod control;
+mod costs;
 mod description;
+mod disturbances;
 mod dynamics;
+mod interface;
 mod lets;
+mod maps;
 mod names;
 mod network;
 mod network_file;
 mod origin;
+mod placed;
 mod policy;
+mod recorded_costs;
+mod references;
 mod section;
+mod shapes;
 mod step;
 mod task;
 mod written;
 
 pub use axes::{MOST_CONTROLS, MOST_PARAMETERS, MOST_STATES, State, Topology};
+pub use bodies::{Bodies, WrittenBody};
+pub use costs::{MOST_COSTS, WrittenCosts, WrittenTerm};
 pub use description::Description;
+pub use disturbances::{Disturbance, MOST_DISTURBANCES};
 pub use dynamics::{Dynamics, Integration, Integrator};
+pub use maps::{MOST_MAPS, WrittenMap};
 pub use network_file::{MOST_NETWORKS, NetworkFile};
 pub use origin::Origin;
 pub use policy::{NetworkPolicy, Policy};
+pub use references::{MOST_REFERENCES, WrittenReference, WrittenSource};
 pub use task::WrittenTask;
 pub use written::Written;
 

@@ -12,7 +12,7 @@ pub(super) struct Scope {
     pub(super) states: usize,
     pub(super) controls: usize,
     pub(super) parameters: usize,
-    /// For each place the control that it is or uses.
+    /// For each place the control or the disturbance that it is or uses.
     behind: Vec<Option<u32>>,
 }
 
@@ -46,19 +46,32 @@ impl Scope {
             (0..self.inputs()).map(|place| control(place).then_some(place as u32)).collect();
     }
 
+    /// Adds the disturbance `key` of `section`, behind the inputs of the model.
+    pub(super) fn declare_disturbance(&mut self, section: &Section<'_>, key: &str) -> Result<()> {
+        let place = self.names.len();
+        self.declare(section, key, "a disturbance")?;
+        self.note_deed(place, Some(place as u32));
+        Ok(())
+    }
+
     /// Inputs of each formula of the model.
     pub(super) fn inputs(&self) -> usize {
         self.states + self.controls + self.parameters + 2
     }
 
-    /// The control that the name at `place` is, or that its formula uses.
-    pub(super) fn control_behind(&self, place: u32) -> Option<u32> {
+    /// The control or the disturbance that the name at `place` is, or that its formula uses.
+    pub(super) fn deed_behind(&self, place: u32) -> Option<u32> {
         self.behind.get(place as usize).copied().flatten()
     }
 
-    /// Notes the control that the intermediate formula at `place` uses.
-    pub(super) fn note_control(&mut self, place: usize, control: Option<u32>) {
+    /// Whether the name at `place` is a control.
+    pub(super) fn is_control(&self, place: u32) -> bool {
+        (self.states..self.states + self.controls).contains(&(place as usize))
+    }
+
+    /// Notes the control or the disturbance that the name at `place` is or uses.
+    pub(super) fn note_deed(&mut self, place: usize, deed: Option<u32>) {
         self.behind.resize(self.names.len(), None);
-        self.behind[place] = control;
+        self.behind[place] = deed;
     }
 }

@@ -23,8 +23,19 @@ impl Description {
     /// [`crate::Error::Invalid`] naming formula and column of a call whose network cannot be read, or that gives
     /// it another number of inputs or asks for an output that it does not have.
     pub fn networks(&self, place: impl Fn(usize, &str) -> PathBuf) -> Result<Vec<NetworkFile>> {
-        let mut files: Vec<NetworkFile> = Vec::new();
-        for (written, call) in self.calls() {
+        let mut files = Vec::new();
+        self.gather(&mut files, self.calls(), place)?;
+        Ok(files)
+    }
+
+    /// Adds to `files` those that `calls` call and that are not there.
+    fn gather<'a>(
+        &self,
+        files: &mut Vec<NetworkFile>,
+        calls: impl Iterator<Item = Found<'a>>,
+        place: impl Fn(usize, &str) -> PathBuf,
+    ) -> Result<()> {
+        for (written, call) in calls {
             let refuse = |problem: String| written.refuse(&self.origin, call.at, problem);
             let known = files.iter().position(|file| file.name == call.file);
             let at = known.unwrap_or(files.len());
@@ -37,7 +48,7 @@ impl Description {
             }
             check(call, &files[at].network).map_err(refuse)?;
         }
-        Ok(files)
+        Ok(())
     }
 
     /// The same description with the networks that its formulas call, which are then not read again.
@@ -48,10 +59,18 @@ impl Description {
 
     /// The networks by their names: those that were given, or those beside the description.
     pub(super) fn table(&self) -> Result<Networks> {
-        let files = match &self.networks {
+        self.table_with(&[])
+    }
+
+    /// The same with those that `formulas` of costs call, which lie beside the description where they are
+    /// not among those that were given.
+    pub(super) fn table_with(&self, formulas: &[&Written]) -> Result<Networks> {
+        let beside = |_: usize, name: &str| self.origin.folder.join(name);
+        let mut files = match &self.networks {
             Some(given) => self.networks_among(given)?,
-            None => self.networks(|_, name| self.origin.folder.join(name))?,
+            None => self.networks(beside)?,
         };
+        self.gather(&mut files, formulas.iter().flat_map(|written| calls_of(written)), beside)?;
         let mut table = Networks::default();
         files.into_iter().for_each(|file| table.add(&file.name, file.network));
         Ok(table)
@@ -80,8 +99,13 @@ impl Description {
         };
         let margins = [&self.task.target, &self.task.constraint].into_iter().flatten();
         let all = self.lets.written().iter().chain(moves).chain(margins).chain(law);
-        all.flat_map(|written| written.formula.networks().iter().map(move |call| (written, call)))
+        all.flat_map(calls_of)
     }
+}
+
+/// The calls of a formula.
+fn calls_of(written: &Written) -> impl Iterator<Item = Found<'_>> {
+    written.formula.networks().iter().map(move |call| (written, call))
 }
 
 /// Why `network` does not fit the call.

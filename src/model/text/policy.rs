@@ -29,19 +29,26 @@ pub struct NetworkPolicy {
     pub act: Option<Vec<Written>>,
 }
 
-/// Reads `[policy]`.
-pub(super) fn policy(section: &Section<'_>, controls: &[&str], scope: &Scope) -> Result<Policy> {
+/// Reads `[policy]`; none where it has neither `file` nor `formula`, and what stands around a network that
+/// is to be trained is checked all the same.
+pub(super) fn policy(
+    section: &Section<'_>,
+    controls: &[&str],
+    scope: &Scope,
+) -> Result<Option<Policy>> {
     section.only(["file", "formula", "observe", "act"].into_iter())?;
     match (section.text("file"), section.has("formula")) {
         (Ok(Some(_)) | Err(_), true) => Err(section.refuse_whole(
             "two definitions: `file` and `formula` are both given; keep one of them",
         )),
         (file, false) => {
-            let missing =
-                || section.refuse_whole("no policy; expected `file`, a network, or `formula`");
-            network(section, file?.ok_or_else(missing)?, controls, scope).map(Policy::Network)
+            let file = file?;
+            let policy = network(section, file.unwrap_or_default(), controls, scope)?;
+            Ok(file.map(|_| Policy::Network(policy)))
         }
-        (Ok(None), true) => formulas(section, controls, scope).map(Policy::Formulas),
+        (Ok(None), true) => {
+            formulas(section, controls, scope).map(|formulas| Some(Policy::Formulas(formulas)))
+        }
     }
 }
 

@@ -115,6 +115,32 @@ impl<'a> Section<'a> {
         Ok(Some([low, high]))
     }
 
+    /// The point at `key`.
+    pub(super) fn point(&self, key: &str) -> Result<Option<[f32; 2]>> {
+        self.value(key, "a list of two numbers", pair)
+    }
+
+    /// Refuses more than `most` entries, which are called `what`.
+    pub(super) fn at_most(&self, what: &str, most: usize) -> Result<()> {
+        let count = self.table.len();
+        match count <= most {
+            true => Ok(()),
+            false => Err(self.refuse_whole(format!("{count} {what}, expected at most {most}"))),
+        }
+    }
+
+    /// The list of `N` finite numbers at `key`.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        key: &str,
+        expected: &str,
+    ) -> Result<Option<[f32; N]>> {
+        self.value(key, expected, |value| {
+            let list = value.as_array()?.iter().map(number).collect::<Option<Vec<f32>>>()?;
+            <[f32; N]>::try_from(list).ok().filter(|list| list.iter().all(|x| x.is_finite()))
+        })
+    }
+
     /// The list of values at `key`.
     pub(super) fn list(&self, key: &str, expected: &str) -> Result<Option<&'a [Value]>> {
         self.value(key, expected, |value| value.as_array().map(Vec::as_slice))

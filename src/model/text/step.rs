@@ -2,12 +2,13 @@
 //! integration, recorded over the inputs of the model.
 
 use super::description::Description;
+use super::disturbances::Disturbance;
 use super::dynamics::{Dynamics, Integration, Integrator};
 use super::written::Written;
 use crate::error::Result;
 use crate::formula::text::{MOST_NODES, Networks, Values};
 use crate::formula::{Graph, Scalar, record};
-use crate::model::Model;
+use crate::model::{Model, Picture};
 use crate::real::Real;
 use crate::system::Axis;
 
@@ -47,11 +48,15 @@ impl Description {
             parameters: self.parameters.clone(),
             period: self.period,
             points: self.task.between + 1,
-            step: self.step(&networks)?,
+            step: self.step(&networks, &[])?,
             task: self.task.task,
             target: margin(&self.task.target, NOWHERE)?,
             constraint: margin(&self.task.constraint, EVERYWHERE)?,
-            bodies: self.bodies.clone(),
+            bodies: self.bodies.at_states.clone(),
+            picture: Picture {
+                bodies: self.placed_bodies(&networks)?,
+                shapes: self.shapes.clone(),
+            },
             smallest_feature: None,
             native: None,
         })
@@ -90,8 +95,9 @@ impl Description {
         Ok(())
     }
 
-    /// The graph of the state after one part of a period: the next one where nothing is looked at between.
-    fn step(&self, networks: &Networks) -> Result<Graph> {
+    /// The graph of the state after one part of a period, the next one where nothing is looked at between, of
+    /// the inputs of the model and one for each of the disturbances that `act`, as a share of its bound.
+    pub(super) fn step(&self, networks: &Networks, act: &[Disturbance]) -> Result<Graph> {
         let (path, formulas, stages) = match &self.dynamics {
             Dynamics::Next(formulas) => ("model.next", formulas, 1),
             Dynamics::Flow(formulas, rule) => ("model.flow", formulas, rule.stages()),
@@ -101,8 +107,11 @@ impl Description {
         let once = formulas.operations() + formulas.formulas.len();
         self.check_size(path, once.saturating_mul(stages / self.substeps()))?;
         self.check_size(SUBSTEPS, once.saturating_mul(stages))?;
-        let graph = record(self.inputs(), |inputs| {
-            let inputs = self.clipped(inputs);
+        let graph = record(self.inputs() + act.len(), |inputs| {
+            let mut inputs = self.clipped(inputs);
+            for (share, disturbance) in inputs[self.inputs()..].iter_mut().zip(act) {
+                *share = *share * Real::lit(disturbance.bound);
+            }
             match &self.dynamics {
                 Dynamics::Next(_) => formulas.values(&inputs),
                 Dynamics::Flow(_, rule) => {
@@ -185,7 +194,7 @@ impl<'a> Formulas<'a> {
 
     /// The value of `written` for the values of all names.
     fn value<R: Scalar>(&self, written: &Written, names: &[R]) -> R {
-        written.formula.value(Values { names, outputs: &[], networks: self.networks })
+        written.formula.value(Values { names, outputs: &[], looked: &[], networks: self.networks })
     }
 
     /// The state `substeps` substeps after `inputs`, the formulas being derivatives.

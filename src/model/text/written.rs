@@ -32,15 +32,27 @@ pub(super) enum FormulaKind {
     Policy,
     /// The control from a network's output: no controls, but the outputs.
     Act,
+    /// The cost of a stage: all of them, and references.
+    Stage,
+    /// The cost of the end of a plan: the same without controls.
+    Terminal,
+    /// What costs are told at a step: time alone.
+    Reference,
 }
 
 impl FormulaKind {
     /// What a formula may use, for an error about one that uses more.
     fn allowed(self) -> &'static str {
         match self {
-            Self::Dynamics => "dynamics know states, controls, parameters and time",
+            Self::Dynamics => "dynamics know states, controls, parameters, disturbances and time",
             Self::Task => "a margin knows states, parameters and time",
-            Self::Picture => "a body stands where states say",
+            Self::Picture => "a body stands where states, parameters and time say",
+            Self::Stage => "the cost of a stage knows states, controls, references and time",
+            Self::Terminal => {
+                "a terminal cost is of the state after the last control, and knows states, \
+                 references, parameters and time"
+            }
+            Self::Reference => "a reference knows `t` and `step` alone",
             Self::Policy | Self::Act => {
                 "a policy knows states, parameters and time, and makes the controls"
             }
@@ -69,6 +81,17 @@ impl Written {
         Ok(written)
     }
 
+    /// Parses what stands at `key` of `section`, if something does.
+    pub(super) fn optional(
+        section: &Section<'_>,
+        key: &str,
+        scope: &Scope,
+        kind: FormulaKind,
+    ) -> Result<Option<Self>> {
+        let value = section.entries().find(|(name, _)| *name == key);
+        value.map(|(_, value)| Self::read(section, key, value, scope, kind)).transpose()
+    }
+
     /// Refuses what the kind does not allow.
     fn check(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
         if kind != FormulaKind::Act
@@ -77,21 +100,39 @@ impl Written {
             let problem = "`out` stands in `act` of `[policy]` alone";
             return Err(self.refuse(origin, output.at, problem));
         }
-        if kind != FormulaKind::Dynamics {
-            self.check_controls(origin, scope, kind)?;
+        match kind {
+            FormulaKind::Dynamics | FormulaKind::Stage => Ok(()),
+            FormulaKind::Reference => self.check_time(origin, scope),
+            _ => self.check_deeds(origin, scope, kind),
         }
-        Ok(())
     }
 
-    /// Refuses controls, whether used here or by an intermediate formula.
-    fn check_controls(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
+    /// Refuses all but the time and the number of the step.
+    fn check_time(&self, origin: &Origin, scope: &Scope) -> Result<()> {
+        let allowed = FormulaKind::Reference.allowed();
+        if let Some(call) = self.formula.networks().first() {
+            return Err(self.refuse(origin, call.at, format!("it calls a network; {allowed}")));
+        }
+        let time = scope.inputs() as u32 - 2..scope.inputs() as u32;
+        match self.formula.names().find(|found| !time.contains(&found.number)) {
+            Some(Use { number, at }) => {
+                let name = scope.names.at(number);
+                Err(self.refuse(origin, at, format!("it reads `{name}`; {allowed}")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses controls and disturbances, whether used here or by an intermediate formula.
+    fn check_deeds(&self, origin: &Origin, scope: &Scope, kind: FormulaKind) -> Result<()> {
         for Use { number, at } in self.formula.names() {
-            let Some(control) = scope.control_behind(number) else { continue };
-            let (name, control) = (scope.names.at(number), scope.names.at(control));
-            let what = if name == control {
-                format!("`{name}` is a control")
+            let Some(deed) = scope.deed_behind(number) else { continue };
+            let kind_of = if scope.is_control(deed) { "control" } else { "disturbance" };
+            let (name, deed) = (scope.names.at(number), scope.names.at(deed));
+            let what = if name == deed {
+                format!("`{name}` is a {kind_of}")
             } else {
-                format!("`{name}` uses the control `{control}`")
+                format!("`{name}` uses the {kind_of} `{deed}`")
             };
             return Err(self.refuse(origin, at, format!("{what}; {}", kind.allowed())));
         }

@@ -6,6 +6,7 @@ mod deviation;
 mod growth;
 mod paths;
 mod plane;
+mod tracks;
 mod value;
 
 use super::figure::Figure;

@@ -1,6 +1,8 @@
 //! Text that the kernels share: sizes, access to states and tables, calls of recorded functions.
 
-use super::kernels::WORKGROUP;
+use std::ops::Range;
+
+use super::kernels::{Slot, WORKGROUP};
 use crate::formula::record;
 use crate::formula::wgsl::{Arithmetic, function_with};
 use crate::rollout::{HUGE, NON_FINITE, normal_pair};
@@ -118,4 +120,25 @@ pub(super) fn recorded_pair(arithmetic: Arithmetic) -> String {
     let pair = record(2, |u| normal_pair(u[0], u[1]).to_vec());
     let arguments = [("magnitude", 1), ("turn", 1)];
     function_with("normal_pair", &arguments, &pair, arithmetic)
+}
+
+/// A function that loads the numbers `part` of row `row` of a table of rows of `length` numbers.
+pub(super) fn loader(
+    name: &str,
+    kind: &str,
+    table: &str,
+    length: usize,
+    part: Range<usize>,
+) -> String {
+    let all: Vec<String> = part.map(|i| format!("{table}[at + {i}u]")).collect();
+    format!(
+        "fn {name}(row: u32) -> {kind} {{\n    let at = row * {length}u;\n    \
+         return {kind}({});\n}}\n",
+        all.join(", ")
+    )
+}
+
+/// A table of numbers that kernels read.
+pub(super) fn storage(slot: Slot, name: &str) -> String {
+    format!("@group(0) @binding({}) var<storage, read> {name}: array<f32>;\n", slot as u32)
 }

@@ -44,6 +44,8 @@ pub enum Kernel {
     MppiStart,
     /// Rolls the samples of MPPI problems and adds up their costs.
     MppiRollout,
+    /// Adds what the end of MPPI problems costs.
+    MppiTerminal,
     /// Weighs the samples of MPPI problems.
     MppiUpdate,
     /// Multiplies and adds in registers.
@@ -107,7 +109,8 @@ pub enum Slot {
     Sink = 16,
     /// `streams`: key and stream of each problem's noise.
     Streams = 17,
-    /// `plans`: nominal controls, and what the cost wants to know, `[problems, H, NU + NC]`.
+    /// `plans`: nominal controls, and what the cost wants to know, `[problems, H, NU + NC]`; where the
+    /// end costs, `[problems, NU + NC]` behind them, without controls.
     Plans = 18,
     /// `starts`: `[problems, NX]`.
     Starts = 20,
@@ -157,7 +160,7 @@ impl Kernel {
         Self::Observe,
     ];
 
-    /// The kernels of MPPI.
+    /// The kernels of MPPI where the end of a plan costs nothing.
     pub const MPPI: [Self; 3] = [Self::MppiStart, Self::MppiRollout, Self::MppiUpdate];
 
     /// The kernels that measure what an adapter can do.
@@ -179,6 +182,7 @@ impl Kernel {
             Self::HiddenLayer | Self::OutputLayer => "mlp",
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
+            Self::MppiTerminal => "mppi_terminal",
             Self::MppiUpdate => "mppi_update",
             Self::Peak => "peak",
             Self::Copy => "copy",
@@ -244,6 +248,7 @@ impl Kernel {
                 (S::State, ReadWrite),
                 (S::Totals, ReadWrite),
             ],
+            Self::MppiTerminal => &[(S::State, Read), (S::Streams, Read), (S::Totals, ReadWrite)],
             Self::MppiUpdate => {
                 &[(S::Streams, Read), (S::Plans, Read), (S::Totals, Read), (S::Partials, ReadWrite)]
             }

@@ -1,14 +1,16 @@
 //! The text of the MPPI kernels: dynamics, cost, controls and noise of one planning.
 
-use std::ops::Range;
-
-use super::glue::{FINITE, PARAMS, RNG, call, component, constants, recorded_pair, state_glue};
+use super::glue::{
+    FINITE, PARAMS, RNG, call, component, constants, loader, recorded_pair, state_glue, storage,
+};
 use super::kernels::{Access, Kernel, PARTIAL_HEADER, Slot};
+use super::lookups::stage_lookups;
+use super::mppi_terminal::TerminalText;
 use super::physics_glue::{Outline, physics_glue};
 use crate::backend::physics::{Function, Part, Role};
 use crate::formula::wgsl::{Arithmetic, CHOICES, careful_function, function};
 use crate::formula::{Expr, Graph, record};
-use crate::model::StageCost;
+use crate::model::{Model, StageCost};
 use crate::real::Real;
 use crate::rollout::{Disturbance, MppiSpec, NoiseShape, Planning, SPLINE_SUPPORT, ValueTerm};
 
@@ -38,7 +40,7 @@ pub(in super::super) fn tile_steps(controls: usize) -> usize {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MppiText {
     outline: Outline,
-    /// Step, stage, and cell of a map.
+    /// Step, stage with its places on maps, and cell of the map that charges besides.
     functions: Vec<Function>,
     /// What both kernels that draw noise need.
     noise: String,
@@ -47,6 +49,8 @@ pub struct MppiText {
     /// Tables and networks that are bound besides those of every task.
     noise_table: Option<(Slot, Access)>,
     rollout_tables: Vec<(Slot, Access)>,
+    /// What the end costs, where it does.
+    terminal: Option<TerminalText>,
 }
 
 impl MppiText {
@@ -62,20 +66,16 @@ impl MppiText {
             contexts: cost.contexts,
             driving: None,
         };
-        let contexts = [0, cost.contexts];
-        let mut functions = vec![
-            Function::of(model, Role::Step, &model.step, [0, 0]),
-            Function::of(model, Role::Stage, &cost.stage, contexts),
-        ];
-        let cell = cost.map.iter().map(|map| Function::of(model, Role::Cell, &map.cell, [0, 0]));
-        functions.extend(cell);
+        let functions = rollout_functions(model, cost);
         let (states, tables) = (outline.states, rollout_tables(planning, &functions));
+        let terminal = cost.terminal.as_ref();
         Self {
-            outline,
+            terminal: terminal.map(|terminal| TerminalText::new(model, cost, terminal, &outline)),
             functions,
             noise: noise_text(spec, cost.contexts),
             charge: [
                 charge_text(cost, spec),
+                stage_lookups(cost, &outline),
                 value_text(value.as_ref()),
                 push_text(states, disturbance.as_ref()),
             ]
@@ -86,11 +86,20 @@ impl MppiText {
                 NoiseShape::Spline { .. } => Some((Slot::Spline, Access::Read)),
             },
             rollout_tables: tables,
+            outline,
         }
+    }
+
+    /// The kernels that it has texts of.
+    pub fn kernels(&self) -> impl Iterator<Item = Kernel> {
+        Kernel::MPPI.into_iter().chain(self.terminal.as_ref().map(|_| Kernel::MppiTerminal))
     }
 
     /// What `kernel` binds.
     pub fn bindings(&self, kernel: Kernel) -> Vec<(Slot, Access)> {
+        if let (Kernel::MppiTerminal, Some(terminal)) = (kernel, &self.terminal) {
+            return terminal.bindings();
+        }
         let mut list = kernel.bindings(false);
         if kernel != Kernel::MppiStart {
             list.extend(self.noise_table);
@@ -101,11 +110,14 @@ impl MppiText {
         list
     }
 
-    /// The WGSL module of `kernel`, one of [`Kernel::MPPI`].
+    /// The WGSL module of `kernel`, one of [`MppiText::kernels`].
     ///
     /// # Panics
     /// For any other kernel.
     pub fn compose(&self, kernel: Kernel) -> String {
+        if let (Kernel::MppiTerminal, Some(terminal)) = (kernel, &self.terminal) {
+            return terminal.compose();
+        }
         let Outline { states, controls, .. } = self.outline;
         let state = state_glue(states);
         let parts = match kernel {
@@ -154,16 +166,28 @@ fn rollout_tables(planning: &Planning, functions: &[Function]) -> Vec<(Slot, Acc
     let reads = functions.iter().any(|function| function.reads(Part::Parameters));
     let read = |slot| (slot, Access::Read);
     let mut tables = vec![];
-    tables.extend(cost.map.as_ref().map(|_| read(Slot::Cells)));
+    let maps = cost.map.is_some() || cost.lookups.is_some();
+    tables.extend(maps.then(|| read(Slot::Cells)));
     tables.extend(value.as_ref().map(|_| read(Slot::Value)));
     tables.extend(disturbance.as_ref().map(|_| read(Slot::Push)));
     tables.extend(reads.then_some((Slot::Values, Access::Constant)));
     tables
 }
 
-/// A table of numbers that kernels read.
-fn storage(slot: Slot, name: &str) -> String {
-    format!("@group(0) @binding({}) var<storage, read> {name}: array<f32>;\n", slot as u32)
+/// The functions of the rollout: step, stage with its places on maps, cell of a map.
+fn rollout_functions(model: &Model, cost: &StageCost) -> Vec<Function> {
+    let asked = cost.lookups.as_ref().map_or(0, |lookups| lookups.maps.len());
+    let stage = [0, cost.contexts, asked];
+    let told = [0, cost.contexts, 0];
+    let mut functions = vec![
+        Function::of(model, Role::Step, &model.step, [0; 3]),
+        Function::of(model, Role::Stage, &cost.stage, stage),
+    ];
+    let cell = cost.map.iter().map(|map| Function::of(model, Role::Cell, &map.cell, [0; 3]));
+    functions.extend(cell);
+    let places = cost.lookups.iter();
+    functions.extend(places.map(|all| Function::of(model, Role::StagePlaces, &all.cells, told)));
+    functions
 }
 
 /// The generator, the shape of the noise and the controls that it makes of a plan.
@@ -207,16 +231,6 @@ fn draw(controls: usize) -> String {
     }
     let all: Vec<String> = (0..controls).map(|i| format!("z{i}")).collect();
     text + &format!("    return array<f32, NU>({});\n}}\n", all.join(", "))
-}
-
-/// A function that loads the numbers `part` of row `row` of a table of rows of `length` numbers.
-fn loader(name: &str, kind: &str, table: &str, length: usize, part: Range<usize>) -> String {
-    let all: Vec<String> = part.map(|i| format!("{table}[at + {i}u]")).collect();
-    format!(
-        "fn {name}(row: u32) -> {kind} {{\n    let at = row * {length}u;\n    \
-         return {kind}({});\n}}\n",
-        all.join(", ")
-    )
 }
 
 /// `recurrence`: the next of correlated numbers.

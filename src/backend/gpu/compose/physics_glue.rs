@@ -67,8 +67,8 @@ impl Physics {
 }
 
 /// `functions` as recorded and what calls them: `advance`, `target_at`, `constraint_at`,
-/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, all of them given the number of the step, or of the
-/// parts of periods so far where these have several.
+/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, `cells_of`, `ended`, all of them given the number of the
+/// step, or of the parts of periods so far where these have several.
 pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String {
     let reads = |part| functions.iter().any(|function| function.reads(part));
     let mut glue = String::new();
@@ -118,10 +118,24 @@ pub(super) fn seconds_glue(period: f32, points: u32) -> String {
     )
 }
 
+/// What the places of a formula on maps are.
+const CELLS: &str = "array<f32, LOOKUPS>";
 /// What the kernels give every formula.
-const STATE: &str = "x: array<f32, NX>";
+pub(super) const STATE: &str = "x: array<f32, NX>";
 /// What they give those of steps and stages besides.
-const CONTROL: &str = "u: array<f32, NU>";
+pub(super) const CONTROL: &str = "u: array<f32, NU>";
+
+/// `arguments` of a cost, with the context where there is one.
+pub(super) fn told<'a>(outline: &Outline, arguments: &[&'a str]) -> Vec<&'a str> {
+    let context = (outline.contexts > 0).then_some("context: array<f32, CONTEXTS>");
+    arguments.iter().copied().chain(context).collect()
+}
+
+/// The names of arguments.
+pub(super) fn names_of(arguments: &[&str]) -> String {
+    let names = arguments.iter().map(|argument| argument.split(':').next().unwrap_or_default());
+    names.collect::<Vec<_>>().join(", ")
+}
 
 /// The function by which the kernels call `function`.
 fn caller(outline: &Outline, function: &Function) -> String {
@@ -132,11 +146,11 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Role::Control => ("control_of", vec![STATE], "array<f32, NU>", true),
         Role::Observe => ("observed", vec![STATE], "array<f32, SEEN>", true),
         Role::Act => ("acted", vec![STATE, "said: array<f32, SAID>"], "array<f32, NU>", true),
-        Role::Stage if outline.contexts == 0 => ("staged", vec![STATE, CONTROL], "f32", false),
-        Role::Stage => {
-            ("staged", vec![STATE, CONTROL, "context: array<f32, CONTEXTS>"], "f32", false)
-        }
+        Role::Stage => ("staged", told(outline, &[STATE, CONTROL]), "f32", false),
+        Role::StagePlaces => ("cells_of", told(outline, &[STATE, CONTROL]), CELLS, true),
         Role::Cell => ("cell_at", vec![STATE], "f32", false),
+        Role::Terminal => ("ended", told(outline, &[STATE]), "f32", false),
+        Role::TerminalPlaces => ("cells_of", told(outline, &[STATE]), CELLS, true),
     };
     let said = outline.driving.as_ref().map_or(0, |driving| driving.outputs);
     // A single number is an f32 to the recorded function, and an array to the kernel.
@@ -149,6 +163,7 @@ fn caller(outline: &Outline, function: &Function) -> String {
         Part::Control => array("u", outline.controls),
         Part::Said => array("said", said),
         Part::Context => array("context", outline.contexts),
+        Part::Looked => format!("looked_up({}, t)", names_of(&arguments)),
         Part::Parameters => "parameters()".to_owned(),
         Part::Seconds => "seconds_at(t)".to_owned(),
         Part::Step if outline.points > 1 => "f32(t / POINTS)".to_owned(),
