@@ -77,7 +77,7 @@ impl Cost<2, 1, 0> for Near {
 pub(crate) fn registry() -> Result<Registry> {
     Registry::new().with("sled", |numbers| {
         let sled = Clipped::new(Sled { drag: numbers.number("drag", 0.2) as f32 });
-        let (push, near) = (Controller::of(&sled, Push), StageCost::of(sled, Near));
+        let (push, near) = (Controller::of(&sled, Push), StageCost::of(sled.clone(), Near));
         let model = Model::of(sled);
         let costs = Costs::of(&model, near, Vec::new())?;
         Ok(Registered::new(model).formula("push", push).costs(costs))

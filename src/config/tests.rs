@@ -153,6 +153,7 @@ fn slices_have_the_cells_of_the_study() {
 fn flags_override_keys_and_keys_override_profiles() {
     let text = format!("profile = 'study'\nseed = 3\nrollout.horizon = 40\n{RACE}");
     let overrides = Overrides {
+        registry: Registry::default(),
         profile: Some(Profile::Paper),
         seed: Some(u64::MAX),
         set: vec!["rollout.gamma=0.9".into(), "slice.x.step=0.2".into()],

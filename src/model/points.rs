@@ -111,6 +111,13 @@ impl Model {
         states
     }
 
+    /// The inputs of the formulas at point number `point` of the period that begins at `step`, where each lane may
+    /// be at a step of its own.
+    #[cfg(feature = "cli")]
+    pub(crate) fn part_inputs<R: Real>(&self, x: &[R], u: &[R], step: R, point: u32) -> Vec<R> {
+        self.arguments_at(x, u, [self.elapsed_at(step, point), step])
+    }
+
     /// Periods since the start at a point of the period that begins at `step`.
     pub(crate) fn elapsed_at<R: Real>(&self, step: R, point: u32) -> R {
         if point == 0 { step } else { step + R::lit(share(point, self.points)) }

@@ -30,7 +30,7 @@ impl Judged {
         };
         Self {
             measure: prefix(&all, all.len(), spec),
-            reached: reached(&all, spec).map(|look| model.moment(look).sample() as u32),
+            reached: reached(&all, spec),
             target: at(|model, x, step| model.target_at(x, step)),
             constraint: at(|model, x, step| model.constraint_at(x, step)),
         }
@@ -42,29 +42,28 @@ impl Judged {
     }
 }
 
-/// The measure of the first `count` states.
-fn prefix(all: &[Margins], count: usize, spec: &RolloutSpec) -> f64 {
-    measure_of(&all[..count], spec, &Tightening::none(spec))
-}
-
-/// The states that are looked at: those that are stored, `states`, and the points between them.
+/// The states that are looked at: those that are stored, and the points between them.
 fn looks(model: &Model, run: &Trajectory, states: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut looks: Vec<Vec<f64>> = states.first().cloned().into_iter().collect();
-    for (step, (next, u)) in (0..).zip(states.iter().skip(1).zip(&run.controls)) {
-        if model.points > 1 {
-            let u: Vec<f64> = u.iter().copied().map(f64::from).collect();
-            let mut parts = model.parts(&states[step as usize], &u, step);
-            parts.pop();
-            looks.extend(parts);
-        }
-        looks.push(next.clone());
+    let mut looks: Vec<Vec<f64>> = states.iter().take(1).cloned().collect();
+    for ((step, pair), u) in (0..).zip(states.windows(2)).zip(&run.controls) {
+        let u: Vec<f64> = u.iter().copied().map(f64::from).collect();
+        let mut parts = model.parts(&pair[0], &u, step);
+        parts.truncate(model.points as usize - 1);
+        looks.extend(parts);
+        looks.push(pair[1].clone());
     }
     looks
 }
 
-/// The number of the first look with which the measure is positive: from there on it stays so.
-fn reached(all: &[Margins], spec: &RolloutSpec) -> Option<usize> {
+/// The measure of the first `count` looks.
+fn prefix(all: &[Margins], count: usize, spec: &RolloutSpec) -> f64 {
+    measure_of(&all[..count], spec, &Tightening::none(spec))
+}
+
+/// The first step with which the measure is positive, that of the sample at or after the look: from there on it
+/// stays so.
+fn reached(all: &[Margins], spec: &RolloutSpec) -> Option<u32> {
     let counts: Vec<usize> = (1..=all.len()).collect();
     let place = counts.partition_point(|&count| prefix(all, count, spec) <= 0.0);
-    (place < counts.len()).then_some(place)
+    all.get(place).map(|margins| margins.moment.sample() as u32)
 }

@@ -15,7 +15,8 @@ pub struct Shapes {
 }
 
 impl Shapes {
-    /// The units with which the score is the reach-avoid measure itself: `1 / gamma^t` at step t.
+    /// The units with which the score is the reach-avoid measure itself: `1 / gamma^t` at step t. Points inside a
+    /// period have those of the sample after them, so that with points only the sign is that of the measure.
     pub fn of_discount(spec: &RolloutSpec) -> Self {
         let gamma = f64::from(spec.gamma);
         let units: Vec<f64> =

@@ -77,11 +77,16 @@ impl Ask<'_> {
         self.of_each(&plain, &shapes.units(), level, in_f64)
     }
 
-    /// The reach-avoid measure of each state.
+    /// The measure of each state, as calibration has it.
     fn measures(&self, alpha: f64) -> Result<Vec<f64>> {
-        let (none, units) = (Tightening::none(self.spec), Shapes::of_discount(self.spec));
+        let units = Shapes::of_discount(self.spec);
+        let (spec, tightening) = match self.context.model().points {
+            1 => (*self.spec, Tightening::none(self.spec)),
+            // In these units points are discounted as the sample after them.
+            _ => (RolloutSpec { gamma: 1.0, ..*self.spec }, units.units()),
+        };
         let in_f64 = |x: &[f32]| units.score(&states_margins(self.context.plant(), x, self.spec));
-        self.of_each(self.spec, &none, alpha, in_f64)
+        self.of_each(&spec, &tightening, alpha, in_f64)
     }
 
     /// The measure of each state, in f64 where f32 cannot tell on which side of `level` or of 0 it lies.

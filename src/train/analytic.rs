@@ -13,7 +13,7 @@ use super::rows::Rows;
 use super::run::Learner;
 use super::score::{mean_measure, share, successes};
 use super::settings::AnalyticSettings;
-use super::soft::{Measured, measure_tape, observe_tape, part_tapes};
+use super::soft::{Measured, further_tapes, measure_tape, observe_tape, step_tape};
 use super::starts::Mixture;
 use super::tape::Tape;
 use crate::backend::Backend;
@@ -54,8 +54,10 @@ pub struct Task<'a> {
 pub struct Analytic<'a> {
     task: Task<'a>,
     settings: AnalyticSettings,
-    /// The parts of a step.
-    parts: Vec<Arc<Tape>>,
+    /// The first part of a step.
+    step: Arc<Tape>,
+    /// The parts behind it, where a period has several.
+    further: Vec<Arc<Tape>>,
     observe: Option<Arc<Tape>>,
     /// What temperature and scale are multiples of.
     unit: f64,
@@ -117,7 +119,11 @@ impl<'a> Analytic<'a> {
         };
         Self {
             unit,
-            parts: part_tapes(&task.model, &task.interface).into_iter().map(Arc::new).collect(),
+            step: Arc::new(step_tape(&task.model, &task.interface)),
+            further: further_tapes(&task.model, &task.interface)
+                .into_iter()
+                .map(Arc::new)
+                .collect(),
             observe: observe_tape(&task.model, &task.interface).map(Arc::new),
             measure: Arc::new(measure_tape(&task.model, measured)),
             adam: Adam::new(network.parameters.len()),
@@ -140,9 +146,12 @@ impl<'a> Analytic<'a> {
                 Some(observe) => apply(observe, temperature, [x.clone(), step.clone()]),
                 None => x.clone(),
             };
-            let (sample, out) = (x.clone(), network.forward(seen));
-            for part in &self.parts {
-                x = apply(part, temperature, [sample.clone(), x, out.clone(), step.clone()]);
+            let out = network.forward(seen);
+            let sample = x.clone();
+            x = apply(&self.step, temperature, [x, out.clone(), step.clone()]);
+            states.push(x.clone());
+            for part in &self.further {
+                x = apply(part, temperature, [x, sample.clone(), out.clone(), step.clone()]);
                 states.push(x.clone());
             }
         }

@@ -74,7 +74,7 @@ impl<'a> Rows<'a> {
             let x = columns(self.states.numbers(), states, tile);
             let u = columns(controls, self.model.controls.len(), tile);
             let step = columns(self.steps, 1, tile);
-            let mut inputs = self.model.arguments_at(&x, &u, [step[0], step[0]]);
+            let mut inputs = self.model.arguments_at(&x, &u, [step[0]; 2]);
             inputs.extend(columns(more, beyond, tile));
             store(graph.eval(&inputs).into_iter(), found, outputs);
         }

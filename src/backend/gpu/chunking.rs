@@ -291,7 +291,7 @@ mod tests {
                     let chunking = planned(&Adapter::made_up(binding), work, &size);
                     let chunking = chunking.expect("a chunking within the limits");
                     let layered = network.filter(|_| fused.is_none());
-                    let bytes = column_bytes(work, 12, 0, layered, chunking.segment);
+                    let bytes = column_bytes(work, &size, layered, chunking.segment);
                     let stride = u64::from(chunking.stride);
                     assert_eq!(stride % COLUMN_UNIT, 0);
                     assert!(bytes.iter().all(|bytes| bytes * stride <= binding));

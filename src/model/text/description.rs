@@ -96,8 +96,8 @@ impl Description {
         let control_names: Vec<&str> = controls.iter().map(|axis| axis.name.as_str()).collect();
         let policy = root.section("policy")?;
         let policy = policy.map(|policy| policy::policy(&policy, &control_names, &scope));
-        let policy = policy.transpose()?.flatten();
         let dynamics = dynamics::dynamics(&model, &state_names, time, &scope)?;
+        let policy = policy.transpose()?.flatten();
         Ok(Self {
             task: task::task(
                 &model.required("task", "the kind and its margins")?,
@@ -105,8 +105,8 @@ impl Description {
                 &dynamics,
                 time.period,
             )?,
-            costs: costs::costs(&model, &scope)?,
             dynamics,
+            costs: costs::costs(&model, &scope)?,
             bodies: bodies::bodies(model.section("bodies")?, &scope)?,
             shapes: shapes::shapes(model.section("shapes")?)?,
             policy,

@@ -95,8 +95,8 @@ impl Description {
         Ok(())
     }
 
-    /// The graph of the state after one part of a period, the next one where nothing is looked at between; of the
-    /// inputs of the model and one for each of the disturbances that `act`, as a share of its bound.
+    /// The graph of the state after one part of a period, the next one where nothing is looked at between, of
+    /// the inputs of the model and one for each of the disturbances that `act`, as a share of its bound.
     pub(super) fn step(&self, networks: &Networks, act: &[Disturbance]) -> Result<Graph> {
         let (path, formulas, stages) = match &self.dynamics {
             Dynamics::Next(formulas) => ("model.next", formulas, 1),

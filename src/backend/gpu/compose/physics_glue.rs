@@ -67,8 +67,8 @@ impl Physics {
 }
 
 /// `functions` as recorded and what calls them: `advance`, `target_at`, `constraint_at`,
-/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, `cells_of`, `ended`, all of them given the number of the step, or
-/// of the parts of periods so far where these have several.
+/// `control_of`, `observed`, `acted`, `staged`, `cell_at`, `cells_of`, `ended`, all of them given the number of the
+/// step, or of the parts of periods so far where these have several.
 pub(super) fn physics_glue(outline: &Outline, functions: &[&Function]) -> String {
     let reads = |part| functions.iter().any(|function| function.reads(part));
     let mut glue = String::new();
