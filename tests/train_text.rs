@@ -273,7 +273,7 @@ fn a_model_without_a_policy_is_trained_and_certified() {
     let (model, out) = (folder.path("cart.toml"), folder.path("trained"));
     std::fs::write(&model, CART).unwrap();
     refused(&["certify", &model], &["cart.toml", "no policy", "reachcast train"]);
-    let few = ["--set", "train.analytic.iterations=60", "--set", "train.held_out=512"];
+    let few = ["--set", "train.analytic.iterations=150", "--set", "train.held_out=512"];
     let told = done(&[&["train", &model, "--out", &out][..], &few].concat());
     let (_, section) = told.split_once("[policy]").unwrap();
     // A range of -1 to 3 is its middle and half of its width.

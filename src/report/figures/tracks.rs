@@ -153,19 +153,23 @@ pub(super) fn shape_legend(shapes: &[Shape]) -> impl Iterator<Item = (Swatch, St
 /// Draws the bodies of the first rollout as large as they are, with the lines that join them, at its first
 /// and its last state.
 pub(super) fn draw_bodies(plot: &mut Plot, tracks: &[Track]) {
-    let ends: [fn(&Vec<[f64; 2]>) -> Option<&[f64; 2]>; 2] =
-        [|path| path.first(), |path| path.last()];
-    for end in ends {
-        let place = |track: &Track| track.paths.first().and_then(end).copied();
-        for track in tracks {
-            let Some(here) = place(track) else { continue };
-            if let Some(there) = track.joined.and_then(|other| tracks.get(other)).and_then(place) {
-                let line = plot.line([here, there]);
-                plot.path("body joint", &line);
-            }
-            if let Some(size) = track.size {
-                plot.ellipse("body extent", here, plot.lengths(0.5 * size));
-            }
+    let path = |track: &Track| track.paths.first().cloned().unwrap_or_default();
+    let first: Vec<_> = tracks.iter().map(|track| path(track).first().copied()).collect();
+    let last: Vec<_> = tracks.iter().map(|track| path(track).last().copied()).collect();
+    draw_bodies_at(plot, tracks, &first);
+    draw_bodies_at(plot, tracks, &last);
+}
+
+/// Draws each body at its place, where it has one.
+fn draw_bodies_at(plot: &mut Plot, tracks: &[Track], places: &[Option<[f64; 2]>]) {
+    for (track, place) in tracks.iter().zip(places) {
+        let Some(here) = *place else { continue };
+        if let Some(there) = track.joined.and_then(|other| places.get(other).copied().flatten()) {
+            let line = plot.line([here, there]);
+            plot.path("body joint", &line);
+        }
+        if let Some(size) = track.size {
+            plot.ellipse("body extent", here, plot.lengths(0.5 * size));
         }
     }
 }
