@@ -10,8 +10,8 @@ use crate::rounding::upper;
 use crate::scenario::most_rollouts_of_check;
 use crate::scenario::settings::Settings;
 
-/// Most operations of a check that nobody allowed more: minutes to hours of a processor.
-pub(super) const USUAL: f64 = 1e14;
+/// Most operations of a check that nobody allowed more: minutes of a processor, an hour of a slow one.
+pub(super) const USUAL: f64 = 1e13;
 
 /// Says what a check takes at most.
 ///

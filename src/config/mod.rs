@@ -7,6 +7,7 @@ mod deterministic_settings;
 mod drop_settings;
 mod drops;
 mod enclosed;
+mod formula_name;
 mod keys;
 mod layers;
 mod learning;
@@ -43,7 +44,8 @@ pub use section::{
 pub use sequential::SequentialSection;
 pub use value::{Constant, Coordinates, Named};
 
-pub(crate) use plant::{check_network, no_formula};
+pub(crate) use formula_name::no_formula;
+pub(crate) use plant::check_network;
 
 use std::path::Path;
 

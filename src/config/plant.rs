@@ -138,12 +138,6 @@ impl Config {
     }
 }
 
-/// The refusal of the formula `name`.
-pub(crate) fn no_formula(system: &str, name: &str, has: &str) -> Error {
-    let problem = format!("`{name}` is unknown; formulas of {system}: {has}, or give a `file`");
-    Error::invalid("policy.formula", problem)
-}
-
 /// Refuses the network of `path` if it does not fit the model.
 pub(crate) fn check_network(model: &Model, path: &Path, network: &Mlp) -> Result<()> {
     let names: Vec<&str> = model.states.iter().map(|axis| axis.name.as_str()).collect();

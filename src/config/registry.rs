@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use super::plant::no_formula;
+use super::formula_name::no_formula;
 use crate::error::{Error, Result};
 use crate::model::{Controller, Costs, Model, Plant};
 use crate::studies::SYSTEMS;

@@ -1,6 +1,6 @@
 //! Why a run cannot go on: which term, reference or state is not finite, and where.
 
-use crate::model::{Costs, Model};
+use crate::model::{Costs, Model, TermKind};
 use crate::real::Real;
 use crate::rollout::HUGE;
 
@@ -34,13 +34,9 @@ fn along(model: &Model, costs: &Costs, x: &[f32], plan: &[f32], step: u32) -> Op
     for (stage, u) in plan.chunks(model.controls.len()).enumerate() {
         let now = step + stage as u32;
         let shares = costs.shares(&x, u, now);
-        let lost = shares.iter().zip(&costs.terms).find(|(share, _)| too_much(**share));
-        if let Some((share, term)) = lost {
-            return Some(format!(
-                "the term `{}` is {share} at stage {stage} of the plan, at {}",
-                term.name,
-                named(model, &x)
-            ));
+        let place = format!("at stage {stage} of the plan");
+        if let Some(found) = term(costs, &shares, TermKind::Stage, &place, &named(model, &x)) {
+            return Some(found);
         }
         let next = model.next(&x, u, now);
         if !next.iter().all(|x| x.is_finite()) {
@@ -48,7 +44,22 @@ fn along(model: &Model, costs: &Costs, x: &[f32], plan: &[f32], step: u32) -> Op
         }
         x = next;
     }
-    None
+    let end = step + (plan.len() / model.controls.len()) as u32;
+    let shares = costs.shares(&x, &vec![0.0; model.controls.len()], end);
+    term(costs, &shares, TermKind::Terminal, "at the end of the plan", &named(model, &x))
+}
+
+/// Which term of `kind` has a share that no sample can have, if one does.
+fn term(
+    costs: &Costs,
+    shares: &[f32],
+    kind: TermKind,
+    place: &str,
+    state: &str,
+) -> Option<String> {
+    let own = shares.iter().zip(&costs.terms).filter(|(_, term)| term.kind == kind);
+    let (share, term) = own.into_iter().find(|(share, _)| too_much(**share))?;
+    Some(format!("the term `{}.{}` is {share} {place}, at {state}", kind.name(), term.name))
 }
 
 /// Whether a cost is none that a sample can have.

@@ -3,6 +3,7 @@
 use super::record::{PlanRecord, SuccessRecord};
 use crate::model::{Costs, Model, Reference, ReferenceSource};
 use crate::rounding::{lower, upper};
+use crate::scenario::sampling::points_between;
 
 /// Share of the samples from which on they count as weighing the same.
 const ALL: f64 = 0.99;
@@ -39,12 +40,21 @@ pub(super) fn notes(
         record.runs.iter().enumerate().find_map(|(i, run)| Some((i, run.stopped.as_ref()?)));
     let stopped = first.map(|(run, why)| {
         format!(
-            "{stopped} of {runs} runs stopped early and are judged by the states that they have; \
-             run {run} at step {}: {}",
+            "{stopped} of {runs} runs stopped early: their costs end there, and they succeed only where \
+             the task was done before; run {run} at step {}: {}",
             why.step, why.reason
         )
     });
+    let looked = match model.points {
+        1 => "states are looked at only at the samples, and nothing is said of what lies between two of them"
+            .to_owned(),
+        points => format!(
+            "runs are judged at the samples and {}, which tables and pictures do not show",
+            points_between(points - 1)
+        ),
+    };
     fixed
+        .chain([looked])
         .chain(held(costs, record))
         .chain(batch)
         .chain(weights(record))

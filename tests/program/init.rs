@@ -36,6 +36,9 @@ fn every_carried_plant_is_one_to_start_from() {
         let policy = config.policy_source(Path::new(&folder.path(""))).unwrap();
         let plant = config.plant(&policy).unwrap();
         assert_eq!(plant.model.name, name);
+        for named in config.planned_files(Path::new(&folder.path(""))).unwrap() {
+            assert!(named.is_file(), "{} is not there", named.display());
+        }
         let lines = fs::read_to_string(&file).unwrap();
         assert!(lines.starts_with("# A starting configuration"), "{lines}");
         let sections = |text: &str| text.lines().filter(|line| line.starts_with('[')).count();

@@ -81,7 +81,11 @@ pub(super) const TEMPLATES: [Template; 10] = [
         name: "diff-drive",
         about: "two wheels in a room with pillars",
         text: text!("diff_drive.toml"),
-        files: &[],
+        files: &[Copy {
+            named: "diff_drive_room.npy",
+            name: "diff_drive_room.npy",
+            bytes: bytes!("diff_drive_room.npy"),
+        }],
         varied: "",
     },
     Template {
@@ -145,7 +149,8 @@ const SECTIONS: [(&str, &str); 9] = [
         "# The perturbation that a certificate allows for: every start within this distance of a certified one.
 # [deviation]
 # radius = 0.02
-# control = \"replay\" # the controls of the nominal start; or \"closed-loop\", the policy sees the perturbed state
+# control = \"replay\" # the controls of the nominal start. An unstable plant needs \"closed-loop\": the policy sees
+#                      # the perturbed start too, where replayed controls would let it drift away
 # epsilon = 0.1 # risk
 # beta = 0.001 # one minus the confidence
 ",
@@ -212,6 +217,13 @@ impl Template {
             self.name,
             self.commands(file).lines().map(|line| format!("# {line}\n")).collect::<String>()
         );
+        let own = match own.contains("control = \"closed-loop\"\n") {
+            true => own.replace(
+                "control = \"closed-loop\"\n",
+                "control = \"closed-loop\" # the policy sees the perturbed start too; else its nominal controls are replayed\n",
+            ),
+            false => own,
+        };
         let absent = |(section, _): &&(&str, &str)| !own.lines().any(|line| is_of(line, section));
         let rest: String =
             SECTIONS.iter().filter(absent).map(|(_, text)| format!("\n{text}")).collect();
