@@ -53,7 +53,7 @@ fn along(model: &Model, costs: &Costs, x: &[f32], plan: &[f32], step: u32) -> Op
 
 /// Whether a cost is none that a sample can have.
 fn too_much(share: f32) -> bool {
-    !(Real::abs(share) < HUGE)
+    share.is_nan() || Real::abs(share) >= HUGE
 }
 
 /// Which state after `x` is not finite.
