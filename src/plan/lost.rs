@@ -64,7 +64,7 @@ fn term(
 
 /// Whether a cost is none that a sample can have.
 fn too_much(share: f32) -> bool {
-    !(Real::abs(share) < HUGE)
+    share.is_nan() || Real::abs(share) >= HUGE
 }
 
 /// Which state after `x` is not finite.
