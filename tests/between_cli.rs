@@ -98,11 +98,11 @@ fn exact_distances_include_the_points() {
     };
     let [samples, points] = [exact("", "samples"), exact("between = 3\n", "points")];
     assert_eq!(samples[0], points[0]);
-    let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
     let below = samples.iter().zip(&points).filter(|(sample, point)| **sample > **point + 1e-9);
     assert_eq!(below.count(), 0, "{samples:?} and {points:?}");
-    let above = samples.iter().zip(&points).filter(|(sample, point)| !close(**sample, **point));
-    assert!(above.count() > 2, "{samples:?} and {points:?}");
+    // The rule of integration damps the spring a little: the point behind a sample is farther than the next one.
+    let above = samples.iter().zip(&points).skip(1).filter(|(sample, point)| point > sample);
+    assert_eq!(above.count(), samples.len() - 1, "{samples:?} and {points:?}");
 }
 
 #[test]

@@ -237,7 +237,7 @@ fn policies_that_do_not_fit() {
     folder.file("policy.safetensors", &vast);
     certify(&["not a whole safetensors file"]);
     folder.file("policy.safetensors", network(&[4, 16, 3], 0.1));
-    certify(&["maps 4 inputs to 3 outputs", "12 states and 3 controls"]);
+    certify(&["takes 4 inputs, the model has 12 states", "ego_x", "`state_order`"]);
     folder.file("policy.safetensors", network(&[12, 16, 3], f32::NAN));
     certify(&["layers.0.weight[0] is NaN"]);
     assert!(!Path::new(&folder.path("out")).exists());

@@ -7,7 +7,7 @@ use super::inputs::{inputs, networks};
 use super::options::Global;
 use super::output::plain;
 use super::progress::Progress;
-use super::{Outcome, devices, folder_of, report, summary};
+use super::{Outcome, caveats, devices, folder_of, report, summary};
 use crate::certificate::{Certificate, manifest};
 use crate::config::{Config, PolicySource};
 use crate::error::Result;
@@ -34,7 +34,9 @@ pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     inputs(path, &policy, networks(&config).chain(named)).spare_folder(&out)?;
     let manifest = manifest_of(&config, &policy)?;
     let work = Certify { global, config: &config, out: &out, manifest: &manifest };
-    let (record, mut staged) = work.run(&config.plant(&policy)?)?;
+    let plant = config.plant(&policy)?;
+    caveats::say(global, &config, &plant);
+    let (record, mut staged) = work.run(&plant)?;
     let network = match policy {
         PolicySource::Network { bytes, .. } => Some(bytes),
         PolicySource::Formula(_) => None,

@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod caveats;
 mod certify;
 pub(crate) mod devices;
 mod effort;

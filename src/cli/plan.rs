@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::options::Global;
 use super::planned::{Steered, stage, text};
 use super::progress::Progress;
-use super::{Outcome, devices, folder_of, report};
+use super::{Outcome, caveats, devices, folder_of, report};
 use crate::backend::Backend;
 use crate::config::{Config, PolicySource};
 use crate::digest::sha256;
@@ -37,6 +37,8 @@ pub(super) fn run(global: &Global, path: &Path) -> Result<Outcome> {
     // Before the work: a folder that cannot be written to would waste it.
     let mut staged = Staged::new(&out)?;
     check_room(&out, asked.estimate())?;
+    let told = caveats::undisturbed(&config).into_iter();
+    caveats::tell(global, told);
     let steered = asked.steer(&backend, &progress)?;
     devices::note_events(global, &backend);
     progress.check()?;

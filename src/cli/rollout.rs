@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::inputs::{inputs, networks};
 use super::options::Global;
 use super::progress::Progress;
-use super::{Outcome, devices, document, folder_of, replayed, report};
+use super::{Outcome, caveats, devices, document, folder_of, replayed, report};
 use crate::backend::{Event, Program};
 use crate::config::Config;
 use crate::error::Result;
@@ -67,7 +67,9 @@ pub(super) fn run(global: &Global, path: &Path, starts: &Path, measures: &Path) 
     inputs(path, &policy, read).spare_file(measures)?;
     spare_existing(measures, global.existing)?;
     let work = Rollout { global, spec, starts, measures };
-    let summary = work.run(&config.plant(&policy)?)?;
+    let plant = config.plant(&policy)?;
+    caveats::say(global, &config, &plant);
+    let summary = work.run(&plant)?;
     report(global, &document(&summary), || text(&summary))?;
     Ok(Outcome::Done)
 }

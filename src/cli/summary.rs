@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::rollout::PairControl;
 use crate::rounding::{interval, lower, number, upper};
 use crate::scenario::record::{Claim, GlobalRecord, GrowthOutcome, Record};
 
@@ -20,6 +21,7 @@ it, fresh where it is drawn anew; fixed shape: one number scales bounds that a p
 pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     let mut lines = vec![headline(record), String::new()];
     lines.extend(record.statements.iter().map(|statement| format!("* {statement}")));
+    lines.extend(replayed(record));
     lines.push(String::new());
     lines.extend(table(record));
     lines.push(TABLE.to_owned());
@@ -50,6 +52,16 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
     let names = files.iter().map(|file| file.display().to_string());
     lines.push(format!("files           {}", names.collect::<Vec<_>>().join("\n                ")));
     lines.join("\n") + "\n"
+}
+
+/// What may be the matter where perturbed starts fail under controls that are not theirs.
+fn replayed(record: &Record) -> Option<String> {
+    let deviation = &record.deviation;
+    (!record.holds && deviation.control == PairControl::Replay).then(|| {
+        "* Perturbed starts are driven by the controls of the nominal one (`deviation.control = \"replay\"`): where \
+         the plant is unstable they drift away. `--set deviation.control=closed-loop` lets the policy see them."
+            .to_owned()
+    })
 }
 
 /// System, policy and verdict.

@@ -102,6 +102,13 @@ impl Config {
         Ok(self)
     }
 
+    /// The names of the disturbances that a model as text has.
+    pub fn disturbances(&self) -> Vec<&str> {
+        let section = self.model.as_ref().and_then(|model| model.get("disturbances"));
+        let section = section.and_then(Value::as_table).into_iter();
+        section.flat_map(|section| section.keys().map(String::as_str)).collect()
+    }
+
     /// The description in the sections `model` and `policy`.
     pub(super) fn description(
         &self,

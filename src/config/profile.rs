@@ -16,6 +16,7 @@ use super::value::{Constant, Coordinates, Named};
 use crate::plan::PlanSettings;
 use crate::rollout::PairControl;
 use crate::scenario::growth_plan::{Around, GrowthMethod, GrowthPlan, GrowthShape};
+use crate::scenario::least_perturbation;
 use crate::scenario::record::decimal;
 use crate::scenario::settings::{BoundarySearch, ConstantRegion, DeviationSource, Joint};
 use crate::studies::SystemSection;
@@ -23,6 +24,8 @@ use crate::system::{Axis, DoubleIntegrator, System};
 
 /// Steps of a slice that nobody asked for.
 const SLICE_STEPS: f64 = 20.0;
+/// Share of the least radius that f32 has points enough for, so that it is one in f32 too.
+const ENOUGH: f64 = 1.001;
 
 /// The double integrator; the published study has no such experiment, so the profiles differ in
 /// their accounting alone.
@@ -62,8 +65,14 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     let narrowest = widths.filter(|width| *width > 0.0).fold(f64::INFINITY, f64::min);
     let narrowest = if narrowest.is_finite() { narrowest } else { 1.0 };
     let mut config = common(profile, None, states, &state, SliceSection { x, y });
-    config.deviation.radius = narrowest / 50.0;
-    config.growth.radius = narrowest / 4.0;
+    let (least, growth) = (ENOUGH * least_perturbation(states), &mut config.growth);
+    config.deviation.radius = (narrowest / 50.0).max(least);
+    // Upward, the first radius is the one that has to be large enough; those that are too large are not reached.
+    let smaller = match growth.method {
+        GrowthMethod::Upward => growth.factor.powi(growth.rounds as i32 - 1),
+        GrowthMethod::Shrinking => 1.0,
+    };
+    growth.radius = (narrowest / 4.0).max(least * smaller);
     config.train = Some(learning::described());
     config
 }

@@ -50,13 +50,7 @@ fn along(model: &Model, costs: &Costs, x: &[f32], plan: &[f32], step: u32) -> Op
 }
 
 /// Which term of `kind` has a share that no sample can have, if one does.
-fn term(
-    costs: &Costs,
-    shares: &[f32],
-    kind: TermKind,
-    place: &str,
-    state: &str,
-) -> Option<String> {
+fn term(costs: &Costs, shares: &[f32], kind: TermKind, place: &str, state: &str) -> Option<String> {
     let own = shares.iter().zip(&costs.terms).filter(|(_, term)| term.kind == kind);
     let (share, term) = own.into_iter().find(|(share, _)| too_much(**share))?;
     Some(format!("the term `{}.{}` is {share} {place}, at {state}", kind.name(), term.name))

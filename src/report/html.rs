@@ -103,6 +103,18 @@ fn statements(record: &Record) -> String {
     )
 }
 
+/// That the disturbances of the model are 0, where it has some.
+fn undisturbed(record: &Record) -> Option<String> {
+    let names = record.provenance.config.pointer("/model/disturbances")?.as_object()?;
+    let names: Vec<&str> = names.keys().map(String::as_str).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "It is about the undisturbed plant: {} is 0 in every rollout, whatever its bound.",
+            names.join(", ")
+        )
+    })
+}
+
 /// What a reader might take the certificate for, and what it is.
 fn limits(record: &Record) -> Vec<String> {
     let given = format!(
@@ -123,6 +135,7 @@ fn limits(record: &Record) -> Vec<String> {
             .to_owned(),
     ];
     limits.push(attempt(record));
+    limits.extend(undisturbed(record));
     if !record.slice.check_margin.is_empty() {
         limits.push(
             "The picture of the slice is made of single rollouts. What lies between two cells was \

@@ -228,7 +228,7 @@ mod tests {
         let (plant, spec) = (pendulum(), RolloutSpec::new(8, 0.95).unwrap());
         let losses: Vec<f32> = (0..9).map(|t| 0.01 * t as f32).collect();
         let tightening = Tightening::losing(losses.clone(), losses);
-        let pairs = [[vec![0.6, 0.2], vec![0.65, 0.2]], [vec![-0.2, 1.9], vec![-0.2, 2.0]]];
+        let pairs = [[vec![0.6, 0.2], vec![0.65, 0.2]], [vec![-0.2, 2.7], vec![-0.2, 2.8]]];
         let control = PairControl::ClosedLoop;
         let group = PairGroup::new(&plant, &pairs, spec.horizon, control);
         let measures = group.measures(&plant.model, &spec, &tightening);

@@ -267,8 +267,8 @@ mod tests {
         refused("growth.scenarios: 0 is not", &|s| s.growth.scenarios = 0);
         refused("growth.epsilon: NaN is not", &|s| s.growth.epsilon = f64::NAN);
         refused("growth.beta: 2 is not", &|s| s.growth.beta = 2.0);
-        refused("deviation.radius: 0.0001 is below 4.76", &|s| s.deviation.radius = 1e-4);
-        refused("growth.radius: 0.0001 is below 4.76", &|s| s.growth.radius = 1e-4);
+        refused("deviation.radius: 0.0001 is below 0.0004769", &|s| s.deviation.radius = 1e-4);
+        refused("growth.radius: 0.0001 is below 0.0004769", &|s| s.growth.radius = 1e-4);
         refused("growth.varies: no coordinate", &|s| s.growth.varies = vec![false; 2]);
     }
 }

@@ -91,6 +91,8 @@ pub use key_source::Keys;
 #[cfg(feature = "cli")]
 pub(crate) use origin::provenance;
 pub use origin::{Hashes, hashes};
+#[cfg(feature = "cli")]
+pub(crate) use spacing::least_perturbation;
 pub use tightened::{Tightened, tightened};
 pub use verify::{QueryRow, check, query};
 

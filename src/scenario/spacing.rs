@@ -4,7 +4,9 @@ use super::sampling::spacing;
 use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::rollout::Ball;
-use crate::rounding::upper;
+use crate::rounding::{number, upper};
+#[cfg(feature = "cli")]
+use crate::system::Axis;
 
 /// Spacings of the largest coordinate that a radius has at least: with fewer, draws from a ball fall on
 /// a coarse grid, and are not the uniform ones that a claim speaks of.
@@ -14,6 +16,12 @@ const LEAST: f64 = 4_000.0;
 fn least_radius(coordinates: impl Iterator<Item = f32>) -> f64 {
     let largest = coordinates.map(|x| f64::from(x.abs())).fold(0.0, f64::max);
     LEAST * spacing(largest)
+}
+
+/// The least radius of a perturbation of starts between the ends of `axes`.
+#[cfg(feature = "cli")]
+pub(crate) fn least_perturbation(axes: &[Axis]) -> f64 {
+    least_radius(axes.iter().flat_map(|axis| [axis.low, axis.high]))
 }
 
 /// Whether f32 has points enough for the ball.
@@ -37,7 +45,7 @@ fn check_radius(
         return Ok(());
     }
     let what = if smallest < radius {
-        format!("of the radii up to {radius}, the first one, {smallest:.3e},")
+        format!("of the radii up to {radius}, the first one, {},", number(f64::from(smallest)))
     } else {
         radius.to_string()
     };

@@ -10,6 +10,8 @@ use crate::error::{Error, Result};
 use crate::model::Task;
 
 /// Most rows of a batch, neurons of a layer and layers: more is a slip, and a software adapter cuts
+/// Most weights between hidden layers.
+const MOST_WEIGHTS: u64 = 1 << 26;
 /// sums over twice as many short, without a word.
 const MOST: u64 = 1 << 15;
 /// Most steps that are remembered: every checkpoint holds them all.
@@ -241,6 +243,14 @@ impl TrainSettings {
         count("train.hidden", self.hidden.len() as u64, 64)?;
         for &width in &self.hidden {
             count("train.hidden", width as u64, MOST)?;
+        }
+        let weights: u64 = self.hidden.windows(2).map(|pair| (pair[0] * pair[1]) as u64).sum();
+        if weights > MOST_WEIGHTS {
+            let problem = format!(
+                "{weights} weights between hidden layers, at most {MOST_WEIGHTS} are trained: each takes memory \
+                 several times over; take narrower layers, or fewer"
+            );
+            return Err(Error::invalid("train.hidden", problem));
         }
         for part in &self.starts {
             positive("train.starts.share", part.share)?;

@@ -39,7 +39,7 @@ formula = {{ push = "1" }}
 
 #[test]
 fn a_thin_wall_is_jumped_without_points_and_seen_with_them() {
-    let starts = [[0.05_f32, 0.0], [0.08, 0.5]];
+    let starts = [[0.06_f32, 0.0], [0.08, 0.5]];
     let spec = RolloutSpec::new(2, 1.0).expect("a specification");
     for (task, succeeds) in [("", true), ("between = 4", false), ("between = 1", true)] {
         let plant = walled(task);
