@@ -70,11 +70,13 @@ impl Controller {
         network: impl Into<Arc<Mlp>>,
     ) -> std::result::Result<Self, String> {
         let network = network.into();
-        let (outputs, controls) = (network.widths().last().copied(), model.controls.len());
-        if outputs != Some(controls) {
-            let outputs = outputs.unwrap_or(0);
+        let (widths, controls) = (network.widths(), model.controls.len());
+        let (inputs, outputs) = (widths[0], widths[widths.len() - 1]);
+        if outputs != controls {
             return Err(format!(
-                "the network has {outputs} outputs, the system {controls} controls"
+                "the network maps {inputs} inputs to {outputs} outputs, the system has {} states and \
+                 {controls} controls",
+                model.states.len()
             ));
         }
         let names: Vec<&str> = model.states.iter().map(|axis| axis.name.as_str()).collect();

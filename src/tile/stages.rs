@@ -125,7 +125,8 @@ where
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Stages { frame, total, lanes, context, .. } = self.stages;
-        let Some(context) = context.as_chunks::<NC>().0.last() else { return };
+        let untold = untold(1);
+        let Some(context) = told::<NC>(context, &untold).last() else { return };
         for at in (0..lanes).step_by(V::WIDTH) {
             let row = |row: usize| V::load(&frame.row(row)[at..]);
             let x: [V; NX] = std::array::from_fn(row);
@@ -171,7 +172,8 @@ where
         assert_eq!(group, N, "samples of a group");
         let (bounds, penalty) = (self.stages.bounds.as_chunks::<NU>().0, self.stages.penalty);
         let [bounds] = bounds else { unreachable!("bounds of each control") };
-        let (plan, context) = (plan.as_chunks::<NU>().0, context.as_chunks::<NC>().0);
+        let untold = untold(steps.end);
+        let (plan, context) = (plan.as_chunks::<NU>().0, told(context, &untold));
         let (horizon, plan, context) = (plan.len(), &plan[steps.clone()], &context[steps.clone()]);
         let blocks = Blocks::new(frame, lanes.next_multiple_of(N));
         let (states, totals) = (blocks.rows::<NX>(0), blocks.rows::<1>(total));
@@ -202,6 +204,17 @@ where
             }
         }
     }
+}
+
+/// The contexts of `rows` stages of a cost that wants to know nothing; none of one that does.
+fn untold<const NC: usize>(rows: usize) -> Vec<[f32; NC]> {
+    if NC == 0 { vec![[0.0; NC]; rows] } else { Vec::new() }
+}
+
+/// The contexts, a row for each stage; `untold` of a cost that wants to know nothing.
+fn told<'a, const NC: usize>(context: &'a [f32], untold: &'a [[f32; NC]]) -> &'a [[f32; NC]] {
+    // Rows of no numbers cannot be cut from a list.
+    if NC == 0 { untold } else { context.as_chunks().0 }
 }
 
 /// Numbers that are the same for all samples.

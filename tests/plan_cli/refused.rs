@@ -67,7 +67,7 @@ fn keys_of_plans() {
         says(PENDULUM, &["--set", set], words);
     }
     let (no_policy, _) = PENDULUM.split_once("[policy]").unwrap();
-    says(no_policy, &["--set", "plan.first_plan=policy"], &["neither `file` nor `formula`"]);
+    says(no_policy, &["--set", "plan.first_plan=policy"], &["no policy; give `file`"]);
     let late = PENDULUM.replace("kind = \"reach-avoid\"", "kind = \"reach-avoid\"\nfrom = 30");
     says(&late, &["--set", "plan.steps=20"], &["step 30 lies beyond the horizon of 20 steps"]);
 }

@@ -36,6 +36,14 @@ ground = { file = "ground.npy", origin = [-1.0, -1.0], cell = 0.5 }
 fn written(folder: &Folder, name: &str, more: &str) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("configs/models/double_integrator.toml")).unwrap();
+    // It has costs of its own.
+    let costs = |line: &&str| line.starts_with("[model.costs]");
+    let ours = |line: &&str| !line.starts_with("stage.") && !line.starts_with("terminal.");
+    let text: String = text
+        .lines()
+        .filter(|line| !costs(line) && ours(line))
+        .map(|line| format!("{line}\n"))
+        .collect();
     let path = folder.path(name);
     std::fs::write(&path, text + more).unwrap();
     path
