@@ -287,7 +287,7 @@ fn the_players_of_a_game_are_updated_as_on_the_cpu() {
     let config = config("double-integrator", "analytic", &set);
     agree(|device| {
         let game = Game {
-            contest: config.contest(&Model::of(system.clone())).unwrap(),
+            contest: config.contest(&Model::of(system)).unwrap(),
             states: intervals(&system),
             hidden: vec![32, 32],
         };

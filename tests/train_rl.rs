@@ -40,7 +40,7 @@ use training::{config, intervals, settings, task};
 /// The players of the double integrator and their critic.
 fn players<'a>(system: &DoubleIntegrator, backend: &'a Backend, config: &Config) -> Ddpg<'a> {
     let game = Game {
-        contest: config.contest(&Model::of(system.clone())).unwrap(),
+        contest: config.contest(&Model::of(*system)).unwrap(),
         states: intervals(system),
         hidden: settings(config).hidden.clone(),
     };

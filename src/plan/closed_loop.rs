@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn every_step_of_every_run_has_a_stream_of_its_own() {
-        assert!(MAX_HORIZON < 1 << STEP_BITS, "steps do not reach into the bits of the run");
+        const { assert!(MAX_HORIZON < 1 << STEP_BITS, "steps do not reach into the bits of the run") };
         let last = (MOST_RUNS - 1) << STEP_BITS | (MAX_HORIZON - 1);
         // It does not panic.
         Stream::new(1, Purpose::CONTROL_NOISE, last);

@@ -95,8 +95,9 @@ pub(crate) fn mutants(text: &str) -> Vec<(String, String)> {
     let parsed: Table = text.parse().expect("a table");
     let mut all = Vec::new();
     for path in SECTIONS {
-        let keys = table(&mut parsed.clone(), path).map(|table| table.keys().cloned().collect());
-        for key in keys.unwrap_or_else(Vec::new) {
+        let keys: Option<Vec<String>> =
+            table(&mut parsed.clone(), path).map(|table| table.keys().cloned().collect());
+        for key in keys.unwrap_or_default() {
             let mut changed = parsed.clone();
             let entry = table(&mut changed, path).and_then(|table| table.get_mut(&key));
             if entry.is_some_and(mutate) {

@@ -1,13 +1,16 @@
 //! A plant in f64: its step, its rollouts, and the measure of its task by definition.
 
+/// Numbers of states and controls.
+pub(crate) type Formula = Box<dyn Fn(&[f64], &[f64]) -> Vec<f64>>;
+
 /// How a state moves under controls that are within their bounds.
 pub(crate) enum Dynamics {
     /// The derivative, by the classical rule of order 4.
-    Rk4(Box<dyn Fn(&[f64], &[f64]) -> Vec<f64>>),
+    Rk4(Formula),
     /// The derivative, by explicit steps.
-    Euler(Box<dyn Fn(&[f64], &[f64]) -> Vec<f64>>),
+    Euler(Formula),
     /// The next state.
-    Next(Box<dyn Fn(&[f64], &[f64]) -> Vec<f64>>),
+    Next(Formula),
 }
 
 /// What a rollout has to do; `by` is a step.

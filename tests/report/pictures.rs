@@ -59,8 +59,8 @@ fn the_frame_holds_paths_and_shapes() {
     let page = html(&drawn());
     let picture = figure(&page, "figure-paths");
     let (left, width) = (
-        number(&picture, "<rect class=\"frame\"", "x"),
-        number(&picture, "<rect class=\"frame\"", "width"),
+        number(picture, "<rect class=\"frame\"", "x"),
+        number(picture, "<rect class=\"frame\"", "width"),
     );
     let wall = picture.split_once("<path class=\"hatched constraint\" d=\"M").unwrap().1;
     let wall = wall.split_once('Z').unwrap().0;
