@@ -15,6 +15,10 @@ pub struct Program<'a> {
 }
 
 /// What each backend keeps of a plant.
+#[cfg_attr(
+    not(feature = "gpu"),
+    allow(clippy::large_enum_variant, reason = "without adapters there is but one variant")
+)]
 enum Prepared<'a> {
     Cpu(&'a cpu::Cpu, cpu::Prepared),
     Gpu(gpu::Prepared<'a>),
