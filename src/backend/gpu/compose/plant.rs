@@ -49,9 +49,9 @@ impl PlantText {
     /// Prints the formulas of `model` and `controller`, whose network, if any, runs in layers.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
-    /// what is not known there, or the network does not fit; [`Error::Invalid`] for points inside a period
-    /// where formulas call networks; [`Error::Device`] if more networks follow
+    /// [`crate::Error::Invalid`] if a formula has not as many inputs or outputs as its place asks for, reads
+    /// what is not known there, or the network does not fit; [`crate::Error::Invalid`] for points inside a period
+    /// where formulas call networks; [`crate::Error::Device`] if more networks follow
     /// one another inside formulas than an adapter takes.
     pub fn new(model: &Model, controller: &Controller) -> Result<Self> {
         check_formulas(model, controller)?;
