@@ -49,7 +49,7 @@ fn a_radius_that_is_too_small_is_told_what_is_enough() {
             ["certify", "configs/models/bicycle.toml", "--backend", "cpu", "--set", &radius];
         arguments.iter().chain(&["--out", &out]).map(|word| (*word).to_owned()).collect()
     };
-    let first = "of the radii up to 0.1, the first one, 1.441e-3, is below 0.003815";
+    let first = "of the radii up to 0.1, the first one, 0.001441, is below 0.003815";
     refused(&words(&with("0.1")), &["growth.radius", first, "take 0.2647 or more"]);
     refused(&words(&with("0.2646")), &["growth.radius"]);
     let enough = with("0.2647");
