@@ -61,6 +61,7 @@ impl Layers {
         self.name_profile(&mut given);
         // Of a setting, the file does not know the line.
         let text = self.text.as_deref().filter(|_| origin == self.file.0);
+        self.check_model_keys(&taken)?;
         let mut merged = self.defaults(&given, origin, text)?;
         let mut valid = keys::with_optional(&merged);
         keys::check_known(&valid, &self.file.1, &self.file.0)?;
@@ -80,6 +81,21 @@ impl Layers {
             Error::invalid(origin, e.to_string().trim_end().replace('\n', " "))
         };
         merged.try_into().map_err(wrong_kind)
+    }
+
+    /// Refuses keys of a described model that are set and that the file does not have, before the description is
+    /// read with them.
+    fn check_model_keys(&self, taken: &impl Fn(usize) -> bool) -> Result<()> {
+        if !model::is_described(&self.file.1) {
+            return Ok(());
+        }
+        let of_model = |table: &Table| {
+            let section = table.get("model").cloned();
+            Table::from_iter(section.map(|section| ("model".to_owned(), section)))
+        };
+        let valid = of_model(&model::settable(&self.file.1));
+        let sets = self.sets.iter().enumerate().filter(|(number, _)| taken(*number));
+        sets.map(|(_, (name, set))| keys::check_known(&valid, &of_model(set), name)).collect()
     }
 
     /// `error` about a key, by the layer `origin`, with the line where that is the file.

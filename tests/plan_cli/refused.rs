@@ -42,13 +42,13 @@ fn costs_that_are_never_a_number() {
     says(
         &lost,
         &[],
-        &["no run takes a step", "cost of every sample", "the term `place` is NaN", "x 0"],
+        &["no run takes a step", "cost of every sample", "the term `terminal.place` is NaN", "x 0"],
     );
     // It is there at first, and gone three steps on.
     let reference = PENDULUM.replace("{ value = 1.0 }", "{ formula = \"log(2.5 - step)\" }");
     says(&reference, &[], &["no run takes a step", "reference `goal` is NaN at stage 3"]);
     let cost = PENDULUM.replace("torque^2", "log(0.5 - step - torque^2 * 0)");
-    says(&cost, &[], &["no run takes a step", "the term `effort` is NaN at stage 1"]);
+    says(&cost, &[], &["no run takes a step", "the term `stage.effort` is NaN at stage 1"]);
 }
 
 #[test]

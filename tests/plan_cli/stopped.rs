@@ -22,7 +22,7 @@ fn a_run_whose_costs_are_lost_stops_alone() {
             assert_eq!(run["success"], false);
             assert_eq!(run["stopped"]["step"], 0);
             let reason = run["stopped"]["reason"].as_str().unwrap();
-            assert!(reason.contains("the term `place` is NaN"), "{reason}");
+            assert!(reason.contains("the term `terminal.place` is NaN"), "{reason}");
             stopped += 1;
         }
     }
