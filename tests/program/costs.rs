@@ -95,7 +95,7 @@ fn weights_are_set_from_outside() {
     let at = Path::new(&path).parent().unwrap();
     let config = load("model.costs.stage.effort.weight=0.5");
     let missing = config.costs(at).unwrap_err().to_string();
-    for part in ["c.toml:", "model.references.goal.file", "goal.csv"] {
+    for part in ["c.toml:", "model.maps.ground", "ground.npy"] {
         assert!(missing.contains(part), "{missing}");
     }
     std::fs::write(folder.path("goal.csv"), "0.5\n0.25\n").unwrap();
