@@ -94,8 +94,8 @@ impl Layers {
             Table::from_iter(section.map(|section| ("model".to_owned(), section)))
         };
         let valid = of_model(&model::settable(&self.file.1));
-        let sets = self.sets.iter().enumerate().filter(|(number, _)| taken(*number));
-        sets.map(|(_, (name, set))| keys::check_known(&valid, &of_model(set), name)).collect()
+        let mut sets = self.sets.iter().enumerate().filter(|(number, _)| taken(*number));
+        sets.try_for_each(|(_, (name, set))| keys::check_known(&valid, &of_model(set), name))
     }
 
     /// `error` about a key, by the layer `origin`, with the line where that is the file.
