@@ -10,9 +10,9 @@ use super::record::{
 };
 use super::settings::PlanSettings;
 use crate::backend::Backend;
-use crate::model::{Costs, Model};
+use crate::model::Costs;
 use crate::rollout::RolloutSpec;
-use crate::scenario::record::SystemRecord;
+use crate::scenario::system_record;
 
 /// What runs came from, beside the closed loop itself.
 #[derive(Clone, Debug)]
@@ -50,7 +50,7 @@ impl Setting<'_> {
         let mut record = PlanRecord {
             schema: PLAN_SCHEMA,
             provenance: provenance(self.backend, planning, costs, self.seed, self.config.clone()),
-            system: self.system(model),
+            system: system_record(model, &self.bounds[0], &self.bounds[1]),
             steps: self.spec.horizon,
             period: model.period,
             gamma: self.spec.gamma,
@@ -66,22 +66,5 @@ impl Setting<'_> {
         let lost = flown.runs.iter().flat_map(|run| &run.non_finite);
         record.notes = notes(model, costs, &record, lost.map(|count| u64::from(*count)).sum());
         record
-    }
-
-    /// The model with the box of starts.
-    fn system(&self, model: &Model) -> SystemRecord {
-        let mut states = model.states.clone();
-        let [low, high] = &self.bounds;
-        for (axis, (low, high)) in states.iter_mut().zip(low.iter().zip(high)) {
-            (axis.low, axis.high) = (*low, *high);
-        }
-        SystemRecord {
-            name: model.name.clone(),
-            states,
-            controls: model.controls.clone(),
-            bodies: model.bodies.clone(),
-            task: model.task,
-            between: model.points - 1,
-        }
     }
 }

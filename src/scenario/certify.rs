@@ -89,7 +89,7 @@ pub fn certify(
             generator: settings.keys.generator().to_owned(),
             ..provenance(program, settings.seed, config)
         },
-        system: system_record(&plant.model, settings),
+        system: system_record(&plant.model, &settings.low, &settings.high),
         horizon: settings.spec.horizon,
         gamma: decimal(settings.spec.gamma),
         constants,

@@ -28,7 +28,7 @@ pub(super) fn derived(plant: &Plant, settings: &Settings, stored: &Record) -> Re
     let Hashes { physics_sha256, policy_sha256 } = hashes(plant);
     record.provenance.physics_sha256 = physics_sha256;
     record.provenance.policy_sha256 = policy_sha256;
-    record.system = system_record(model, settings);
+    record.system = system_record(model, &settings.low, &settings.high);
     record.constants = constants::derived(model, settings, &stored.constants)?;
     record.deviation = deviation::derived(model, settings, &stored.deviation)?;
     match &settings.drops {

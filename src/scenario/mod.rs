@@ -88,9 +88,9 @@ pub use certify::{certify, check_settings};
 pub(crate) use effort::most_rollouts_of_check;
 pub use finding::{CheckReport, Figure, Finding};
 pub use key_source::Keys;
-#[cfg(feature = "cli")]
-pub(crate) use origin::provenance;
 pub use origin::{Hashes, hashes};
+#[cfg(feature = "cli")]
+pub(crate) use origin::{provenance, system_record};
 #[cfg(feature = "cli")]
 pub(crate) use spacing::least_perturbation;
 pub use tightened::{Tightened, tightened};

@@ -1,7 +1,6 @@
 //! What a record is of, and who computed it from which input.
 
 use super::record::{Provenance, SystemRecord};
-use super::settings::Settings;
 use crate::backend::Program;
 use crate::digest;
 use crate::model::{Model, Plant};
@@ -47,10 +46,10 @@ pub fn hashes(plant: &Plant) -> Hashes {
     Hashes { physics_sha256, policy_sha256 }
 }
 
-/// Names, boxes and bodies of the system, with the box of starts that `settings` ask for.
-pub(super) fn system_record(model: &Model, settings: &Settings) -> SystemRecord {
+/// Names, boxes and bodies of the system, with the box of starts from the corner `low` to `high`.
+pub(crate) fn system_record(model: &Model, low: &[f32], high: &[f32]) -> SystemRecord {
     let mut states = model.states.clone();
-    for (axis, (low, high)) in states.iter_mut().zip(settings.low.iter().zip(&settings.high)) {
+    for (axis, (low, high)) in states.iter_mut().zip(low.iter().zip(high)) {
         (axis.low, axis.high) = (*low, *high);
     }
     SystemRecord {
