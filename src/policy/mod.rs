@@ -1,11 +1,18 @@
 //! Policies: a formula over `Real`, or a trained network.
 
+#[cfg(feature = "import")]
+mod export;
 mod file;
 #[cfg(feature = "import")]
 pub mod import;
 pub mod inspect;
 mod mlp;
+#[cfg(feature = "import")]
+mod onnx;
 mod spectral;
+
+#[cfg(feature = "import")]
+pub use export::onnx_bytes;
 
 pub use mlp::{Activation, Layer, Mlp, OutputActivation};
 
