@@ -16,7 +16,7 @@ use reachcast::bench;
 use reachcast::config::Config;
 use reachcast::formula::{Graph, Node, record};
 use reachcast::model::{Interface, Model, Plant};
-use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{StateList, Stream, Tightening, reach_avoid};
@@ -26,7 +26,7 @@ use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
 use reachcast::train::device::{Device, floats};
-use reachcast::train::layer::{Curve, layer};
+use reachcast::train::layer::layer;
 use reachcast::train::network::{Architecture, Network};
 use reachcast::train::physics::apply;
 use reachcast::train::purpose;
@@ -411,7 +411,7 @@ fn a_value_network_learns_the_measure() {
         seed: 5,
     };
     let inputs = system.states().iter().map(|axis| [axis.low, axis.high]).collect();
-    let (activation, output) = (Activation::Relu, OutputActivation::Identity);
+    let (activation, output) = (Activation::Relu, Activation::Identity);
     let shape = Architecture { inputs, hidden: vec![32; 2], outputs: 1, activation, output };
     let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
     let mut settings = settings(&config).value;
@@ -566,14 +566,7 @@ fn a_layer_is_burns_own_operations() {
         let values: Vec<f32> = lanes.iter().map(|lane| lane.0[0]).collect();
         Device::cpu().tensor(values, [rows, columns])
     };
-    let (hidden, last) = (Curve::Hidden, Curve::Last);
-    for curve in [
-        hidden(Activation::Relu),
-        hidden(Activation::Tanh),
-        hidden(Activation::Silu),
-        last(OutputActivation::Tanh),
-        last(OutputActivation::Identity),
-    ] {
+    for curve in [Activation::Relu, Activation::Tanh, Activation::Silu, Activation::Identity] {
         let run = |fused: bool| {
             let shapes = [[5, 4], [4, 3], [1, 3]];
             let [x, w, b] = std::array::from_fn(|i| drawn(i as u32, shapes[i]).require_grad());
@@ -582,9 +575,9 @@ fn a_layer_is_burns_own_operations() {
                 (false, curve) => {
                     let sums = x.clone().matmul(w.clone()) + b.clone();
                     match curve {
-                        Curve::Hidden(Activation::Relu) => activation::relu(sums),
-                        Curve::Hidden(Activation::Silu) => activation::silu(sums),
-                        Curve::Last(OutputActivation::Identity) => sums,
+                        Activation::Relu => activation::relu(sums),
+                        Activation::Silu => activation::silu(sums),
+                        Activation::Identity => sums,
                         _ => sums.tanh(),
                     }
                 }

@@ -11,7 +11,7 @@ use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::config::Registry;
 use crate::files::Existing;
-use crate::policy::{Activation, OutputActivation};
+use crate::policy::Activation;
 use crate::studies::StudyCommand;
 use crate::train::settings::Method;
 
@@ -414,7 +414,7 @@ pub(super) struct ImportArguments {
     pub(super) activation: Option<Activation>,
     /// Activation of its last layer [default: that of the library, else tanh; identity for a critic]
     #[arg(long, value_enum)]
-    pub(super) output: Option<OutputActivation>,
+    pub(super) output: Option<Activation>,
     /// Names of the inputs, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "config")]
     pub(super) state_order: Option<Vec<String>>,

@@ -1,20 +1,26 @@
 //! Policies: a formula over `Real`, or a trained network.
 
+mod activation;
+mod core;
 #[cfg(feature = "import")]
 mod export;
 mod file;
 #[cfg(feature = "import")]
 pub mod import;
 pub mod inspect;
+mod layer;
 mod mlp;
 #[cfg(feature = "import")]
 mod onnx;
 mod spectral;
 
+pub use activation::Activation;
+pub(crate) use core::Parts;
+pub use layer::{Layer, Norm, Rescale};
+pub(crate) use layer::{normaliser, normaliser_range};
 #[cfg(feature = "import")]
 pub use export::onnx_bytes;
-
-pub use mlp::{Activation, Layer, Mlp, OutputActivation};
+pub use mlp::Mlp;
 
 use crate::real::Real;
 

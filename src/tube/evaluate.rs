@@ -4,7 +4,8 @@ use super::affine::{Affine, Symbols};
 use super::choice;
 use super::curve::Curve;
 use crate::formula::{Call, Function, Graph, Node};
-use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::policy::{Activation, Mlp, Norm, Rescale};
+use crate::real::bound::Interval;
 
 /// The outputs of `graph` for `inputs`.
 pub(super) fn outputs(graph: &Graph, inputs: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
@@ -102,35 +103,76 @@ fn constant_power(x: &Affine, exponent: f32, symbols: &mut Symbols) -> Affine {
 }
 
 /// The outputs of a network.
-pub(super) fn network(network: &Mlp, mut x: Vec<Affine>, symbols: &mut Symbols) -> Vec<Affine> {
-    let last = network.layers().len() - 1;
-    for (i, layer) in network.layers().iter().enumerate() {
+pub(super) fn network(network: &Mlp, x: Vec<Affine>, symbols: &mut Symbols) -> Vec<Affine> {
+    let seen = network.input_map().map_or_else(|| x.clone(), |map| mapped(map, &x, symbols));
+    let said = network.layers().iter().fold(seen, |x, layer| {
         let sums = Affine::dense(&layer.weight, &layer.bias, &x);
-        let activated = sums.iter().map(|sum| match i == last {
-            true => output(network.output(), sum, symbols),
-            false => hidden(network.activation(), sum, symbols),
-        });
-        x = activated.collect();
-    }
-    x
+        let normed = match &layer.norm {
+            Some(norm) => normed(norm, &sums, symbols),
+            None => sums,
+        };
+        normed.iter().map(|sum| activated(layer.activation, sum, symbols)).collect()
+    });
+    network.output_map().map_or_else(|| said.clone(), |map| mapped(map, &said, symbols))
 }
 
-/// The activation of a hidden neuron.
-fn hidden(activation: Activation, sum: &Affine, symbols: &mut Symbols) -> Affine {
+/// An activation of a sum.
+fn activated(activation: Activation, sum: &Affine, symbols: &mut Symbols) -> Affine {
+    let constant = |value: f32| Affine::constant(f64::from(value));
     match activation {
+        Activation::Identity => sum.clone(),
         Activation::Relu => choice::positive_part(sum, symbols),
+        Activation::LeakyRelu { slope } => {
+            let above = choice::positive_part(sum, symbols);
+            let slope = f64::from(slope);
+            Affine::combination(&[(slope, sum), (1.0 - slope, &above)], 0.0)
+        }
+        Activation::Hardtanh { low, high } => {
+            choice::clamp(sum, [&constant(low), &constant(high)], symbols)
+        }
+        Activation::Relu6 => choice::clamp(sum, [&constant(0.0), &constant(6.0)], symbols),
         Activation::Tanh => Curve::Apply(Function::Tanh).of(sum, symbols),
+        Activation::Sigmoid => Curve::Apply(Function::Sigmoid).of(sum, symbols),
         Activation::Silu => {
             let logistic = Curve::Apply(Function::Sigmoid).of(sum, symbols);
             sum.times(&logistic, symbols)
         }
+        smooth => Curve::Activated(smooth).of(sum, symbols),
     }
 }
 
-/// The activation of an output.
-fn output(activation: OutputActivation, sum: &Affine, symbols: &mut Symbols) -> Affine {
-    match activation {
-        OutputActivation::Tanh => Curve::Apply(Function::Tanh).of(sum, symbols),
-        OutputActivation::Identity => sum.clone(),
-    }
+/// A norm of the sums of a layer.
+fn normed(norm: &Norm, sums: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
+    let count = Affine::constant(sums.len() as f64);
+    let share = Curve::Reciprocal.of(&count, symbols);
+    let mean = total(sums).times(&share, symbols);
+    let apart: Vec<Affine> = sums.iter().map(|sum| sum.minus(&mean)).collect();
+    let squares: Vec<Affine> = apart.iter().map(|gap| Curve::Whole(2).of(gap, symbols)).collect();
+    let variance = total(&squares).times(&share, symbols);
+    let within = variance.range;
+    let variance = variance.ranged(Interval::new(0.0, within.high.max(0.0)));
+    let factor = Curve::Normaliser(norm.epsilon).of(&variance, symbols);
+    let each = apart.iter().zip(norm.scale.iter().zip(&norm.shift));
+    each.map(|(gap, (&scale, &shift))| {
+        let normed = gap.times(&factor, symbols);
+        Affine::combination(&[(f64::from(scale), &normed)], f64::from(shift))
+    })
+    .collect()
+}
+
+/// The sum of all.
+fn total(all: &[Affine]) -> Affine {
+    let terms: Vec<(f64, &Affine)> = all.iter().map(|one| (1.0, one)).collect();
+    Affine::combination(&terms, 0.0)
+}
+
+/// Each number behind a map.
+fn mapped(map: &Rescale, x: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
+    let each = x.iter().enumerate().map(|(i, x)| {
+        let number = |value: f32| f64::from(value);
+        let moved = Affine::combination(&[(number(map.scale[i]), x)], number(map.shift[i]));
+        let limits = [map.low[i], map.high[i]].map(|limit| Affine::constant(number(limit)));
+        choice::clamp(&moved, [&limits[0], &limits[1]], symbols)
+    });
+    each.collect()
 }
