@@ -6,9 +6,9 @@ use clap::{Args, Parser, Subcommand};
 
 use super::effort::USUAL;
 use super::falsify::FalsifyArguments;
-use super::export::Target;
 use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
+use super::values::Target;
 use crate::config::Registry;
 use crate::files::Existing;
 use crate::policy::Activation;
@@ -277,7 +277,9 @@ impl Command {
             Self::Policy(PolicyCommand::Import(asked)) => {
                 own(no_seed(&asked.keys), &asked.out, asked.replace)
             }
-            Self::Policy(PolicyCommand::Eval(asked)) => own(Changes::default(), &None, asked.replace),
+            Self::Policy(PolicyCommand::Eval(asked)) => {
+                own(Changes::default(), &None, asked.replace)
+            }
             Self::Policy(PolicyCommand::Export(asked)) => {
                 own(Changes::default(), &asked.out, asked.replace)
             }

@@ -64,7 +64,9 @@ fn evaluate(network: &Mlp, inputs: &Array) -> std::result::Result<Array, String>
         Some(width) if *width == takes && inputs.shape.len() <= 2 => *width = gives,
         _ => {
             let shape = &inputs.shape;
-            return Err(format!("shape {shape:?}; expected [N, {takes}] or [{takes}], as the policy takes {takes} numbers"));
+            return Err(format!(
+                "shape {shape:?}; expected [N, {takes}] or [{takes}], as the policy takes {takes} numbers"
+            ));
         }
     }
     let numbers = match &inputs.data {

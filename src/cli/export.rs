@@ -1,36 +1,16 @@
 //! The command `policy export`: a policy as a file for other programs.
 
-use clap::ValueEnum;
 use safetensors::SafeTensors;
 use serde::Serialize;
 use serde_json::json;
 
 use super::args::ExportArguments;
 use super::options::Global;
+use super::values::Target;
 use super::{Outcome, document, folder_of, report};
 use crate::error::{Error, Result};
 use crate::files::{Array, Data, Inputs, Staged, npz_bytes};
 use crate::policy::{Mlp, onnx_bytes};
-
-/// What a policy is written as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Target {
-    /// An ONNX graph, which imports as the same policy
-    Onnx,
-    /// NumPy arrays under the names of the policy file, its metadata as JSON in bytes
-    Npz,
-}
-
-impl Target {
-    /// Ending of its files.
-    fn ending(self) -> &'static str {
-        match self {
-            Self::Onnx => "onnx",
-            Self::Npz => "npz",
-        }
-    }
-}
 
 /// What `policy export --json` prints.
 #[derive(Serialize)]
@@ -47,9 +27,10 @@ pub(super) fn run(global: &Global, asked: &ExportArguments) -> Result<Outcome> {
     let out = asked.out.as_deref().ok_or_else(missing)?;
     let name = out.file_name().and_then(|name| name.to_str());
     let ending = asked.to.ending();
-    let name = name.filter(|_| out.extension().is_some_and(|own| own == ending)).ok_or_else(|| {
-        Error::invalid("--out", format!("{}: the name has to end in .{ending}", out.display()))
-    })?;
+    let name =
+        name.filter(|_| out.extension().is_some_and(|own| own == ending)).ok_or_else(|| {
+            Error::invalid("--out", format!("{}: the name has to end in .{ending}", out.display()))
+        })?;
     Inputs::new([asked.file.clone()]).spare_file(out)?;
     let network = Mlp::load(&asked.file)?;
     let bytes = match asked.to {
@@ -85,7 +66,8 @@ fn arrays(network: &Mlp) -> Result<Vec<(String, Array)>> {
         })
         .collect();
     arrays.sort_by(|(a, _), (b, _)| a.cmp(b));
-    let metadata: std::collections::BTreeMap<&String, &String> = header.metadata().iter().flatten().collect();
+    let metadata: std::collections::BTreeMap<&String, &String> =
+        header.metadata().iter().flatten().collect();
     let text = json!(metadata).to_string().into_bytes();
     arrays.push(("metadata".to_owned(), Array { shape: vec![text.len()], data: Data::U8(text) }));
     Ok(arrays)

@@ -157,7 +157,9 @@ fn import_text(import: &Import) -> String {
     let from = |origin: Origin, flag: &str| match (origin, layout) {
         (Origin::File, _) => "as the file has it".to_owned(),
         (Origin::Stated, _) => "as stated".to_owned(),
-        (Origin::Layout, Some(layout)) => format!("as {layout} has it by default; --{flag} states another"),
+        (Origin::Layout, Some(layout)) => {
+            format!("as {layout} has it by default; --{flag} states another")
+        }
         _ => format!("the default: the file does not say, --{flag} does"),
     };
     let inputs = import.state_order.as_ref().map(|names| names.join(","));
@@ -205,7 +207,11 @@ fn grouped(names: &[String]) -> Vec<String> {
     }
     let deepest = names.iter().map(|name| name.split('.').count()).max().unwrap_or(1);
     let at = |depth: usize| groups(names, depth);
-    (1..=deepest).map(at).take_while(|groups| groups.len() <= LISTED).last().unwrap_or_else(|| at(1))
+    (1..=deepest)
+        .map(at)
+        .take_while(|groups| groups.len() <= LISTED)
+        .last()
+        .unwrap_or_else(|| at(1))
 }
 
 /// The names that share their first `depth` keys, as these and their number.

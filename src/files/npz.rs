@@ -229,7 +229,9 @@ pub(crate) fn npy_array_bytes(array: &Array) -> Vec<u8> {
 fn parse(mut bytes: &[u8]) -> std::result::Result<Array, String> {
     let NpyHeader { descr, fortran_order, shape } = NpyHeader::read(&mut bytes)?;
     if fortran_order && shape.len() > 1 {
-        return Err("column-major order is not supported; in NumPy: numpy.ascontiguousarray(x)".to_owned());
+        return Err(
+            "column-major order is not supported; in NumPy: numpy.ascontiguousarray(x)".to_owned()
+        );
     }
     let data = Data::parse(&descr, bytes)
         .ok_or_else(|| format!("{} bytes are no array of type `{descr}`", bytes.len()))?;

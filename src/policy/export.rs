@@ -2,7 +2,9 @@
 
 use prost::Message;
 
-use super::onnx::{Attribute, Entry, Graph, Length, Model, Named, Node, Operators, Shape, Tensor, TensorType, Type};
+use super::onnx::{
+    Attribute, Entry, Graph, Length, Model, Named, Node, Operators, Shape, Tensor, TensorType, Type,
+};
 use super::{Activation, Layer, Mlp, Rescale};
 
 /// Who wrote a graph.
@@ -21,7 +23,10 @@ const TEXT: i32 = 3;
 /// The bytes of an ONNX file of `network`, from `input`, `[batch, inputs]`, to `output`, `[batch, outputs]`.
 pub fn onnx_bytes(network: &Mlp) -> Vec<u8> {
     let widths = network.widths();
-    let mut writer = Writer { graph: Graph { name: "policy".to_owned(), ..Graph::default() }, last: "input".to_owned() };
+    let mut writer = Writer {
+        graph: Graph { name: "policy".to_owned(), ..Graph::default() },
+        last: "input".to_owned(),
+    };
     if let Some(map) = network.input_map() {
         writer.map("input_map", map);
     }
@@ -73,9 +78,16 @@ impl Writer {
     }
 
     /// The same of what the graph gives so far, and tensors.
-    fn then(&mut self, operation: &str, tensors: &[&str], output: &str, attributes: Vec<Attribute>) {
+    fn then(
+        &mut self,
+        operation: &str,
+        tensors: &[&str],
+        output: &str,
+        attributes: Vec<Attribute>,
+    ) {
         let last = self.last.clone();
-        let inputs: Vec<&str> = std::iter::once(last.as_str()).chain(tensors.iter().copied()).collect();
+        let inputs: Vec<&str> =
+            std::iter::once(last.as_str()).chain(tensors.iter().copied()).collect();
         self.node(operation, &inputs, output, attributes);
     }
 
@@ -187,5 +199,10 @@ fn integer(name: &str, integer: i64) -> Attribute {
 }
 
 fn text(name: &str, text: &str) -> Attribute {
-    Attribute { name: name.to_owned(), text: text.as_bytes().to_vec(), kind: TEXT, ..Attribute::default() }
+    Attribute {
+        name: name.to_owned(),
+        text: text.as_bytes().to_vec(),
+        kind: TEXT,
+        ..Attribute::default()
+    }
 }

@@ -16,10 +16,10 @@ mod spectral;
 
 pub use activation::Activation;
 pub(crate) use core::Parts;
-pub use layer::{Layer, Norm, Rescale};
-pub(crate) use layer::{normaliser, normaliser_range};
 #[cfg(feature = "import")]
 pub use export::onnx_bytes;
+pub use layer::{Layer, Norm, Rescale};
+pub(crate) use layer::{normaliser, normaliser_range};
 pub use mlp::Mlp;
 
 use crate::real::Real;

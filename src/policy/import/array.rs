@@ -15,7 +15,8 @@ pub(super) struct Array {
 impl Array {
     /// These numbers, if they fill the shape.
     pub(super) fn new(shape: Vec<usize>, numbers: &[f64]) -> Option<Self> {
-        let fills = shape.iter().try_fold(1, |n: usize, &length| n.checked_mul(length)) == Some(numbers.len());
+        let fills = shape.iter().try_fold(1, |n: usize, &length| n.checked_mul(length))
+            == Some(numbers.len());
         fills.then(|| Self { shape, numbers: numbers.to_vec() })
     }
 

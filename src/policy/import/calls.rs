@@ -9,14 +9,49 @@ const MOST_DIMENSIONS: usize = 64;
 const ARGUMENTS: usize = 8;
 /// Modules that read, write, run or load: a file that names one of them is no policy.
 const HOSTILE: [&str; 26] = [
-    "os", "posix", "nt", "sys", "subprocess", "shutil", "socket", "runpy", "pty", "importlib", "ctypes",
-    "webbrowser", "pickle", "_pickle", "marshal", "code", "codeop", "commands", "pip", "pdb", "timeit",
-    "multiprocessing", "platform", "tempfile", "urllib", "requests",
+    "os",
+    "posix",
+    "nt",
+    "sys",
+    "subprocess",
+    "shutil",
+    "socket",
+    "runpy",
+    "pty",
+    "importlib",
+    "ctypes",
+    "webbrowser",
+    "pickle",
+    "_pickle",
+    "marshal",
+    "code",
+    "codeop",
+    "commands",
+    "pip",
+    "pdb",
+    "timeit",
+    "multiprocessing",
+    "platform",
+    "tempfile",
+    "urllib",
+    "requests",
 ];
 /// Names of Python itself that make plain values.
 const BUILTINS: [&str; 14] = [
-    "object", "set", "frozenset", "slice", "complex", "bytearray", "list", "dict", "tuple", "int", "float",
-    "bool", "str", "range",
+    "object",
+    "set",
+    "frozenset",
+    "slice",
+    "complex",
+    "bytearray",
+    "list",
+    "dict",
+    "tuple",
+    "int",
+    "float",
+    "bool",
+    "str",
+    "range",
 ];
 
 /// Refuses a name that only a program has a use for.
@@ -68,18 +103,22 @@ pub(super) fn result<'a>(
         ("collections", "OrderedDict", []) | ("collections", "defaultdict", _) => Ok(dict(pickle)),
         ("collections", "OrderedDict", _) => other(),
         ("flax.core.frozen_dict", "FrozenDict", &[dict @ Value::Dict(_)]) => Ok(dict),
-        ("torch._utils", "_rebuild_tensor_v2", rest) => tensor(pickle, rest)?.map_or_else(other, Ok),
+        ("torch._utils", "_rebuild_tensor_v2", rest) => {
+            tensor(pickle, rest)?.map_or_else(other, Ok)
+        }
         (
             "torch._utils",
             "_rebuild_parameter" | "_rebuild_parameter_with_state",
             &[tensor @ Value::Tensor(_), ..],
         ) => Ok(tensor),
-        ("torch._tensor", "_rebuild_from_type_v2", &[Value::Name(inner), _, Value::Tuple(inside), ..])
-            if inner != function =>
-        {
-            result(pickle, inner, inside)
+        (
+            "torch._tensor",
+            "_rebuild_from_type_v2",
+            &[Value::Name(inner), _, Value::Tuple(inside), ..],
+        ) if inner != function => result(pickle, inner, inside),
+        ("_codecs", "encode", &[Value::Text(text), Value::Text("latin1" | "latin-1")]) => {
+            latin(pickle, text)
         }
-        ("_codecs", "encode", &[Value::Text(text), Value::Text("latin1" | "latin-1")]) => latin(pickle, text),
         ("numpy", "dtype", &[Value::Text(name), ..] | &[Value::Name(Name { name, .. }), ..]) => {
             Ok(Value::Type(Kind::of_numpy(name)))
         }
@@ -119,7 +158,9 @@ pub(super) fn filled<'a>(
     state: Value<'a>,
 ) -> Result<Option<Value<'a>>, String> {
     let Name { module, name } = pickle.objects[number].maker;
-    let (true, Value::Tuple(state)) = (module.starts_with("numpy") && name == "_reconstruct", state) else {
+    let (true, Value::Tuple(state)) =
+        (module.starts_with("numpy") && name == "_reconstruct", state)
+    else {
         return Ok(None);
     };
     let state = head(pickle, state);
@@ -200,7 +241,10 @@ fn array<'a>(
 }
 
 /// A tensor of PyTorch, if the arguments are those of one.
-fn tensor<'a>(pickle: &mut Pickle<'a>, arguments: &[Value<'a>]) -> Result<Option<Value<'a>>, String> {
+fn tensor<'a>(
+    pickle: &mut Pickle<'a>,
+    arguments: &[Value<'a>],
+) -> Result<Option<Value<'a>>, String> {
     let &[
         Value::Storage(storage),
         Value::Int(offset),

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::draft::{Draft, Step};
+use super::draft::{Draft, MOST_LAYERS, Step};
 use super::kind::Cast;
 use super::layers::{self, Dense, Order};
 use super::layouts::{self, Layout, Recognised};
@@ -108,6 +108,9 @@ impl Choice {
             None => layers::only(source, &dense)?,
         };
         layers::check(&layers)?;
+        if layers.len() > MOST_LAYERS {
+            return Err(format!("{} layers; a network has at most {MOST_LAYERS}", layers.len()));
+        }
         let same = |found: &&Recognised<'_>| names(&found.layers) == names(&layers);
         let found = recognised.as_ref().filter(same);
         Ok(Self {
@@ -168,13 +171,22 @@ impl Choice {
     }
 
     /// Adds what the output goes through.
-    fn add_ends(&self, source: &mut Source<'_>, made: &mut Made, hints: &Hints) -> Result<(), String> {
+    fn add_ends(
+        &self,
+        source: &mut Source<'_>,
+        made: &mut Made,
+        hints: &Hints,
+    ) -> Result<(), String> {
         let width = made.draft.width().unwrap_or_default();
         if let Some(names) = self.layout.and_then(|layout| layout.scaled) {
             let names = names.map(|name| under(&self.outer, name));
-            let [scale, shift] = [numbers(source, &names[0], width)?, numbers(source, &names[1], width)?];
+            let [scale, shift] =
+                [numbers(source, &names[0], width)?, numbers(source, &names[1], width)?];
             made.draft.push(Step::Map(Map::affine(scale, shift)))?;
-            made.notes.push(format!("the output is multiplied by `{}`, and `{}` is added", names[0], names[1]));
+            made.notes.push(format!(
+                "the output is multiplied by `{}`, and `{}` is added",
+                names[0], names[1]
+            ));
             made.used.extend(names);
         }
         if let Some(map) = &hints.output_map {
@@ -190,7 +202,11 @@ impl Choice {
 /// The refusal of a file without a dense layer.
 fn none(source: &Source<'_>) -> String {
     let unmade = source.unmade.iter().take(3);
-    let unmade: String = unmade.map(|object| format!("; `{}` is an object of `{}`, which was not made", object.name, object.maker)).collect();
+    let unmade: String = unmade
+        .map(|object| {
+            format!("; `{}` is an object of `{}`, which was not made", object.name, object.maker)
+        })
+        .collect();
     format!(
         "no dense layer among its {} tensors: none is called `.weight` and has the shape [out, in]{unmade}",
         source.tensors.len()
@@ -221,10 +237,14 @@ fn halve(linear: &mut Linear, name: &str) -> Result<String, String> {
     let (half, rest) = (linear.outputs() / 2, linear.outputs() % 2);
     if rest != 0 {
         let width = linear.outputs();
-        return Err(format!("`{name}` gives {width} numbers, which are no means and as many deviations"));
+        return Err(format!(
+            "`{name}` gives {width} numbers, which are no means and as many deviations"
+        ));
     }
     *linear = linear.selected(&(0..half).collect::<Vec<_>>());
-    Ok(format!("`{name}` gives {half} means and {half} deviations of a Gaussian; the means are taken"))
+    Ok(format!(
+        "`{name}` gives {half} means and {half} deviations of a Gaussian; the means are taken"
+    ))
 }
 
 /// The `width` numbers of the tensor `name`, or its one number as many times.

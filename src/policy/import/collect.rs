@@ -41,8 +41,10 @@ fn refuse_object(pickle: &Pickle<'_>, root: Value<'_>) -> Result<(), String> {
         Value::Object(number) => pickle.objects[number].maker,
         Value::Name(name) => name,
         _ => {
-            return Err("no dictionary of tensors; save one: torch.save(module.state_dict(), FILE)"
-                .to_owned());
+            return Err(
+                "no dictionary of tensors; save one: torch.save(module.state_dict(), FILE)"
+                    .to_owned(),
+            );
         }
     };
     if maker.name == "VecNormalize" {
@@ -130,7 +132,12 @@ impl<'b> Walk<'_, 'b, '_> {
     }
 
     /// Adds what lies under `key`.
-    fn within(&mut self, key: String, value: Value<'b>, path: &mut Vec<String>) -> Result<(), String> {
+    fn within(
+        &mut self,
+        key: String,
+        value: Value<'b>,
+        path: &mut Vec<String>,
+    ) -> Result<(), String> {
         self.seen += 1;
         if self.seen > MOST_ENTRIES {
             return Err(format!("more than {MOST_ENTRIES} entries in its dictionaries"));

@@ -36,7 +36,8 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
         }
         ("Concat", _) if first.shape.len() == 1 => {
             let lists: Option<Vec<&Array>> = inputs.iter().copied().collect();
-            let joint = lists.map(|lists| lists.iter().flat_map(|list| list.numbers.clone()).collect());
+            let joint =
+                lists.map(|lists| lists.iter().flat_map(|list| list.numbers.clone()).collect());
             joint.map(Array::list)
         }
         _ => return Err("of constants, which is not followed".to_owned()),

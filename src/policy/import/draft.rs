@@ -111,7 +111,9 @@ impl Draft {
                 }
                 Step::Map(map) => *map = map.selected(rows),
                 Step::Activation(_) => {}
-                Step::Norm { .. } => return Err("a part of what is normalised as a whole".to_owned()),
+                Step::Norm { .. } => {
+                    return Err("a part of what is normalised as a whole".to_owned());
+                }
             }
         }
         Err("a part of the input alone".to_owned())
@@ -139,7 +141,9 @@ impl Draft {
     /// Makes a clip behind the last activation a map of the output: it needs no layer of its own.
     fn end_clip(&mut self) {
         let limits = match self.steps.as_slice() {
-            [.., Step::Activation(_), Step::Activation(Activation::Hardtanh { low, high })] => [*low, *high],
+            [.., Step::Activation(_), Step::Activation(Activation::Hardtanh { low, high })] => {
+                [*low, *high]
+            }
             [.., Step::Activation(_), Step::Activation(Activation::Relu6)] => [0.0, 6.0],
             _ => return,
         };
@@ -206,7 +210,8 @@ fn stage(stages: &mut Vec<Stage>, step: Step, inputs: Option<usize>) -> Result<(
         Step::Activation(activation) => open(stages, inputs, |_| true)?.activation = activation,
         Step::Map(map) => {
             let (affine, limits) = map.parts();
-            let limits = limits.ok_or("limits between layers that are not the same for all neurons")?;
+            let limits =
+                limits.ok_or("limits between layers that are not the same for all neurons")?;
             let stage = open(stages, Some(map.width()), |stage| stage.norm.is_none())?;
             stage.linear.scaled(&affine)?;
             stage.activation = clip(limits)?;
@@ -222,11 +227,14 @@ fn open(
     is_open: fn(&Stage) -> bool,
 ) -> Result<&mut Stage, String> {
     let last = stages.last();
-    let takes_more = last.is_some_and(|last| last.activation == Activation::Identity && is_open(last));
+    let takes_more =
+        last.is_some_and(|last| last.activation == Activation::Identity && is_open(last));
     if !takes_more {
         let width = last.map(|last| last.linear.outputs()).or(inputs);
         let width = width.filter(|width| *width <= WIDEST);
-        let width = width.ok_or("an operation before the first layer, of which nobody says how many numbers it takes")?;
+        let width = width.ok_or(
+            "an operation before the first layer, of which nobody says how many numbers it takes",
+        )?;
         let linear = Linear::diagonal(&Map::affine(vec![1.0; width], vec![0.0; width]))?;
         stages.push(Stage { linear, norm: None, activation: Activation::Identity });
     }

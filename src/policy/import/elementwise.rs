@@ -38,7 +38,9 @@ impl Each {
     /// It on `width` numbers.
     pub(super) fn step(self, width: usize) -> Step {
         match self {
-            Self::Affine { scale, shift } => Step::Map(Map::affine(vec![scale; width], vec![shift; width])),
+            Self::Affine { scale, shift } => {
+                Step::Map(Map::affine(vec![scale; width], vec![shift; width]))
+            }
             Self::Clamp { low, high } => Step::Map(Map::clamp(vec![low; width], vec![high; width])),
             Self::Activation(activation) => Step::Activation(activation),
         }

@@ -25,11 +25,7 @@ pub(super) enum Format {
 const OTHERS: [(&[u8], &str, &str); 12] = [
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file, as Keras writes it (or MATLAB 7.3)", KERAS),
     (b"MATLAB 5.0", "a MATLAB file", MATLAB),
-    (
-        b"\x1f\x8b",
-        "compressed with gzip",
-        "unpack it first: gunzip -k FILE",
-    ),
+    (b"\x1f\x8b", "compressed with gzip", "unpack it first: gunzip -k FILE"),
     (
         b"version https://git-lfs",
         "a pointer of Git LFS, and not the file itself",
@@ -41,12 +37,18 @@ const OTHERS: [(&[u8], &str, &str); 12] = [
     (b"<html", "an HTML page, and not the file itself", HTML),
     (b"BZh", "compressed with bzip2", "unpack it first: bunzip2 -k FILE"),
     (b"\xfd7zXZ\0", "compressed with xz", "unpack it first: xz -dk FILE"),
-    (b"\x28\xb5\x2f\xfd", "compressed with zstd", "unpack it first: zstd -d FILE; of Orbax, save the parameters alone"),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "compressed with zstd",
+        "unpack it first: zstd -d FILE; of Orbax, save the parameters alone",
+    ),
     (b"Rar!", "a RAR archive", "unpack it first"),
 ];
-const KERAS: &str = "convert it to ONNX: python -m tf2onnx.convert --keras FILE --output policy.onnx";
-const MATLAB: &str = "export the network to ONNX: exportONNXNetwork(net, 'policy.onnx'), or save its weights as \
-                      safetensors: safetensors.numpy.save_file(scipy.io.loadmat(FILE))";
+const KERAS: &str =
+    "convert it to ONNX: python -m tf2onnx.convert --keras FILE --output policy.onnx";
+const MATLAB: &str = "export the network to ONNX in MATLAB: exportONNXNetwork(net, 'policy.onnx'); or save its weights as \
+                      safetensors in Python: safetensors.numpy.save_file({'0.weight': scipy.io.loadmat(FILE)['W1'], \
+                      '0.bias': scipy.io.loadmat(FILE)['b1'].ravel()}, 'policy.safetensors')";
 const NUMPY: &str = "save all arrays of the network as safetensors: safetensors.numpy.save_file({'0.weight': w0, \
                      '0.bias': b0}, 'policy.safetensors')";
 const HTML: &str = "download it again, from the address of the raw file";
@@ -61,11 +63,14 @@ impl Format {
     pub(super) fn of(path: &Path, bytes: &[u8]) -> Result<Self, String> {
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
         let ending = ending.as_deref().and_then(|ending| ending.to_str()).unwrap_or_default();
-        if let Some((_, what, remedy)) = OTHERS.iter().find(|(first, ..)| bytes.starts_with(first)) {
+        if let Some((_, what, remedy)) = OTHERS.iter().find(|(first, ..)| bytes.starts_with(first))
+        {
             return Err(format!("{what}; {remedy}"));
         }
         Ok(match bytes {
-            [b'P', b'K', 3, 4, ..] if ending == "npz" => return Err(format!("NumPy arrays (.npz); {NUMPY}")),
+            [b'P', b'K', 3, 4, ..] if ending == "npz" => {
+                return Err(format!("NumPy arrays (.npz); {NUMPY}"));
+            }
             [b'P', b'K', 3, 4, ..] => Self::Archive,
             _ if ending == "onnx" => Self::Graph,
             [0x80, 2..=5, ..] => Self::Pickle,

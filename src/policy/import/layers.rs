@@ -147,7 +147,11 @@ fn pick<'a>(
     let known = parts(&chosen);
     let bears = |tensor: &&Tensor| {
         let name = tensor.name.as_str();
-        let inside = if prefix.is_empty() { name } else { around(name, prefix).map_or(name, |(_, inside)| inside) };
+        let inside = if prefix.is_empty() {
+            name
+        } else {
+            around(name, prefix).map_or(name, |(_, inside)| inside)
+        };
         let other = rule(name, prefix) && !known.contains(name);
         other && tensor.is_float() && bearing(inside) != Bearing::None
     };
@@ -187,10 +191,12 @@ fn listing(networks: &[(&str, Vec<Dense<'_>>)]) -> String {
         let title = if name.is_empty() { "(no prefix)" } else { name };
         if layers.windows(2).all(|pair| pair[0].outputs() == pair[1].inputs()) {
             let outputs: String = layers.iter().map(|l| format!("-{}", l.outputs())).collect();
-            let alone = if layers.len() == 1 { format!("  {}", layers[0].name) } else { String::new() };
+            let alone =
+                if layers.len() == 1 { format!("  {}", layers[0].name) } else { String::new() };
             return format!("\n  {title}  {}{outputs}{alone}", layers[0].inputs());
         }
-        let each = layers.iter().map(|l| format!("\n    {}  {}-{}", l.name, l.inputs(), l.outputs()));
+        let each =
+            layers.iter().map(|l| format!("\n    {}  {}-{}", l.name, l.inputs(), l.outputs()));
         format!("\n  {title}  not one after the other:{}", each.collect::<String>())
     };
     let more = match networks.len().saturating_sub(MOST_LISTED) {

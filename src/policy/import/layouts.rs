@@ -44,7 +44,8 @@ const ELU: Activation = Activation::Elu { alpha: 1.0 };
 /// What CleanRL calls the limits of its actions.
 const ACTIONS: Option<[&str; 2]> = Some(["action_scale", "action_bias"]);
 /// What several libraries do behind the tanh.
-const LIMITS: Option<&str> = Some("the largest action, which the output is multiplied by; the file does not say it");
+const LIMITS: Option<&str> =
+    Some("the largest action, which the output is multiplied by; the file does not say it");
 const GAUSSIAN: (Activation, Activation) = (Activation::Tanh, Activation::Identity);
 
 /// The layouts, those with more parts first.
@@ -259,7 +260,8 @@ fn fit<'a>(
 /// What stands before the module in the name of one of its layers.
 fn outer<'a>(layer: &'a str, module: &str) -> Option<&'a str> {
     match module.ends_with('_') {
-        true => around(layer.trim_end_matches(|c: char| c.is_ascii_digit()), module).map(|(outer, _)| outer),
+        true => around(layer.trim_end_matches(|c: char| c.is_ascii_digit()), module)
+            .map(|(outer, _)| outer),
         false => around(layer, module).map(|(outer, _)| outer),
     }
 }

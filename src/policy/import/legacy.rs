@@ -56,7 +56,8 @@ fn with_storages<'a>(
     let (mut runs, mut rest) = (HashMap::new(), bytes);
     for key in keys {
         let kind = kinds.get(key).ok_or_else(|| format!("a storage `{key}` that no tensor has"))?;
-        let (run, left) = storage(rest, kind.size()).ok_or_else(|| format!("storage `{key}`: cut off"))?;
+        let (run, left) =
+            storage(rest, kind.size()).ok_or_else(|| format!("storage `{key}`: cut off"))?;
         rest = left;
         runs.insert(*key, source.runs.len());
         source.runs.push(run.to_vec());

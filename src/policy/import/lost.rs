@@ -35,7 +35,8 @@ pub(super) fn refuse(
     name: &str,
 ) -> Result<(), String> {
     let modules: HashSet<&str> = used.iter().map(|name| split(name).0).collect();
-    let rest = source.tensors.iter().filter(|tensor| tensor.is_float() && !used.contains(&tensor.name));
+    let rest =
+        source.tensors.iter().filter(|tensor| tensor.is_float() && !used.contains(&tensor.name));
     let known = |name: &str| beside.iter().any(|module| starts_with(name, module));
     let rest = rest.filter(|tensor| !is_of_statistics(tensor, &modules) && !known(&tensor.name));
     let rest: Vec<&Tensor> = rest.collect();
@@ -65,7 +66,8 @@ pub(super) fn refuse(
 /// Whether a tensor lies in the module of statistics that are used: their squares and counts.
 fn is_of_statistics(tensor: &Tensor, modules: &HashSet<&str>) -> bool {
     let (module, key) = split(&tensor.name);
-    let counts = ["_sumsq", "_var", "_count", "count", "summed_variance", "_mean", "_std", "std", "var"];
+    let counts =
+        ["_sumsq", "_var", "_count", "count", "summed_variance", "_mean", "_std", "std", "var"];
     counts.contains(&key.split('.').next().unwrap_or_default()) && modules.contains(module)
 }
 
@@ -84,7 +86,8 @@ pub(super) fn left_out(source: &Source<'_>, used: &HashSet<String>) -> Vec<Strin
     let dense = layers::dense(source);
     let of_layers = layers::parts(&dense);
     let unmade = source.unmade.iter().map(|object| format!("{} ({})", object.name, object.maker));
-    let rest = source.tensors.iter().map(|tensor| &tensor.name).filter(|name| !used.contains(*name));
+    let rest =
+        source.tensors.iter().map(|tensor| &tensor.name).filter(|name| !used.contains(*name));
     let mut rest: Vec<&String> = rest.collect();
     rest.sort_by_key(|name| of_layers.contains(name.as_str()));
     unmade.chain(rest.into_iter().cloned()).collect()

@@ -82,7 +82,12 @@ impl Map {
             let end = |end: f64| if scale == 0.0 { shift } else { scale * end + shift };
             let (a, b) = (end(self.low[i]), end(self.high[i]));
             let within = |value: f64| value.max(next.low[i]).min(next.high[i]);
-            [scale * self.scale[i], scale * self.shift[i] + shift, within(a.min(b)), within(a.max(b))]
+            [
+                scale * self.scale[i],
+                scale * self.shift[i] + shift,
+                within(a.min(b)),
+                within(a.max(b)),
+            ]
         };
         let all: Vec<[f64; 4]> = (0..self.width()).map(each).collect();
         let column = |j: usize| all.iter().map(|row| row[j]).collect();

@@ -34,6 +34,8 @@ mod source;
 mod statistics;
 mod text;
 mod value;
+mod walk;
+mod weights;
 
 use std::path::Path;
 
@@ -88,7 +90,8 @@ fn from_archive(bytes: &[u8], request: &Request) -> std::result::Result<Imported
         None => {
             let sb3::Model { checkpoint, hints } = sb3::open(Entries::open(bytes)?)?;
             let inner = Entries::open(&checkpoint)?.around("data.pkl");
-            let inner = inner.ok_or("no entry `data.pkl` in `policy.pth`: not written by torch.save")?;
+            let inner =
+                inner.ok_or("no entry `data.pkl` in `policy.pth`: not written by torch.save")?;
             choice::policy(checkpoint::open(inner)?, request, &hints)
         }
     }
@@ -108,7 +111,8 @@ fn whole(found: Imported, request: &Request) -> Result<Imported> {
         return Err(Error::invalid("network", "the file holds one network; leave it out"));
     }
     let layers = found.network.layers();
-    let (last, hidden) = layers.split_last().map_or((None, layers), |(last, hidden)| (Some(last), hidden));
+    let (last, hidden) =
+        layers.split_last().map_or((None, layers), |(last, hidden)| (Some(last), hidden));
     let differs = |place: &str, stated: String, has: String| {
         Err(Error::invalid(place, format!("{stated} is stated, the file has {has}; leave it out")))
     };

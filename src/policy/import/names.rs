@@ -4,10 +4,40 @@ use std::cmp::Ordering;
 
 /// Keys of what trains a policy or judges it, and is no part of it. A key that begins so counts.
 const BESIDE: [&str; 34] = [
-    "critic", "value", "vf", "qf", "q_net", "q1", "q2", "Q1", "Q2", "target", "optim", "log_std", "logstd",
-    "std", "sigma", "fc_logstd", "log_alpha", "alpha", "log_ent_coef", "ent_coef", "reward", "ret_", "return",
-    "cost", "scheduler", "lr_", "distribution", "privileged_obs_norm", "critic_obs_norm", "actor_opt", "pi_opt",
-    "discriminator", "loss", "num_batches_tracked",
+    "critic",
+    "value",
+    "vf",
+    "qf",
+    "q_net",
+    "q1",
+    "q2",
+    "Q1",
+    "Q2",
+    "target",
+    "optim",
+    "log_std",
+    "logstd",
+    "std",
+    "sigma",
+    "fc_logstd",
+    "log_alpha",
+    "alpha",
+    "log_ent_coef",
+    "ent_coef",
+    "reward",
+    "ret_",
+    "return",
+    "cost",
+    "scheduler",
+    "lr_",
+    "distribution",
+    "privileged_obs_norm",
+    "critic_obs_norm",
+    "actor_opt",
+    "pi_opt",
+    "discriminator",
+    "loss",
+    "num_batches_tracked",
 ];
 /// Ends of such keys.
 const ENDS_BESIDE: [&str; 8] =
@@ -15,11 +45,23 @@ const ENDS_BESIDE: [&str; 8] =
 /// Such keys as a whole.
 const WHOLE_BESIDE: [&str; 4] = ["v", "q", "c", "obs"];
 /// Beginnings of the keys of the tensors of recurrent layers.
-const RECURRENT: [&str; 6] = ["weight_ih", "weight_hh", "bias_ih", "bias_hh", "kernel_h", "recurrent"];
+const RECURRENT: [&str; 6] =
+    ["weight_ih", "weight_hh", "bias_ih", "bias_hh", "kernel_h", "recurrent"];
 /// Keys that a last layer goes by.
 const HEADS: [&str; 13] = [
-    "mu", "mean", "fc_mu", "fc_mean", "fc_out", "out", "output", "output_layer", "action", "action_net",
-    "head", "last", "final",
+    "mu",
+    "mean",
+    "fc_mu",
+    "fc_mean",
+    "fc_out",
+    "out",
+    "output",
+    "output_layer",
+    "action",
+    "action_net",
+    "head",
+    "last",
+    "final",
 ];
 
 /// What a tensor that is no part of the network may have to do with the policy.
@@ -135,7 +177,13 @@ mod tests {
 
     #[test]
     fn what_bears_on_a_policy_is_told_by_its_keys() {
-        let none = ["critic.0.weight", "optimizer.state.0", "log_std", "actor_target.mu.0.weight", "v.0.bias"];
+        let none = [
+            "critic.0.weight",
+            "optimizer.state.0",
+            "log_std",
+            "actor_target.mu.0.weight",
+            "v.0.bias",
+        ];
         assert!(none.iter().all(|name| bearing(name) == Bearing::None));
         assert_eq!(bearing("memory.weight_ih_l0"), Bearing::Memory);
         assert_eq!(bearing("obs_rms.mean"), Bearing::Unknown);

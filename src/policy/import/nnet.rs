@@ -17,11 +17,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Imported, String> {
     if layers > MOST_LAYERS {
         return Err(format!("{layers} layers; a network has at most {MOST_LAYERS}"));
     }
-    let (inputs, outputs) = (words.count("the number of inputs")?, words.count("the number of outputs")?);
+    let (inputs, outputs) =
+        (words.count("the number of inputs")?, words.count("the number of outputs")?);
     words.count("the widest layer")?;
     let widths = (0..=layers).map(|_| words.count("a width")).collect::<Result<Vec<_>, _>>()?;
     if (widths[0], widths[layers]) != (inputs, outputs) {
-        return Err(format!("widths {widths:?} of a network of {inputs} inputs and {outputs} outputs"));
+        return Err(format!(
+            "widths {widths:?} of a network of {inputs} inputs and {outputs} outputs"
+        ));
     }
     // A number that says nothing.
     words.number("the flag")?;
@@ -64,7 +67,9 @@ fn imported(draft: Draft, layers: usize) -> Result<Imported, String> {
         layers: (0..layers).map(|i| format!("layer {i}")).collect(),
         left_out: Vec::new(),
         layout: Some(".nnet (ACAS)".to_owned()),
-        notes: vec!["inputs are kept within the limits of the file and normalised, as it says".to_owned()],
+        notes: vec![
+            "inputs are kept within the limits of the file and normalised, as it says".to_owned(),
+        ],
         activation_from: Origin::File,
         output_from: Origin::File,
     })

@@ -62,7 +62,8 @@ impl Graph {
     /// # Errors
     /// A sentence with the names of all of them.
     pub(super) fn input(&self) -> Result<Input<'_>, String> {
-        let tensor = |input: &&Named| self.initializers.iter().any(|tensor| tensor.name == input.name);
+        let tensor =
+            |input: &&Named| self.initializers.iter().any(|tensor| tensor.name == input.name);
         let inputs: Vec<&Named> = self.inputs.iter().filter(|input| !tensor(input)).collect();
         match inputs.as_slice() {
             [input] => Ok(Input { name: &input.name, width: input.width() }),
@@ -86,7 +87,13 @@ impl Named {
     /// Numbers of one value, where the first length counts values.
     fn width(&self) -> Option<usize> {
         let lengths = &self.kind.as_ref()?.tensor.as_ref()?.shape.as_ref()?.lengths;
-        let rest = if let [_, rest @ ..] = lengths.as_slice() && !rest.is_empty() { rest } else { lengths };
+        let rest = if let [_, rest @ ..] = lengths.as_slice()
+            && !rest.is_empty()
+        {
+            rest
+        } else {
+            lengths
+        };
         rest.iter().try_fold(1, |n: usize, length| {
             let length = usize::try_from(length.value).ok().filter(|length| *length > 0)?;
             n.checked_mul(length)
@@ -157,7 +164,9 @@ impl Tensor {
     /// does not allow it.
     pub(super) fn array(&self, cast: Cast) -> Result<Array, String> {
         if self.location != 0 {
-            return Err("its numbers are in another file; export with external_data=False".to_owned());
+            return Err(
+                "its numbers are in another file; export with external_data=False".to_owned()
+            );
         }
         let numbers = if self.is_float() { self.reals(cast)? } else { self.wholes()? };
         let shape: Option<Vec<usize>> =
@@ -183,7 +192,9 @@ impl Tensor {
         let (words, rest) = self.raw.as_chunks::<8>();
         Ok(match self.data_type {
             INT64 if self.raw.is_empty() => self.integers.iter().map(|&i| i as f64).collect(),
-            INT64 if rest.is_empty() => words.iter().map(|&word| i64::from_le_bytes(word) as f64).collect(),
+            INT64 if rest.is_empty() => {
+                words.iter().map(|&word| i64::from_le_bytes(word) as f64).collect()
+            }
             INT32 if self.raw.is_empty() => self.small.iter().map(|&i| i.into()).collect(),
             INT32 => {
                 let (words, _) = self.raw.as_chunks::<4>();

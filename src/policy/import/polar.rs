@@ -20,7 +20,8 @@ struct Between {
 /// A sentence about damage.
 pub(super) fn read(bytes: &[u8]) -> Result<Imported, String> {
     let mut words = Words::of(bytes)?;
-    let (inputs, outputs) = (words.count("the number of inputs")?, words.count("the number of outputs")?);
+    let (inputs, outputs) =
+        (words.count("the number of inputs")?, words.count("the number of outputs")?);
     let hidden = words.count("the number of hidden layers")?;
     if hidden >= MOST_LAYERS {
         return Err(format!("{} layers; a network has at most {MOST_LAYERS}", hidden + 1));
@@ -56,7 +57,9 @@ const SHERLOCK: &str = "Sherlock text";
 /// The activations behind `count` layers: POLAR names them, in Sherlock's networks each neuron is a ReLU.
 fn between(words: &mut Words<'_>, count: usize) -> Result<Between, String> {
     if !words.is_word() {
-        let notes = vec!["in a text of Sherlock every neuron is a ReLU, those of the last layer too".to_owned()];
+        let notes = vec![
+            "in a text of Sherlock every neuron is a ReLU, those of the last layer too".to_owned(),
+        ];
         return Ok(Between { activations: vec![Activation::Relu; count], layout: SHERLOCK, notes });
     }
     let word = |words: &mut Words<'_>| {
@@ -87,7 +90,10 @@ fn layer(words: &mut Words<'_>, inputs: usize, outputs: usize) -> Result<Linear,
 fn ends(words: &mut Words<'_>, outputs: usize) -> Result<Map, String> {
     let (offset, scale) = (words.number("the offset")?, words.number("the scale")?);
     if words.left() > 0 {
-        return Err(format!("{} words behind the offset and the scale of the output", words.left()));
+        return Err(format!(
+            "{} words behind the offset and the scale of the output",
+            words.left()
+        ));
     }
     Ok(Map::affine(vec![scale; outputs], vec![-offset * scale; outputs]))
 }

@@ -62,11 +62,13 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
     if data.len() > LONGEST {
         return Err(format!("entry `data`: {} bytes of JSON", data.len()));
     }
-    let data: Value = serde_json::from_slice(data).map_err(|e| format!("entry `data`: no JSON ({e})"))?;
+    let data: Value =
+        serde_json::from_slice(data).map_err(|e| format!("entry `data`: no JSON ({e})"))?;
     let kwargs = &data["policy_kwargs"];
     let mut hints = Hints { activation: activation(kwargs)?, ..Hints::default() };
     // With exploration that depends on the state, PPO may bound its actions as SAC does.
-    let squashed = kwargs["squash_output"] == Value::Bool(true) || kwargs["squash_output"] == "True";
+    let squashed =
+        kwargs["squash_output"] == Value::Bool(true) || kwargs["squash_output"] == "True";
     if squashed {
         hints.output = Some(Activation::Tanh);
     }
@@ -95,7 +97,11 @@ fn activation(kwargs: &Value) -> Result<Option<Activation>, String> {
         "Hardtanh" => Activation::Hardtanh { low: -1.0, high: 1.0 },
         "ReLU6" => Activation::Relu6,
         "Identity" => Activation::Identity,
-        _ => return Err(format!("`data` has the activation `{class}`, which is none that is known")),
+        _ => {
+            return Err(format!(
+                "`data` has the activation `{class}`, which is none that is known"
+            ));
+        }
     }))
 }
 
@@ -109,14 +115,21 @@ fn actions(space: &Value, squashed: bool, hints: &mut Hints) {
         ));
         return;
     }
-    let what = if squashed { "scaled to the limits of the actions" } else { "kept within the limits of the actions" };
+    let what = if squashed {
+        "scaled to the limits of the actions"
+    } else {
+        "kept within the limits of the actions"
+    };
     let Some([low, high]) = limits(space) else {
-        hints.notes.push(format!("not in it: predict() gives the output {what}, which `data` does not say in plain words"));
+        hints.notes.push(format!(
+            "not in it: predict() gives the output {what}, which `data` does not say in plain words"
+        ));
         return;
     };
     let map = match squashed {
         true => {
-            let half = |sign: f64| low.iter().zip(&high).map(move |(low, high)| (high + sign * low) / 2.0);
+            let half =
+                |sign: f64| low.iter().zip(&high).map(move |(low, high)| (high + sign * low) / 2.0);
             Map::affine(half(-1.0).collect(), half(1.0).collect())
         }
         false => Map::clamp(low.clone(), high.clone()),
@@ -132,7 +145,8 @@ fn limits(space: &Value) -> Option<[Vec<f64>; 2]> {
     let numbers = |key: &str| -> Option<Vec<f64>> {
         let text = space[key].as_str()?.trim();
         let inside = text.strip_prefix('[').and_then(|text| text.strip_suffix(']')).unwrap_or(text);
-        let numbers: Option<Vec<f64>> = inside.split_whitespace().map(|word| word.parse().ok()).collect();
+        let numbers: Option<Vec<f64>> =
+            inside.split_whitespace().map(|word| word.parse().ok()).collect();
         numbers.filter(|numbers| !numbers.is_empty())
     };
     let [low, high] = [numbers("low")?, numbers("high")?];

@@ -104,8 +104,10 @@ pub(super) fn find(source: &mut Source<'_>, inputs: usize) -> Result<Option<Norm
         ));
     }
     let map = map(known, &numbers).ok_or_else(|| {
-        format!("`{module}` has a deviation that is not positive; name the network with --network to \
-                 import it without it")
+        format!(
+            "`{module}` has a deviation that is not positive; name the network with --network to \
+                 import it without it"
+        )
     })?;
     let names = tensors.into_iter().map(|tensor| tensor.name).collect();
     Ok(Some(Normaliser { map, names, module }))
@@ -114,9 +116,10 @@ pub(super) fn find(source: &mut Source<'_>, inputs: usize) -> Result<Option<Norm
 /// The tensors of these statistics: means, spreads, limits.
 fn tensors(source: &Source<'_>, known: &Statistics) -> Option<Vec<Tensor>> {
     let ends = |name: &str| {
-        source.tensors.iter().find(|tensor| {
-            around(&tensor.name, name).is_some_and(|(_, after)| after.is_empty())
-        })
+        source
+            .tensors
+            .iter()
+            .find(|tensor| around(&tensor.name, name).is_some_and(|(_, after)| after.is_empty()))
     };
     let (Spread::Deviation(spread, _) | Spread::Variance(spread, _)) = known.spread;
     let mut tensors = vec![ends(known.mean)?.clone(), ends(spread)?.clone()];

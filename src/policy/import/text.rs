@@ -48,7 +48,9 @@ impl<'a> Words<'a> {
     pub(super) fn count(&mut self, what: &str) -> Result<usize, String> {
         let word = self.word(what)?;
         let count = word.parse().ok().filter(|count| (1..=WIDEST).contains(count));
-        count.ok_or_else(|| format!("word {}, {what}: `{word}` is no whole number from 1 to {WIDEST}", self.at))
+        count.ok_or_else(|| {
+            format!("word {}, {what}: `{word}` is no whole number from 1 to {WIDEST}", self.at)
+        })
     }
 
     /// The next word as a number.
