@@ -25,6 +25,7 @@ use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
+use reachcast::train::chosen::chosen_first;
 use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::{Curve, layer};
 use reachcast::train::network::{Architecture, Network};
@@ -372,7 +373,8 @@ fn samples_are_measures_in_f64() {
         reach_avoid(margins, f64::from(source.spec.gamma))
     };
     let values = source.values(purpose::START, 300).unwrap();
-    let actions = source.action_values(purpose::START, 300).unwrap();
+    let chosen = backend.prepare(&chosen_first(&plant)).unwrap();
+    let actions = source.action_values(&chosen, purpose::START, 300).unwrap();
     assert_eq!((values.len(), values.columns, actions.len(), actions.columns), (300, 2, 300, 3));
     let mut outside = 0;
     for i in 0..300 {

@@ -180,9 +180,7 @@ struct Certified<'p, 'a> {
 /// The findings of a sweep of certificates.
 pub(super) fn certificates(grid: &Grid<'_>) -> Findings {
     let all: Vec<Certified<'_, '_>> = grid.points.iter().filter_map(certified).collect();
-    let best = grid.best.and_then(|best| certified(&grid.points[best]));
-    let parts =
-        [best.map(|best| largest_share(grid, &best, &all)), largest_ball(grid, &all), held(&all)];
+    let parts = [largest_share(grid, &all), largest_ball(grid, &all), held(&all)];
     let (headlines, found) = parts.into_iter().flatten().unzip();
     Findings { headlines, found, limits: certificate_limits(&all) }
 }
@@ -191,18 +189,34 @@ fn certified<'p, 'a>(point: &'p Point<'a>) -> Option<Certified<'p, 'a>> {
     Some(Certified { point, certificate: certificate(point.record)? })
 }
 
-fn largest_share(
-    grid: &Grid<'_>,
-    best: &Certified<'_, '_>,
-    all: &[Certified<'_, '_>],
-) -> (Headline, String) {
-    let (name, value) = (grid.name(best.point), percent(share(best.certificate)));
+/// The point with the largest share of those whose certificates hold, of all where none does.
+fn largest_share(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
+    let some_hold = all.iter().any(|one| one.certificate.holds);
+    let eligible = || all.iter().filter(|one| one.certificate.holds || !some_hold);
+    let of = |one: &Certified<'_, '_>| share(one.certificate);
+    // Of equal points the first.
+    let best = eligible().reduce(|best, next| if of(next) > of(best) { next } else { best })?;
+    let (name, value) = (grid.name(best.point), percent(of(best)));
     let interval = percents(best.certificate.share_interval);
-    let found =
-        format!("The largest share of the box is certified at {name}: {value} ({interval}).");
-    let mut details = vec![format!("At {name}."), format!("Interval: {interval}.")];
+    let risk = upper(best.certificate.conditional_risk);
+    let mut found = format!(
+        "The largest share of the box is certified at {name}: {value} ({interval}), with a failure risk of at \
+         most {risk}."
+    );
+    let mut details = vec![
+        format!("At {name}."),
+        format!("Interval: {interval}."),
+        format!("Failure risk in the set: at most {risk}."),
+    ];
+    let equal = eligible().filter(|one| of(one) == of(best)).count();
+    details.extend((equal > 1).then(|| format!("The same at {} more points.", equal - 1)));
+    if !some_hold {
+        details.push("No certificate of the sweep holds.".to_owned());
+    } else if all.iter().any(|one| of(one) > of(best)) {
+        found += " Larger ones belong to certificates that do not hold.";
+    }
     details.extend(picked(all));
-    (Headline { title: "Largest certified share".to_owned(), value, details }, found)
+    Some((Headline { title: "Largest certified share".to_owned(), value, details }, found))
 }
 
 fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
