@@ -285,10 +285,13 @@ fn a_risk_that_is_looked_for_is_no_claim() {
     asked.risk = Some(ConditionalRisk::LookedFor(0.03));
     let shown = record(&cpu(2), &plant, &settings);
     assert_eq!(shown.global.claim.epsilon, Some(0.03), "the draws show it");
+    assert_eq!(shown.looked_for(), None);
     settings.global.draws = 300;
     let few = record(&cpu(2), &plant, &settings);
     let claim = &few.global.claim;
     assert!(few.statements.join("\n").contains("was not tested"));
+    let words = few.looked_for().expect("not found");
+    assert!(words.starts_with("a risk of 0.03 was looked for"), "{words}");
     assert!(claim.epsilon == Some(settings.deviation.epsilon) && claim.is_obtained(), "{claim:?}");
 }
 

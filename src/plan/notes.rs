@@ -85,7 +85,8 @@ fn weights(record: &PlanRecord) -> Option<String> {
     if samples > 1 && median > ALL * f64::from(samples) {
         return Some(format!(
             "{} of {samples} samples are effective, so all weigh about the same and a plan is their mean: \
-             the temperature {temperature} is large beside the differences of their costs; lower it",
+             the temperature {temperature} is large beside the differences of their costs: lower it, unless \
+             the costs hardly depend on the controls",
             lower(median)
         ));
     }
