@@ -1,11 +1,9 @@
 //! Tasks against brute force: each kind's measure from its definition over stored trajectories, on every
 //! backend, its signs with early exit, its pairs, its margin drops; and kernels that break a rule are caught.
 
-mod common;
-
 use std::path::Path;
 
-use common::{adapter, backends, cpu};
+use crate::common::{adapter, backends, cpu};
 use reachcast::Error;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::Gpu;

@@ -1,8 +1,6 @@
 //! Margin drops and scores against a plain loop in f64, on every backend, and the certificate made of them.
 
-mod common;
-
-use common::{backends, cpu, race_policy, race_settings};
+use crate::common::{backends, cpu, race_policy, race_settings};
 use reachcast::backend::Backend;
 use reachcast::model::Plant;
 use reachcast::race::DroneRace;
