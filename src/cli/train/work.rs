@@ -237,6 +237,9 @@ fn text(record: &TrainRecord, files: &[PathBuf], seconds: f64) -> String {
         line(format_args!("{} {}", network.file, network.sha256));
     }
     line(format_args!("{} s", number(seconds)));
+    for note in &record.notes {
+        line(format_args!("note: {note}"));
+    }
     for file in files {
         line(format_args!("{}", file.display()));
     }

@@ -222,16 +222,19 @@ fn largest_share(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline
 fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
     let balls = all.iter().filter(|one| one.certificate.radius > 0.0);
     let radius = |one: &Certified<'_, '_>| one.certificate.radius;
-    let largest = balls.max_by(|a, b| radius(a).total_cmp(&radius(b)));
+    // Of equal sets the first.
+    let largest = balls.reduce(|best, next| if radius(next) > radius(best) { next } else { best });
     let title = "Largest verified set".to_owned();
     let Some(largest) = largest else {
         let found = "Local growth verified no set at any point.".to_owned();
         let headline = Headline { title, value: "none".to_owned(), details: Vec::new() };
         return (!all.is_empty()).then_some((headline, found));
     };
+    let equal = all.iter().filter(|one| radius(one) == radius(largest)).count() - 1;
     let (name, radius) = (grid.name(largest.point), lower(radius(largest)));
-    let found = format!("The largest verified set has radius {radius}, at {name}.");
-    let mut details = vec![format!("At {name}.")];
+    let also = if equal > 0 { format!(" and {equal} more") } else { String::new() };
+    let found = format!("The largest verified set has radius {radius}, at {name}{also}.");
+    let mut details = vec![format!("At {name}{also}.")];
     details.extend(picked(all));
     Some((Headline { title, value: format!("radius {radius}"), details }, found))
 }
@@ -283,5 +286,6 @@ fn certificate_limits(all: &[Certified<'_, '_>]) -> Vec<String> {
          better certificate by itself."
             .to_owned(),
         "Nothing is certified for one given state: each claim is about a measure.".to_owned(),
+        "Each point takes the policy that its configuration names; none is trained anew.".to_owned(),
     ]
 }
