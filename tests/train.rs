@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use burn_tensor::{Tensor, activation};
+use common::activations::{activations, exact};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
 use reachcast::bench;
@@ -593,6 +594,27 @@ fn a_layer_is_burns_own_operations() {
         for (found, expected) in run(true).into_iter().zip(run(false)) {
             let error = (found - expected).abs();
             assert!(error <= 3e-6 * (1.0 + expected.abs()), "{curve:?}: {found} {expected}");
+        }
+    }
+}
+
+/// Values and slopes of a layer with each activation, against definitions in f64 and their central differences.
+#[test]
+fn layers_of_every_activation_have_their_slopes() {
+    let sums: Vec<f32> = (-40..40).map(|i| 0.173 * i as f32 + 0.0117).collect();
+    for activation in activations() {
+        let one = |value: f32| Device::cpu().tensor(vec![value], [1, 1]);
+        let x = Device::cpu().tensor(sums.clone(), [sums.len(), 1]).require_grad();
+        let outputs = layer(x.clone(), one(1.0), one(0.0), activation);
+        let grads = outputs.clone().sum().backward();
+        let (values, slopes) = (floats(outputs), floats(x.grad(&grads).unwrap()));
+        for ((x, value), slope) in sums.iter().zip(values).zip(slopes) {
+            let at = |step: f64| exact(activation, f64::from(*x) + step);
+            let expected = (at(1e-6) - at(-1e-6)) / 2e-6;
+            let error = (f64::from(value) - at(0.0)).abs();
+            assert!(error < 3e-6, "{activation} at {x}: {value}");
+            let error = (f64::from(slope) - expected).abs();
+            assert!(error < 5e-6, "{activation} at {x}: {slope}, {expected}");
         }
     }
 }

@@ -359,11 +359,11 @@ pub(super) struct ImportArguments {
     /// Prefix of the names of the network's layers; several, separated by commas, are joined
     #[arg(long, value_name = "PREFIX", value_delimiter = ',')]
     pub(super) network: Vec<String>,
-    /// Activation of the hidden layers of a checkpoint [default: relu]
-    #[arg(long, value_enum)]
+    /// Activation of the hidden layers of a checkpoint, `elu` or `leaky_relu(0.2)` [default: relu]
+    #[arg(long, value_name = "WORD")]
     pub(super) activation: Option<Activation>,
     /// Activation of its last layer [default: tanh; identity for a critic]
-    #[arg(long, value_enum)]
+    #[arg(long, value_name = "WORD")]
     pub(super) output: Option<Activation>,
     /// Names of the inputs, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "config")]
