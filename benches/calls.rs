@@ -10,7 +10,7 @@ use reachcast::backend::gpu::compose::{Kernel, PlantText};
 use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
 use reachcast::bench;
 use reachcast::model::{Controller, Model, Plant};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Layer, Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::rollout::{Query, ReachAvoidTask, Region, RolloutSpec, Starts, Stream, Tightening};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
@@ -18,14 +18,9 @@ use reachcast::system::{BangBang, DoubleIntegrator, System};
 /// A network from 12 states to 3 controls.
 fn network(width: usize, depth: usize) -> Mlp {
     let widths = [&[12][..], &vec![width; depth], &[3]].concat();
-    let layer = |pair: &[usize]| Layer {
-        weight: vec![0.01; pair[0] * pair[1]],
-        bias: vec![0.0; pair[1]],
-        inputs: pair[0],
-        outputs: pair[1],
-    };
+    let layer = |pair: &[usize]| Layer::dense(vec![0.01; pair[0] * pair[1]], vec![0.0; pair[1]]);
     let layers = widths.windows(2).map(layer).collect();
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers, Activation::Relu, Activation::Tanh).expect("a whole network")
 }
 
 /// Calls of one plant on one adapter.

@@ -9,7 +9,7 @@ use std::time::Instant;
 use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
 use reachcast::backend::{Backend, Program};
 use reachcast::model::Plant;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::race::DroneRace;
 use reachcast::race::bench::data;
 use reachcast::rollout::{
@@ -31,14 +31,9 @@ const DISPATCH_SECONDS: f64 = 1e-6;
 
 /// A network from 12 states to 3 controls, three hidden layers of 64.
 fn network() -> Mlp {
-    let layer = |pair: &[usize]| Layer {
-        weight: vec![0.01; pair[0] * pair[1]],
-        bias: vec![0.0; pair[1]],
-        inputs: pair[0],
-        outputs: pair[1],
-    };
+    let layer = |pair: &[usize]| Layer::dense(vec![0.01; pair[0] * pair[1]], vec![0.0; pair[1]]);
     let layers = [12, 64, 64, 64, 3].windows(2).map(layer).collect();
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers, Activation::Relu, Activation::Tanh).expect("a whole network")
 }
 
 /// An adapter whose rollouts run networks as `networks` says.

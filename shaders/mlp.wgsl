@@ -28,7 +28,6 @@ fn mlp(
         params.layer_inputs,
         params.layer_outputs,
         params.layer_neurons,
-        LAST_LAYER,
     );
     put_tile(layer, quad, column, tile_of(layer, quad, column));
 }

@@ -16,8 +16,6 @@ struct Layer {
     outputs: u32,
     // Of those outputs, which are padded to whole tiles.
     neurons: u32,
-    // Whether it is the last of its network, with an activation of its own.
-    last: bool,
 }
 
 struct Tile {
@@ -101,20 +99,9 @@ fn tile_of(layer: Layer, quad: u32, column: u32) -> Tile {
     );
 }
 
-fn activation(layer: Layer, sum: f32) -> f32 {
-    if layer.last {
-        return output_activation(sum);
-    }
-    return hidden_activation(sum);
-}
-
 fn put_activated(layer: Layer, quad: u32, column: u32, sum: vec4<f32>) {
-    let activated = vec4<f32>(
-        activation(layer, sum.x),
-        activation(layer, sum.y),
-        activation(layer, sum.z),
-        activation(layer, sum.w),
-    );
+    let activated =
+        vec4<f32>(activation(sum.x), activation(sum.y), activation(sum.z), activation(sum.w));
     // Weights of 0 do not keep a padded neuron at 0 where an input is infinite.
     let number = vec4<u32>(4u * quad) + vec4<u32>(0u, 1u, 2u, 3u);
     put(quad, column, select(vec4<f32>(0.0), activated, number < vec4<u32>(layer.neurons)));

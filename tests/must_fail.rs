@@ -24,7 +24,7 @@ use reachcast::backend::gpu::{Form, Gpu, NetworkKernels};
 use reachcast::cost::Quadratic;
 use reachcast::formula::Function;
 use reachcast::model::Plant;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Layer, Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
@@ -281,8 +281,8 @@ const MPPI_HORIZON: u32 = 37;
 
 /// A layer with weights of both signs.
 fn mppi_network() -> Mlp {
-    let layer = Layer { weight: vec![0.7, -0.9], bias: vec![0.2], inputs: 2, outputs: 1 };
-    Mlp::new(vec![layer], Activation::Tanh, OutputActivation::Tanh).expect("a network")
+    let layer = Layer::dense(vec![0.7, -0.9], vec![0.2]);
+    Mlp::new(vec![layer], Activation::Tanh, Activation::Tanh).expect("a network")
 }
 
 /// Whether the adapter agrees with f64 on plans of the double integrator under each kind of noise,

@@ -10,7 +10,7 @@ use std::path::Path;
 use checkpoint::{bytes, import, path, refused};
 use reachcast::files::{Array, read_npz};
 use reachcast::policy::import::{Cast, Imported, Origin, Request, read};
-use reachcast::policy::{Activation, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Mlp};
 
 /// Largest difference to PyTorch's forward pass in f32; the outputs are of the order of 1.
 const TOLERANCE: f32 = 1e-5;
@@ -23,7 +23,7 @@ fn request(network: &str) -> Request {
 fn silu(network: &str) -> Request {
     Request {
         activation: Some(Activation::Silu),
-        output: Some(OutputActivation::Identity),
+        output: Some(Activation::Identity),
         ..request(network)
     }
 }
@@ -121,21 +121,21 @@ fn what_a_file_does_not_say_is_said_to_be_a_default() {
     let found = |file: &str, request: Request| {
         let Imported { network, layers, activation_from, output_from, .. } =
             read(&path(file), &request).unwrap();
-        ((network.activation(), activation_from), (network.output(), output_from), layers)
+        ((network.activation().unwrap(), activation_from), (network.output(), output_from), layers)
     };
     let (activation, output, layers) = found("tianshou.pth", request("actor1_old"));
     assert_eq!(activation, (Activation::Relu, Origin::Default));
-    assert_eq!(output, (OutputActivation::Tanh, Origin::Default));
+    assert_eq!(output, (Activation::Tanh, Origin::Default));
     let body = [0, 2, 4, 6].map(|i| format!("actor1_old.preprocess.model.model.{i}"));
     assert_eq!(layers[..4], body);
     assert_eq!(layers[4..], ["actor1_old.last.model.0"]);
     let (_, output, _) = found("tianshou.pth", request("critic"));
-    assert_eq!(output, (OutputActivation::Identity, Origin::Default));
-    let tanh = Request { output: Some(OutputActivation::Tanh), ..request("critic") };
-    assert_eq!(found("tianshou.pth", tanh).1, (OutputActivation::Tanh, Origin::Stated));
+    assert_eq!(output, (Activation::Identity, Origin::Default));
+    let tanh = Request { output: Some(Activation::Tanh), ..request("critic") };
+    assert_eq!(found("tianshou.pth", tanh).1, (Activation::Tanh, Origin::Stated));
     let (activation, output, layers) = found("silu.onnx", request(""));
     assert_eq!(activation, (Activation::Silu, Origin::File));
-    assert_eq!(output, (OutputActivation::Identity, Origin::File));
+    assert_eq!(output, (Activation::Identity, Origin::File));
     assert_eq!(layers, ["0.weight", "2.weight", "4.weight"]);
     assert_eq!(found("ambiguous.pth", silu("teacher")).0, (Activation::Silu, Origin::Stated));
 }
@@ -158,7 +158,7 @@ fn prefixes_name_one_network() {
     refused("tianshou.pth", &request("preprocess"), &["`preprocess` may be one of", "actor2_old"]);
     let whole = network("tianshou.pth", request("critic"));
     let parts = request("critic.preprocess,critic.last");
-    let tail = OutputActivation::Identity;
+    let tail = Activation::Identity;
     assert_eq!(network("tianshou.pth", parts), whole);
     assert_eq!(whole.output(), tail);
     assert_eq!(network("training.pt", request("model")), network("sequential.pth", request("")));
@@ -167,7 +167,7 @@ fn prefixes_name_one_network() {
     refused("relu.onnx", &request("0"), &["one network", "leave it out"]);
     let other = Request { activation: Some(Activation::Tanh), ..request("") };
     refused("relu.onnx", &other, &["activation", "tanh is stated, the graph has relu"]);
-    let other = Request { output: Some(OutputActivation::Identity), ..request("") };
+    let other = Request { output: Some(Activation::Identity), ..request("") };
     refused("relu.onnx", &other, &["output", "identity is stated, the graph has tanh"]);
 }
 

@@ -2,43 +2,37 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
+mod common;
+
+use common::activations::{self, activations};
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::policy::inspect::{Inspection, output_intervals, output_ranges};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
-use reachcast::real::bound::Interval;
+use reachcast::policy::{Activation, Layer, Mlp, Norm, Rescale};
+use reachcast::real::bound::{Domain, Interval, lipschitz};
 use reachcast::rollout::{Purpose, Region, Stream};
 
-const ACTIVATIONS: [Activation; 3] = [Activation::Relu, Activation::Tanh, Activation::Silu];
-
 /// A network with weights drawn uniformly, of about unit gain per layer.
-fn network(widths: &[usize], activation: Activation, output: OutputActivation, seed: u64) -> Mlp {
+fn network(widths: &[usize], activation: Activation, output: Activation, seed: u64) -> Mlp {
     let mut draw = StdRng::seed_from_u64(seed);
     let layers = widths.windows(2).map(|pair| {
         let (inputs, outputs) = (pair[0], pair[1]);
         let size = 1.5 / (inputs as f32).sqrt();
         let mut numbers =
             |count: usize| (0..count).map(|_| draw.random_range(-size..size)).collect();
-        Layer { weight: numbers(inputs * outputs), bias: numbers(outputs), inputs, outputs }
+        Layer::dense(numbers(inputs * outputs), numbers(outputs))
     });
     Mlp::new(layers.collect(), activation, output).unwrap()
 }
 
-/// The network in f64 with the library's functions, which the polynomials of `forward` are not.
+/// The network in f64 from definitions, which the polynomials of `forward` are not.
 fn exact(network: &Mlp, input: &[f64]) -> Vec<f64> {
-    let last = network.layers().len() - 1;
-    network.layers().iter().enumerate().fold(input.to_vec(), |x, (i, layer)| {
+    network.layers().iter().fold(input.to_vec(), |x, layer| {
         let rows = layer.weight.chunks_exact(layer.inputs).zip(&layer.bias);
         rows.map(|(row, &bias)| {
             let sum: f64 = row.iter().zip(&x).map(|(&w, x)| f64::from(w) * x).sum();
-            let sum = sum + f64::from(bias);
-            match (i == last, network.activation(), network.output()) {
-                (true, _, OutputActivation::Tanh) | (false, Activation::Tanh, _) => sum.tanh(),
-                (true, _, OutputActivation::Identity) => sum,
-                (false, Activation::Relu, _) => sum.max(0.0),
-                (false, Activation::Silu, _) => sum / (1.0 + (-sum).exp()),
-            }
+            activations::exact(layer.activation, sum + f64::from(bias))
         })
         .collect()
     })
@@ -48,14 +42,24 @@ fn race_policy() -> Mlp {
     Mlp::load("configs/policies/race_policy.safetensors".as_ref()).unwrap()
 }
 
+/// The steepest slope by central differences on a grid.
+fn steepest(activation: Activation) -> f64 {
+    let at = |x: f64| activations::exact(activation, x);
+    let slopes = (-80_000..80_000).map(|i| {
+        let x = f64::from(i) * 1e-4 + 5e-5;
+        ((at(x + 4e-5) - at(x - 4e-5)) / 8e-5).abs()
+    });
+    slopes.fold(0.0, f64::max)
+}
+
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
 #[test]
 fn the_lipschitz_bound_is_the_product_of_the_norms() {
-    let networks = ACTIVATIONS
-        .map(|activation| network(&[6, 32, 20, 2], activation, OutputActivation::Identity, 3));
+    let networks =
+        ACTIVATIONS.map(|activation| network(&[6, 32, 20, 2], activation, Activation::Identity, 3));
     for network in networks.into_iter().chain([race_policy()]) {
         let inspection = Inspection::of(&network);
         let norms = network.layers().iter().map(|layer| {
@@ -63,11 +67,7 @@ fn the_lipschitz_bound_is_the_product_of_the_norms() {
             DMatrix::from_row_iterator(layer.outputs, layer.inputs, weights).singular_values().max()
         });
         let product: f64 = norms.product();
-        // The steepest slope of SiLU, between the layers.
-        let slope: f64 = match network.activation() {
-            Activation::Silu => 1.099_839_3,
-            _ => 1.0,
-        };
+        let slope = steepest(network.activation().unwrap());
         let product = product * slope.powi(network.layers().len() as i32 - 1);
         let bound = inspection.lipschitz_bound;
         assert!(bound >= product * (1.0 - 1e-7), "{bound} is below {product}");
@@ -78,10 +78,10 @@ fn the_lipschitz_bound_is_the_product_of_the_norms() {
 #[test]
 fn no_two_outputs_are_farther_apart_than_the_bound_says() {
     let mut draw = StdRng::seed_from_u64(5);
-    for activation in ACTIVATIONS {
+    for activation in activations() {
         // One layer of one neuron comes close to its bound: a positive weight at the steepest.
-        let narrow = network(&[1, 1, 1], activation, OutputActivation::Identity, 1);
-        let wide = network(&[3, 16, 2], activation, OutputActivation::Tanh, 4);
+        let narrow = network(&[1, 1, 1], activation, Activation::Identity, 1);
+        let wide = network(&[3, 16, 2], activation, Activation::Tanh, 4);
         for (network, share) in [(narrow, 0.999), (wide, 0.05)] {
             let bound = Inspection::of(&network).lipschitz_bound;
             let mut steepest: f64 = 0.0;
@@ -104,7 +104,7 @@ fn no_two_outputs_are_farther_apart_than_the_bound_says() {
 
 #[test]
 fn one_layer_has_its_range_in_closed_form() {
-    let network = network(&[4, 3], Activation::Relu, OutputActivation::Identity, 7);
+    let network = network(&[4, 3], Activation::Relu, Activation::Identity, 7);
     let sides = [[-1.0, 2.0], [0.5, 0.5], [-3.0, -1.0], [0.0, 1.0]];
     let intervals =
         output_intervals(&network, &sides.map(|[low, high]| Interval::new(low, high))).unwrap();
@@ -126,11 +126,10 @@ fn one_layer_has_its_range_in_closed_form() {
 /// One input through one neuron: the range is exact, wherever the interval lies.
 #[test]
 fn activations_have_their_exact_range() {
-    let layer =
-        |weight: f32| Layer { weight: vec![weight], bias: vec![0.0], inputs: 1, outputs: 1 };
-    for activation in ACTIVATIONS {
+    let layer = |weight: f32| Layer::dense(vec![weight], vec![0.0]);
+    for activation in activations() {
         let layers = vec![layer(1.0), layer(1.0)];
-        let network = Mlp::new(layers, activation, OutputActivation::Identity).unwrap();
+        let network = Mlp::new(layers, activation, Activation::Identity).unwrap();
         for i in 0..120 {
             let low = -6.0 + 0.1 * f64::from(i);
             for width in [0.0, 0.003, 0.2, 1.0, 5.0] {
@@ -150,7 +149,7 @@ fn activations_have_their_exact_range() {
             }
         }
     }
-    let silu = Mlp::new(vec![layer(1.0), layer(1.0)], Activation::Silu, OutputActivation::Identity);
+    let silu = Mlp::new(vec![layer(1.0), layer(1.0)], Activation::Silu, Activation::Identity);
     let all = output_intervals(&silu.unwrap(), &[Interval::ENTIRE]).unwrap()[0];
     assert!(all.low < -0.278_464_5 && all.low > -0.279 && all.high == f64::INFINITY, "{all:?}");
 }
@@ -158,8 +157,8 @@ fn activations_have_their_exact_range() {
 #[test]
 fn every_output_lies_in_its_interval() {
     let mut draw = StdRng::seed_from_u64(9);
-    for activation in ACTIVATIONS {
-        for output in [OutputActivation::Tanh, OutputActivation::Identity] {
+    for activation in activations() {
+        for output in [Activation::Tanh, Activation::Identity] {
             let network = network(&[5, 24, 24, 3], activation, output, 11);
             for size in [0.001, 0.1, 2.0] {
                 let centre: Vec<f64> = (0..5).map(|_| draw.random_range(-1.0..1.0)).collect();
@@ -202,13 +201,59 @@ fn seen_ranges_are_those_of_the_states_drawn() {
 #[test]
 fn numbers_of_the_layers() {
     let layers = vec![
-        Layer { weight: vec![3.0, 0.0, 0.0, -4.0], bias: vec![0.5, -2.0], inputs: 2, outputs: 2 },
-        Layer { weight: vec![0.6, 0.8], bias: vec![1.0], inputs: 2, outputs: 1 },
+        Layer::dense(vec![3.0, 0.0, 0.0, -4.0], vec![0.5, -2.0]),
+        Layer::dense(vec![0.6, 0.8], vec![1.0]),
     ];
-    let network = Mlp::new(layers, Activation::Tanh, OutputActivation::Identity).unwrap();
+    let network = Mlp::new(layers, Activation::Tanh, Activation::Identity).unwrap();
     let Inspection { layers, lipschitz_bound, parameter_count, .. } = Inspection::of(&network);
     assert_eq!((layers[0].weight_range, layers[0].bias_range), ([-4.0, 3.0], [-2.0, 0.5]));
     assert!((4.0..4.001).contains(&layers[0].spectral_norm), "{}", layers[0].spectral_norm);
     assert!((4.0 - 1e-6..4.001).contains(&lipschitz_bound), "{lipschitz_bound}");
     assert_eq!(parameter_count, 9);
+}
+
+/// A network with everything: a norm, a map at each end, an activation of its own in each layer.
+fn whole(activation: Activation, seed: u64) -> Mlp {
+    let mut layers = network(&[3, 12, 9, 2], activation, Activation::Gelu, seed).layers().to_vec();
+    layers[1].activation = Activation::Softsign;
+    let row = |from: f32, count: usize| (0..count).map(|k| from + 0.1 * (k % 4) as f32).collect();
+    layers[0].norm = Some(Norm { scale: row(0.6, 12), shift: row(-0.2, 12), epsilon: 0.01 });
+    let input = Rescale { low: vec![-0.8; 3], ..Rescale::affine(row(0.7, 3), row(-0.1, 3)) };
+    let output = Rescale { high: vec![0.1, 3.0], ..Rescale::affine(row(-1.3, 2), row(0.2, 2)) };
+    let mlp = Mlp::from_layers(layers).and_then(|mlp| mlp.with_input(input));
+    mlp.and_then(|mlp| mlp.with_output(output)).unwrap()
+}
+
+#[test]
+fn bounds_hold_networks_with_norms_and_maps() {
+    let mut draw = StdRng::seed_from_u64(21);
+    for (seed, activation) in (30..).zip(activations()) {
+        let mlp = whole(activation, seed);
+        let global = Inspection::of(&mlp).lipschitz_bound;
+        for size in [0.01, 0.3, 2.0] {
+            let centre: Vec<f64> = (0..3).map(|_| draw.random_range(-0.6..0.6)).collect();
+            let [low, high] =
+                [-size, size].map(|side| centre.iter().map(|c| c + side).collect::<Vec<_>>());
+            let domain = Domain { low: &low, high: &high, varies: &[true; 3] };
+            let local = lipschitz(domain, |x| mlp.forward(x)[0]).constant;
+            let sides = low.iter().zip(&high).map(|(&low, &high)| Interval::new(low, high));
+            let intervals = output_intervals(&mlp, &sides.collect::<Vec<_>>()).unwrap();
+            let mut point = || -> Vec<f64> {
+                centre.iter().map(|c| c + size * draw.random_range(-1.0..1.0)).collect()
+            };
+            for _ in 0..400 {
+                let (a, b) = (point(), point());
+                let b: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a + 1e-3 * (b - a)).collect();
+                let [at, next] = [&a, &b].map(|x| mlp.forward(x));
+                let apart = distance(&at, &next) - 1e-13;
+                assert!(apart <= global * distance(&a, &b), "{activation}: {global}");
+                let apart = (at[0] - next[0]).abs() - 1e-13;
+                assert!(apart <= local * distance(&a, &b), "{activation}: {local}");
+                for (value, interval) in at.iter().zip(&intervals) {
+                    let held = interval.low - 1e-13 <= *value && *value <= interval.high + 1e-13;
+                    assert!(held, "{activation}: {value} outside {interval:?}");
+                }
+            }
+        }
+    }
 }

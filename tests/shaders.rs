@@ -20,7 +20,7 @@ use reachcast::backend::gpu::compose::{
 use reachcast::cost::{Cost, CostMap, GoalCost, Grid, Quadratic};
 use reachcast::formula::{Expr, Scalar as _, record};
 use reachcast::model::{Controller, Law, Lookups, MapCost, Model, StageCost, TerminalCost};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Layer, Mlp, Norm, Policy};
 use reachcast::race::{Cone, DroneRace, Fence, RaceCost, RecoveryCost, Safety};
 use reachcast::real::Real;
 use reachcast::rollout::{Disturbance, MppiSettings, MppiSpec, NoiseKind, Planning, ValueTerm};
@@ -70,14 +70,19 @@ fn network(states: usize, controls: usize, activation: Activation) -> Mlp {
 
 /// A network with one hidden layer of `hidden` neurons.
 fn network_of(states: usize, hidden: usize, controls: usize, activation: Activation) -> Mlp {
-    let layer = |inputs: usize, outputs: usize| Layer {
-        weight: vec![0.1; inputs * outputs],
-        bias: vec![0.0; outputs],
-        inputs,
-        outputs,
+    let layer = |inputs: usize, outputs: usize| {
+        Layer::dense(vec![0.1; inputs * outputs], vec![0.0; outputs])
     };
     let layers = vec![layer(states, hidden), layer(hidden, controls)];
-    Mlp::new(layers, activation, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers, activation, Activation::Tanh).expect("a whole network")
+}
+
+/// A network with a norm behind its first layer.
+fn normed() -> Controller {
+    let mut layers = network(2, 1, Activation::Gelu).layers().to_vec();
+    layers[0].norm = Some(Norm { scale: vec![1.0; 5], shift: vec![0.0; 5], epsilon: 1e-5 });
+    let mlp = Mlp::from_layers(layers).expect("a whole network");
+    Controller::of(&DoubleIntegrator::default(), mlp)
 }
 
 /// Forms of networks that rollouts run themselves: of each kind, and tiles of each size.
@@ -99,7 +104,7 @@ where
 {
     let name = system.name().to_owned();
     let formula = Controller::of(&system, Clamped);
-    let activations = [Activation::Relu, Activation::Tanh, Activation::Silu];
+    let activations = [Activation::Relu, Activation::Tanh, Activation::Gelu];
     let networks = activations.map(|activation| network(NX, NU, activation));
     let driven = networks.map(|mlp| Controller::of(&system, mlp));
     let model = Model::of(system);
@@ -282,6 +287,13 @@ fn each_kernel(mut see: impl FnMut(&str, Bindings<'_>, &naga::Module, &ModuleInf
             let bindings = text.bindings(kernel);
             see(&name, (kernel, text.lanes(kernel), &bindings), &module, &info);
         }
+    }
+    let normed = text(&Model::of(DoubleIntegrator::default()), &normed());
+    for kernel in [Kernel::Sums, Kernel::Norm(0), Kernel::Layer(1)] {
+        let name = format!("{kernel:?} of a network with a norm");
+        let (module, info) = validated(&name, &normed.compose(kernel));
+        let bindings = normed.bindings(kernel);
+        see(&name, (kernel, normed.lanes(kernel), &bindings), &module, &info);
     }
     for (plant, text) in mppi_texts() {
         for kernel in text.kernels() {
@@ -599,7 +611,7 @@ fn formulas_that_do_not_fit_are_refused() {
 fn tile_of_the_layer_kernel_is_the_one_that_is_dispatched() {
     use reachcast::backend::gpu::compose::{TILE_COLUMNS, TILE_QUADS};
     let (_, text) = all_plants().swap_remove(1);
-    let text = text.compose(Kernel::HiddenLayer);
+    let text = text.compose(Kernel::Layer(0));
     assert!(text.contains(&format!("const TILE_COLUMNS: u32 = {TILE_COLUMNS}u;")));
     let stores = text.matches("tile.upper_").count() + text.matches("tile.lower_").count();
     assert_eq!(stores as u32, TILE_COLUMNS * TILE_QUADS);

@@ -7,7 +7,7 @@ use reachcast::backend::Backend;
 use reachcast::control::mppi::{Planner, shifted};
 use reachcast::cost::Quadratic;
 use reachcast::model::Plant;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::rollout::{
     MppiProblem, MppiSettings, MppiSpec, Planning, Purpose, Query, ReachAvoidTask, RolloutSpec,
     Starts, Stream, Tightening,
@@ -32,14 +32,9 @@ fn resident_bytes() -> Option<u64> {
 fn growth(backend: &Backend, samples: u32, steps: u32) -> Option<i64> {
     let system = DoubleIntegrator::default();
     let weights = |count: usize| (0..count).map(|i| 0.3 - 0.1 * (i % 7) as f32).collect();
-    let layer = |inputs: usize, outputs: usize| Layer {
-        weight: weights(inputs * outputs),
-        bias: vec![0.0; outputs],
-        inputs,
-        outputs,
-    };
-    let policy =
-        Mlp::new(vec![layer(2, 16), layer(16, 1)], Activation::Tanh, OutputActivation::Tanh);
+    let layer =
+        |inputs: usize, outputs: usize| Layer::dense(weights(inputs * outputs), vec![0.0; outputs]);
+    let policy = Mlp::new(vec![layer(2, 16), layer(16, 1)], Activation::Tanh, Activation::Tanh);
     let policy = policy.expect("a network");
     let settings = MppiSettings::new(&system.controls(), samples, HORIZON as u32);
     let cost = Quadratic { state: [2.0, 0.5], control: [0.1], last: [20.0, 5.0], obstacle: None };

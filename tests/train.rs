@@ -10,13 +10,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use burn_tensor::{Tensor, activation};
+use common::activations::{activations, exact};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
 use reachcast::bench;
 use reachcast::config::Config;
 use reachcast::formula::{Graph, Node, record};
 use reachcast::model::{Interface, Model, Plant};
-use reachcast::policy::{Activation, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{StateList, Stream, Tightening, reach_avoid};
@@ -27,7 +28,7 @@ use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
 use reachcast::train::chosen::chosen_first;
 use reachcast::train::device::{Device, floats};
-use reachcast::train::layer::{Curve, layer};
+use reachcast::train::layer::layer;
 use reachcast::train::network::{Architecture, Network};
 use reachcast::train::physics::apply;
 use reachcast::train::purpose;
@@ -413,7 +414,7 @@ fn a_value_network_learns_the_measure() {
         seed: 5,
     };
     let inputs = system.states().iter().map(|axis| [axis.low, axis.high]).collect();
-    let (activation, output) = (Activation::Relu, OutputActivation::Identity);
+    let (activation, output) = (Activation::Relu, Activation::Identity);
     let shape = Architecture { inputs, hidden: vec![32; 2], outputs: 1, activation, output };
     let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
     let mut settings = settings(&config).value;
@@ -568,14 +569,7 @@ fn a_layer_is_burns_own_operations() {
         let values: Vec<f32> = lanes.iter().map(|lane| lane.0[0]).collect();
         Device::cpu().tensor(values, [rows, columns])
     };
-    let (hidden, last) = (Curve::Hidden, Curve::Last);
-    for curve in [
-        hidden(Activation::Relu),
-        hidden(Activation::Tanh),
-        hidden(Activation::Silu),
-        last(OutputActivation::Tanh),
-        last(OutputActivation::Identity),
-    ] {
+    for curve in [Activation::Relu, Activation::Tanh, Activation::Silu, Activation::Identity] {
         let run = |fused: bool| {
             let shapes = [[5, 4], [4, 3], [1, 3]];
             let [x, w, b] = std::array::from_fn(|i| drawn(i as u32, shapes[i]).require_grad());
@@ -584,9 +578,9 @@ fn a_layer_is_burns_own_operations() {
                 (false, curve) => {
                     let sums = x.clone().matmul(w.clone()) + b.clone();
                     match curve {
-                        Curve::Hidden(Activation::Relu) => activation::relu(sums),
-                        Curve::Hidden(Activation::Silu) => activation::silu(sums),
-                        Curve::Last(OutputActivation::Identity) => sums,
+                        Activation::Relu => activation::relu(sums),
+                        Activation::Silu => activation::silu(sums),
+                        Activation::Identity => sums,
                         _ => sums.tanh(),
                     }
                 }
@@ -602,6 +596,27 @@ fn a_layer_is_burns_own_operations() {
         for (found, expected) in run(true).into_iter().zip(run(false)) {
             let error = (found - expected).abs();
             assert!(error <= 3e-6 * (1.0 + expected.abs()), "{curve:?}: {found} {expected}");
+        }
+    }
+}
+
+/// Values and slopes of a layer with each activation, against definitions in f64 and their central differences.
+#[test]
+fn layers_of_every_activation_have_their_slopes() {
+    let sums: Vec<f32> = (-40..40).map(|i| 0.173 * i as f32 + 0.0117).collect();
+    for activation in activations() {
+        let one = |value: f32| Device::cpu().tensor(vec![value], [1, 1]);
+        let x = Device::cpu().tensor(sums.clone(), [sums.len(), 1]).require_grad();
+        let outputs = layer(x.clone(), one(1.0), one(0.0), activation);
+        let grads = outputs.clone().sum().backward();
+        let (values, slopes) = (floats(outputs), floats(x.grad(&grads).unwrap()));
+        for ((x, value), slope) in sums.iter().zip(values).zip(slopes) {
+            let at = |step: f64| exact(activation, f64::from(*x) + step);
+            let expected = (at(1e-6) - at(-1e-6)) / 2e-6;
+            let error = (f64::from(value) - at(0.0)).abs();
+            assert!(error < 3e-6, "{activation} at {x}: {value}");
+            let error = (f64::from(slope) - expected).abs();
+            assert!(error < 5e-6, "{activation} at {x}: {slope}, {expected}");
         }
     }
 }

@@ -12,18 +12,19 @@ use std::ops::Range;
 
 use burn_tensor::Tensor;
 use command::{Folder, document, refused};
+use common::activations::exact;
 use common::{adapter, cpu};
 use reachcast::backend::Backend;
 use reachcast::bench;
 use reachcast::model::{Model, Plant};
-use reachcast::policy::{Activation, OutputActivation};
+use reachcast::policy::Activation;
 use reachcast::race::DroneRace;
 use reachcast::rollout::Stream;
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::ddpg::{Ddpg, Game};
 use reachcast::train::device::{Device, floats};
-use reachcast::train::layer::{Curve, layer};
+use reachcast::train::layer::layer;
 use reachcast::train::network::{Architecture, Network};
 use reachcast::train::ppo::{self, Ppo};
 use reachcast::train::purpose;
@@ -38,13 +39,7 @@ use training::{config, intervals, losses, random, settings, task};
 const MOST: usize = 1 << 15;
 
 /// What follows the products of a layer.
-const CURVES: [Curve; 5] = [
-    Curve::Hidden(Activation::Relu),
-    Curve::Hidden(Activation::Tanh),
-    Curve::Hidden(Activation::Silu),
-    Curve::Last(OutputActivation::Tanh),
-    Curve::Last(OutputActivation::Identity),
-];
+const CURVES: [Activation; 16] = Activation::ALL;
 
 /// The CPU and an adapter; `None`, said aloud, where no adapter opens.
 fn devices() -> Option<[Device; 2]> {
@@ -85,7 +80,7 @@ impl Case {
     }
 
     /// Outputs, and slopes of their weighted sum by `x`, weights and biases.
-    fn run(&self, device: &Device, curve: Curve) -> [Vec<f32>; 4] {
+    fn run(&self, device: &Device, curve: Activation) -> [Vec<f32>; 4] {
         let leaf = |values: &Vec<f32>, shape| device.tensor(values.clone(), shape).require_grad();
         let x = leaf(&self.x, [self.rows, self.inputs]);
         let weight = leaf(&self.weight, [self.inputs, self.outputs]);
@@ -106,19 +101,9 @@ impl Case {
     }
 }
 
-/// The curve in f64, from its definition.
-fn curved(curve: Curve, x: f64) -> f64 {
-    match curve {
-        Curve::Last(OutputActivation::Identity) => x,
-        Curve::Hidden(Activation::Relu) => x.max(0.0),
-        Curve::Hidden(Activation::Tanh) | Curve::Last(OutputActivation::Tanh) => x.tanh(),
-        Curve::Hidden(Activation::Silu) => x / (1.0 + (-x).exp()),
-    }
-}
-
 /// Its slope as a central difference.
-fn slope(curve: Curve, x: f64) -> f64 {
-    (curved(curve, x + 1e-6) - curved(curve, x - 1e-6)) / 2e-6
+fn slope(curve: Activation, x: f64) -> f64 {
+    (exact(curve, x + 1e-6) - exact(curve, x - 1e-6)) / 2e-6
 }
 
 /// How far `found` lies from `expected`, of the length of what is expected.
@@ -171,7 +156,7 @@ fn large_products_are_whole() {
     let Some([host, remote]) = devices() else { return };
     for shape in [[2048, 512, 512], [4096, 12, 64], [1, 512, 512], [MOST, 3, 2], [2, MOST, 3]] {
         let case = Case::new(shape);
-        let curve = Curve::Last(OutputActivation::Identity);
+        let curve = Activation::Identity;
         for (found, expected) in case.run(&remote, curve).iter().zip(case.run(&host, curve)) {
             let error = apart(found, &expected);
             println!("{shape:?}: {error:.1e}");
@@ -272,7 +257,7 @@ fn a_value_is_updated_as_on_the_cpu() {
             device: device.clone(),
             seed: 5,
         };
-        let (activation, output) = (Activation::Relu, OutputActivation::Identity);
+        let (activation, output) = (Activation::Relu, Activation::Identity);
         let (inputs, hidden) = (intervals(&system), vec![32; 2]);
         let shape = Architecture { inputs, hidden, outputs: 1, activation, output };
         let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);

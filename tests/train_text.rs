@@ -138,7 +138,7 @@ fn slopes_through_what_stands_around_a_network_are_central_differences_in_f64() 
         hidden: vec![4],
         outputs: 2,
         activation: policy::Activation::Relu,
-        output: policy::OutputActivation::Tanh,
+        output: policy::Activation::Tanh,
     };
     let network = Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), 1.0);
     let starts = task.mixture.draw(9, purpose::START, 3, 20);

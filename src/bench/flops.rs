@@ -96,7 +96,7 @@ pub fn sample(planning: &Planning) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::policy::{Activation, Layer, OutputActivation};
+    use crate::policy::{Activation, Layer};
     use crate::race::system::DroneRace;
     use crate::system::{BangBang, DoubleIntegrator};
 
@@ -122,14 +122,11 @@ mod tests {
 
     #[test]
     fn a_network_counts_two_per_weight() {
-        let layer = |inputs: usize, outputs: usize| Layer {
-            weight: vec![0.5; inputs * outputs],
-            bias: vec![0.0; outputs],
-            inputs,
-            outputs,
+        let layer = |inputs: usize, outputs: usize| {
+            Layer::dense(vec![0.5; inputs * outputs], vec![0.0; outputs])
         };
         let layers = vec![layer(12, 64), layer(64, 64), layer(64, 64), layer(64, 3)];
-        let mlp = Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap();
+        let mlp = Mlp::new(layers, Activation::Relu, Activation::Tanh).unwrap();
         assert_eq!(network(&mlp), 2.0 * (768.0 + 4096.0 + 4096.0 + 192.0));
         let plant = &Plant::of(DroneRace::default(), mlp);
         assert_eq!(rollout(plant, 30.0), 30.0 * (18_304.0 + 40.0) + 31.0 * 40.0);

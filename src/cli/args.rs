@@ -10,7 +10,7 @@ use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
 use crate::config::Registry;
 use crate::files::Existing;
-use crate::policy::{Activation, OutputActivation};
+use crate::policy::Activation;
 use crate::studies::StudyCommand;
 use crate::train::settings::Method;
 
@@ -359,12 +359,12 @@ pub(super) struct ImportArguments {
     /// Prefix of the names of the network's layers; several, separated by commas, are joined
     #[arg(long, value_name = "PREFIX", value_delimiter = ',')]
     pub(super) network: Vec<String>,
-    /// Activation of the hidden layers of a checkpoint [default: relu]
-    #[arg(long, value_enum)]
+    /// Activation of the hidden layers of a checkpoint, `elu` or `leaky_relu(0.2)` [default: relu]
+    #[arg(long, value_name = "WORD")]
     pub(super) activation: Option<Activation>,
     /// Activation of its last layer [default: tanh; identity for a critic]
-    #[arg(long, value_enum)]
-    pub(super) output: Option<OutputActivation>,
+    #[arg(long, value_name = "WORD")]
+    pub(super) output: Option<Activation>,
     /// Names of the inputs, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "config")]
     pub(super) state_order: Option<Vec<String>>,

@@ -6,7 +6,7 @@ use super::options::Global;
 use super::output::plain;
 use crate::config::Config;
 use crate::model::{Law, Plant};
-use crate::policy::OutputActivation;
+use crate::policy::Activation;
 
 /// Says on standard error what is to be known of `plant`, which `config` describes.
 pub(super) fn say(global: &Global, config: &Config, plant: &Plant) {
@@ -33,7 +33,8 @@ pub(super) fn undisturbed(config: &Config) -> Option<String> {
 fn unscaled(plant: &Plant) -> Option<String> {
     let Law::Network { network, act: None, .. } = &plant.controller.law else { return None };
     let beyond = plant.model.controls.iter().find(|axis| axis.low < -1.0 || axis.high > 1.0)?;
-    (network.output() == OutputActivation::Tanh).then(|| {
+    let bounded = network.output() == Activation::Tanh && network.output_map().is_none();
+    bounded.then(|| {
         format!(
             "the network says numbers from -1 to 1, and `{}` goes from {} to {}: `act` below `[policy]` scales \
              them, `{} = \"{} + {} * out[0]\"` for one; without it the rest is never used",

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::call::Call;
 use super::node::Node;
 use super::recorder::{Expr, Graph, record};
-use crate::policy::Mlp;
+use crate::policy::{Mlp, Parts};
 
 /// Numbers that a network's inputs and outputs lie at multiples of: kernels take vectors of them.
 const ROOM: usize = 8;
@@ -72,6 +72,20 @@ impl Graph {
         self.outputs.iter().map(|i| values[*i as usize]).collect()
     }
 
+    /// The same graph with the maps at the ends of the networks that it calls as operations of its own.
+    fn unmapped(&self) -> Self {
+        record(self.inputs, |inputs| {
+            let mut values = Vec::with_capacity(self.nodes.len());
+            self.replay_with(inputs, &mut values, |network, arguments| {
+                let Parts { input, core, output } = network.parts();
+                let seen = input.map_or_else(|| arguments.to_vec(), |map| map.apply(arguments));
+                let said = super::Scalar::call(&core, &seen);
+                output.map_or_else(|| said.clone(), |map| map.apply(&said))
+            });
+            self.outputs.iter().map(|i| values[*i as usize]).collect()
+        })
+    }
+
     /// One graph with the outputs of all `graphs`, which have the same inputs.
     ///
     /// # Panics
@@ -85,6 +99,14 @@ impl Graph {
 impl Chain {
     /// `graph` in as few links as its networks allow.
     pub(crate) fn new(graph: &Graph) -> Self {
+        match graph.calls.iter().any(|call| call.network.is_mapped()) {
+            true => Self::of(&graph.unmapped()),
+            false => Self::of(graph),
+        }
+    }
+
+    /// The same of a graph whose networks have no maps.
+    fn of(graph: &Graph) -> Self {
         let levels = Levels::new(graph);
         let (rooms, [asked, said]) = rooms(graph, &levels);
         let mut computed = vec![Vec::new(); levels.last + 1];

@@ -1,9 +1,10 @@
 //! Who drives a model: a formula, or a network with what stands around it.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::formula::{Graph, record};
-use crate::policy::{Mlp, Policy};
+use crate::policy::{Mlp, Parts, Policy};
 use crate::system::System;
 use crate::tile::{CompiledPolicy, NativeFormula};
 
@@ -51,10 +52,10 @@ impl Controller {
     ///
     /// ```
     /// use reachcast::model::{Controller, Model};
-    /// use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+    /// use reachcast::policy::{Activation, Layer, Mlp};
     /// use reachcast::system::DoubleIntegrator;
-    /// let layer = Layer { weight: vec![-2.0], bias: vec![0.0], inputs: 1, outputs: 1 };
-    /// let network = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity)?;
+    /// let layer = Layer::dense(vec![-2.0], vec![0.0]);
+    /// let network = Mlp::new(vec![layer], Activation::Relu, Activation::Identity)?;
     /// let damper = network.with_state_order(vec!["velocity".to_owned()])?;
     /// let model = Model::of(DoubleIntegrator::default());
     /// let controller = Controller::network_of(&model, damper).map_err(|e| reachcast::Error::invalid("policy", e))?;
@@ -124,6 +125,36 @@ impl Controller {
             None => Law::Formula(recorded(system, |x, _| policy.control(x).to_vec())),
         };
         Self::new(policy.name(), law)
+    }
+
+    /// The same with the maps at the ends of its network among the formulas around it, as those run it that know layers
+    /// alone; the formulas are of the inputs of `model`.
+    pub(crate) fn unmapped(&self, model: &Model) -> Cow<'_, Self> {
+        let Law::Network { observe, network, act } = &self.law else { return Cow::Borrowed(self) };
+        if !network.is_mapped() {
+            return Cow::Borrowed(self);
+        }
+        let Parts { input, core, output } = network.parts();
+        let (inputs, states) = (model.inputs(), model.states.len());
+        let observe = match input {
+            None => observe.clone(),
+            Some(map) => Some(record(inputs, |x| match observe {
+                Some(observe) => map.apply(&observe.recorded_at(x)),
+                None => map.apply(&x[..states]),
+            })),
+        };
+        let act = match output {
+            None => act.clone(),
+            Some(map) => Some(record(inputs + map.scale.len(), |x| {
+                let (own, said) = x.split_at(inputs);
+                let said = map.apply(said);
+                match act {
+                    Some(act) => act.recorded_at(&[own, &said].concat()),
+                    None => said,
+                }
+            })),
+        };
+        Cow::Owned(Self::new(self.name.clone(), Law::Network { observe, network: core, act }))
     }
 
     /// The network, if there is one.

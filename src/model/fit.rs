@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::formula::record;
     use crate::model::{Controller, Model};
-    use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+    use crate::policy::{Activation, Layer, Mlp};
     use crate::system::{BangBang, DoubleIntegrator};
 
     fn refusal(model: Model, law: Law) -> String {
@@ -101,8 +101,8 @@ mod tests {
         of(refusal(step, Law::Formula(sums(inputs, 1))), ["model.step", &needed(0, 2)]);
         let target = Model { target: sums(inputs, 2), ..model.clone() };
         of(refusal(target, Law::Formula(sums(inputs, 1))), ["model.target", "gives 2 numbers"]);
-        let layer = Layer { weight: vec![1.0; 4], bias: vec![0.0; 2], inputs: 2, outputs: 2 };
-        let network = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity);
+        let layer = Layer::dense(vec![1.0; 4], vec![0.0; 2]);
+        let network = Mlp::new(vec![layer], Activation::Relu, Activation::Identity);
         let network = Arc::new(network.expect("a network"));
         let around = |observe, act| Law::Network { observe, network: Arc::clone(&network), act };
         let act = Some(sums(inputs, 1));

@@ -1,7 +1,13 @@
 //! The safetensors file of a network.
 //!
-//! f32 tensors `layers.{i}.weight` `[out, in]` and `layers.{i}.bias` `[out]`; metadata `activation`
-//! (relu, tanh, silu), `output` (tanh, identity) and `state_order` (names separated by commas).
+//! f32 tensors: `layers.{i}.weight` `[out, in]` and `layers.{i}.bias` `[out]` of each layer; `layers.{i}.norm.weight`
+//! and `layers.{i}.norm.bias` `[out]` of one with a LayerNorm; `input.scale`, `input.shift`, `input.low` and
+//! `input.high` `[in]` of a map of the inputs, `output.scale` and so on `[out]` of one of the outputs.
+//!
+//! Metadata: `activation` of the hidden layers and `output`, that of the last layer; where the hidden layers differ,
+//! `activations` in their place, a word for each layer with spaces between; `layers.{i}.norm.epsilon`, a number;
+//! `state_order`, names separated by commas. `format`, by which other programs say who wrote a file, is passed over.
+//! Any other tensor or entry is refused: a network that left it out would be another one.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,9 +16,14 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 
-use super::{Activation, Layer, Mlp, OutputActivation};
+use super::{Activation, Layer, Mlp, Norm, Rescale};
 use crate::error::{Error, Result};
 use crate::files::{RECORD_BYTES, read};
+
+/// The entries of the metadata that are not of one layer.
+const ENTRIES: [&str; 5] = ["activation", "output", "activations", "state_order", "format"];
+/// The tensors of a map.
+const MAP: [&str; 4] = ["scale", "shift", "low", "high"];
 
 impl Mlp {
     /// Reads a safetensors file.
@@ -40,122 +51,285 @@ impl Mlp {
         let tensors = SafeTensors::deserialize(bytes).map_err(damaged)?;
         let empty = HashMap::new();
         let metadata = header.metadata().as_ref().unwrap_or(&empty);
-        let activation = match word(metadata, "activation", "relu, tanh or silu")? {
-            "relu" => Activation::Relu,
-            "tanh" => Activation::Tanh,
-            "silu" => Activation::Silu,
-            other => return Err(format!("activation `{other}` is none of relu, tanh, silu")),
-        };
-        let output = match word(metadata, "output", "tanh or identity")? {
-            "tanh" => OutputActivation::Tanh,
-            "identity" => OutputActivation::Identity,
-            other => return Err(format!("output `{other}` is neither tanh nor identity")),
-        };
-        let state_order = metadata
-            .get("state_order")
-            .map(|names| names.split(',').map(|name| name.trim().to_owned()).collect());
-        let mut layers = Vec::new();
-        while tensors.tensor(&format!("layers.{}.weight", layers.len())).is_ok() {
-            layers.push(read_layer(&tensors, layers.len())?);
+        let mut count = 0;
+        while tensors.tensor(&weight_of(count)).is_ok() {
+            count += 1;
         }
-        refuse_others(&tensors, layers.len())?;
-        let mlp = Self { layers: layers.into(), activation, output, state_order: None };
-        mlp.validate()?;
-        match state_order {
-            None => Ok(mlp),
-            Some(names) => mlp.with_state_order(names).map_err(|error| match error {
-                Error::Invalid { problem, .. } => format!("metadata `state_order` {problem}"),
-                other => other.to_string(),
-            }),
-        }
+        let file = File { tensors, metadata };
+        file.refuse_tensors(count)?;
+        file.refuse_entries(count)?;
+        file.network(count)
     }
 
     /// The bytes of its safetensors file, the same for the same network.
     pub fn to_bytes(&self) -> Vec<u8> {
-        // The library writes the metadata in an order that changes from one run to the next.
-        let mut metadata = Map::new();
-        metadata.insert("activation".to_owned(), self.activation.name().into());
-        metadata.insert("output".to_owned(), self.output.name().into());
-        if let Some(names) = &self.state_order {
-            metadata.insert("state_order".to_owned(), names.join(",").into());
-        }
-        let mut header = Map::from_iter([("__metadata__".to_owned(), metadata.into())]);
+        let mut header = Map::from_iter([("__metadata__".to_owned(), self.entries().into())]);
         let mut numbers = Vec::new();
-        for (i, layer) in self.layers.iter().enumerate() {
-            let Layer { weight, bias, inputs, outputs } = layer;
-            let mut add = |kind: &str, shape: Value, values: &[f32]| {
-                let begin = numbers.len();
-                numbers.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-                let offsets = [begin, numbers.len()];
-                let entry = json!({"dtype": "F32", "shape": shape, "data_offsets": offsets});
-                header.insert(format!("layers.{i}.{kind}"), entry);
-            };
-            add("weight", json!([outputs, inputs]), weight);
-            add("bias", json!([outputs]), bias);
+        for (name, shape, values) in self.tensors() {
+            let begin = numbers.len();
+            numbers.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            let offsets = [begin, numbers.len()];
+            let entry = json!({"dtype": "F32", "shape": shape, "data_offsets": offsets});
+            header.insert(name, entry);
         }
         let mut header = Value::Object(header).to_string().into_bytes();
         header.resize(header.len().next_multiple_of(8), b' ');
         [&(header.len() as u64).to_le_bytes(), header.as_slice(), &numbers].concat()
     }
-}
 
-/// The metadata entry `key`; the error names what it may be.
-fn word<'a>(
-    metadata: &'a HashMap<String, String>,
-    key: &str,
-    choices: &str,
-) -> std::result::Result<&'a str, String> {
-    metadata
-        .get(key)
-        .map(String::as_str)
-        .ok_or_else(|| format!("metadata has no `{key}`, expected {choices}"))
-}
-
-/// Refuses tensors that are no part of the first `count` layers: a network that left them out would
-/// be another one.
-fn refuse_others(tensors: &SafeTensors<'_>, count: usize) -> std::result::Result<(), String> {
-    let known = |name: &str| {
-        (0..count)
-            .any(|i| ["weight", "bias"].iter().any(|kind| name == format!("layers.{i}.{kind}")))
-    };
-    let mut others = tensors.names();
-    others.retain(|name| !known(name));
-    others.sort_unstable();
-    let Some(first) = others.first() else { return Ok(()) };
-    let beyond = others.iter().any(|name| name.starts_with("layers."));
-    let problem = match (beyond, others.len()) {
-        (true, _) => {
-            format!("there is no `layers.{count}.weight`: the layers have a gap before it")
+    /// The metadata of its file, in an order that does not change: the library's does from one run to the next.
+    fn entries(&self) -> Map<String, Value> {
+        let mut entries = Map::new();
+        match self.activation() {
+            Some(hidden) => {
+                entries.insert("activation".to_owned(), hidden.name().into());
+                entries.insert("output".to_owned(), self.output().name().into());
+            }
+            None => {
+                let words: Vec<String> =
+                    self.layers().iter().map(|layer| layer.activation.name()).collect();
+                entries.insert("activations".to_owned(), words.join(" ").into());
+            }
         }
-        (false, 1) => "it is no layer, and the network would be used without it".to_owned(),
-        (false, more) => format!(
-            "it is no layer, nor are {} more tensors, and the network would be used without them",
-            more - 1
-        ),
-    };
-    Err(format!(
-        "tensor `{first}`: {problem}; a policy file has layers.{{i}}.weight and layers.{{i}}.bias \
-         alone, i = 0, 1, ..."
-    ))
+        for (i, layer) in self.layers().iter().enumerate() {
+            if let Some(norm) = &layer.norm {
+                entries.insert(epsilon_of(i), format!("{:?}", norm.epsilon).into());
+            }
+        }
+        if let Some(names) = self.state_order() {
+            entries.insert("state_order".to_owned(), names.join(",").into());
+        }
+        entries
+    }
+
+    /// Its tensors: name, shape and numbers.
+    fn tensors(&self) -> impl Iterator<Item = (String, Vec<usize>, &[f32])> {
+        let layers = self.layers().iter().enumerate().flat_map(|(i, layer)| {
+            let name = move |kind: &str| format!("layers.{i}.{kind}");
+            let own = [
+                (name("weight"), vec![layer.outputs, layer.inputs], layer.weight.as_slice()),
+                (name("bias"), vec![layer.outputs], layer.bias.as_slice()),
+            ];
+            let norm = layer.norm.iter().flat_map(move |norm| {
+                let of = [("norm.weight", &norm.scale), ("norm.bias", &norm.shift)];
+                of.map(|(kind, values)| (name(kind), vec![values.len()], values.as_slice()))
+            });
+            own.into_iter().chain(norm)
+        });
+        let ends = [("input", self.input_map()), ("output", self.output_map())];
+        let maps = ends.into_iter().filter_map(|(end, map)| Some((end, map?)));
+        layers.chain(maps.flat_map(|(end, map)| {
+            let name = move |kind| format!("{end}.{kind}");
+            map.tensors().map(|(kind, values)| (name(kind), vec![values.len()], values.as_slice()))
+        }))
+    }
 }
 
-/// Layer `i` of the file.
-fn read_layer(tensors: &SafeTensors<'_>, i: usize) -> std::result::Result<Layer, String> {
-    let named = |kind: &str| {
-        let name = format!("layers.{i}.{kind}");
-        let tensor = tensors.tensor(&name).map_err(|_| format!("no tensor `{name}`"))?;
-        let values = floats(&name, &tensor)?;
-        Ok::<_, String>((values, tensor.shape().to_vec()))
+fn weight_of(layer: usize) -> String {
+    format!("layers.{layer}.weight")
+}
+
+fn epsilon_of(layer: usize) -> String {
+    format!("layers.{layer}.norm.epsilon")
+}
+
+/// Whether `name` is a tensor of one of the first `count` layers or of a map.
+fn is_known(name: &str, count: usize) -> bool {
+    let of_layer = |i: usize| {
+        let kinds = ["weight", "bias", "norm.weight", "norm.bias"];
+        i < count && kinds.iter().any(|kind| *name == format!("layers.{i}.{kind}"))
     };
-    let (weight, shape) = named("weight")?;
-    let &[outputs, inputs] = shape.as_slice() else {
-        return Err(format!("layers.{i}.weight has shape {shape:?}, expected [out, in]"));
-    };
-    let (bias, shape) = named("bias")?;
-    if shape != [outputs] {
-        return Err(format!("layers.{i}.bias has shape {shape:?}, expected [{outputs}]"));
+    let of_map = |(end, kind)| ["input", "output"].contains(&end) && MAP.contains(&kind);
+    number_of(name).is_some_and(of_layer) || name.split_once('.').is_some_and(of_map)
+}
+
+/// A file whose tensors and metadata are named.
+struct File<'a> {
+    tensors: SafeTensors<'a>,
+    metadata: &'a HashMap<String, String>,
+}
+
+impl File<'_> {
+    /// The network of `count` layers.
+    fn network(&self, count: usize) -> std::result::Result<Mlp, String> {
+        let [hidden, words] = self.activations(count)?;
+        let layers = words.into_iter().enumerate().map(|(i, activation)| self.layer(i, activation));
+        let layers = layers.collect::<std::result::Result<Vec<_>, _>>()?;
+        let mlp = match hidden.first() {
+            Some(hidden) => {
+                let last = layers.last().map_or(Activation::Identity, |layer| layer.activation);
+                Mlp::new(layers, *hidden, last)
+            }
+            None => Mlp::from_layers(layers),
+        };
+        let mut mlp = mlp.map_err(in_words)?;
+        if let Some(map) = self.map("input")? {
+            mlp = mlp.with_input(map).map_err(in_words)?;
+        }
+        if let Some(map) = self.map("output")? {
+            mlp = mlp.with_output(map).map_err(in_words)?;
+        }
+        let Some(names) = self.metadata.get("state_order") else { return Ok(mlp) };
+        let names = names.split(',').map(|name| name.trim().to_owned()).collect();
+        mlp.with_state_order(names)
+            .map_err(|error| format!("metadata `state_order` {}", in_words(error)))
     }
-    Ok(Layer { weight, bias, inputs, outputs })
+
+    /// The activation that hidden layers share, if the file says that they do, and that of each layer.
+    fn activations(&self, count: usize) -> std::result::Result<[Vec<Activation>; 2], String> {
+        let Some(list) = self.metadata.get("activations") else {
+            let hidden = self.word("activation")?;
+            let last = self.word("output")?;
+            let words = (0..count).map(|i| if i + 1 == count { last } else { hidden });
+            return Ok([vec![hidden], words.collect()]);
+        };
+        if let Some(other) =
+            ["activation", "output"].iter().find(|key| self.metadata.contains_key(**key))
+        {
+            return Err(format!(
+                "metadata has both `activations` and `{other}`: a word for each layer, or the two of all"
+            ));
+        }
+        let words: Vec<Activation> = list
+            .split_whitespace()
+            .map(str::parse)
+            .collect::<std::result::Result<_, String>>()
+            .map_err(|problem| {
+                format!(
+                    "activations `{list}`: {problem}; a word for each layer, with spaces between"
+                )
+            })?;
+        if words.len() != count {
+            return Err(format!(
+                "activations `{list}` are {}, the file has {count} layers",
+                words.len()
+            ));
+        }
+        Ok([Vec::new(), words])
+    }
+
+    /// The activation in the metadata entry `key`.
+    fn word(&self, key: &str) -> std::result::Result<Activation, String> {
+        let word = self.metadata.get(key);
+        let missing =
+            || format!("metadata has no `{key}`, expected one of {}", Activation::words());
+        word.ok_or_else(missing)?.parse().map_err(|problem| format!("{key} {problem}"))
+    }
+
+    /// Layer `i`.
+    fn layer(&self, i: usize, activation: Activation) -> std::result::Result<Layer, String> {
+        let name = weight_of(i);
+        let (weight, shape) = self.numbers(&name)?;
+        let &[outputs, inputs] = shape.as_slice() else {
+            return Err(format!("{name} has shape {shape:?}, expected [out, in]"));
+        };
+        let bias = self.vector(&format!("layers.{i}.bias"), outputs)?;
+        let norm = self.norm(i, outputs)?;
+        Ok(Layer { weight, bias, inputs, outputs, norm, activation })
+    }
+
+    /// The norm of layer `i`: both tensors and the entry, or none of them.
+    fn norm(&self, i: usize, outputs: usize) -> std::result::Result<Option<Norm>, String> {
+        let key = epsilon_of(i);
+        let names = ["weight", "bias"].map(|kind| format!("layers.{i}.norm.{kind}"));
+        let has = names.iter().any(|name| self.tensors.tensor(name).is_ok());
+        if !has && !self.metadata.contains_key(&key) {
+            return Ok(None);
+        }
+        let [scale, shift] = &names;
+        let (scale, shift) = (self.vector(scale, outputs)?, self.vector(shift, outputs)?);
+        let epsilon = self.metadata.get(&key).ok_or_else(|| format!("metadata has no `{key}`"))?;
+        let epsilon =
+            epsilon.trim().parse().map_err(|_| format!("{key} `{epsilon}` is no number"))?;
+        Ok(Some(Norm { scale, shift, epsilon }))
+    }
+
+    /// The map at `end`: all four tensors, or none.
+    fn map(&self, end: &str) -> std::result::Result<Option<Rescale>, String> {
+        let name = |kind: &str| format!("{end}.{kind}");
+        if !MAP.iter().any(|kind| self.tensors.tensor(&name(kind)).is_ok()) {
+            return Ok(None);
+        }
+        let (scale, shape) = self.numbers(&name("scale"))?;
+        let &[count] = shape.as_slice() else {
+            return Err(format!(
+                "{end}.scale has shape {shape:?}, expected a number for each {end}"
+            ));
+        };
+        let vector = |kind: &str| self.vector(&name(kind), count);
+        Ok(Some(Rescale {
+            scale,
+            shift: vector("shift")?,
+            low: vector("low")?,
+            high: vector("high")?,
+        }))
+    }
+
+    /// A tensor of `count` numbers.
+    fn vector(&self, name: &str, count: usize) -> std::result::Result<Vec<f32>, String> {
+        let (values, shape) = self.numbers(name)?;
+        match shape == [count] {
+            true => Ok(values),
+            false => Err(format!("{name} has shape {shape:?}, expected [{count}]")),
+        }
+    }
+
+    /// A tensor's numbers and its shape.
+    fn numbers(&self, name: &str) -> std::result::Result<(Vec<f32>, Vec<usize>), String> {
+        let tensor = self.tensors.tensor(name).map_err(|_| format!("no tensor `{name}`"))?;
+        Ok((floats(name, &tensor)?, tensor.shape().to_vec()))
+    }
+
+    /// Refuses tensors that are no part of the first `count` layers or of a map.
+    fn refuse_tensors(&self, count: usize) -> std::result::Result<(), String> {
+        let mut others = self.tensors.names();
+        others.retain(|name| !is_known(name, count));
+        others.sort_unstable();
+        let Some(first) = others.first() else { return Ok(()) };
+        let beyond =
+            others.iter().any(|name| number_of(name).is_some_and(|number| number >= count));
+        let problem = match (beyond, others.len()) {
+            (true, _) => {
+                format!("there is no `{}`: the layers have a gap before it", weight_of(count))
+            }
+            (false, 1) => "it is no part of a network, which would be used without it".to_owned(),
+            (false, more) => format!(
+                "it is no part of a network, nor are {} more tensors, and it would be used without them",
+                more - 1
+            ),
+        };
+        Err(format!(
+            "tensor `{first}`: {problem}; a policy file has layers.{{i}}.weight and layers.{{i}}.bias, i = 0, 1, ..., \
+             layers.{{i}}.norm.weight and .bias, and scale, shift, low and high of input and output"
+        ))
+    }
+
+    /// Refuses metadata that says nothing of the first `count` layers: it may have been meant to.
+    fn refuse_entries(&self, count: usize) -> std::result::Result<(), String> {
+        let of_layer =
+            |key: &str| number_of(key).is_some_and(|i| i < count && *key == epsilon_of(i));
+        let known = |key: &str| ENTRIES.contains(&key) || of_layer(key);
+        match self.metadata.keys().filter(|key| !known(key.as_str())).min() {
+            None => Ok(()),
+            Some(key) => Err(format!(
+                "metadata `{key}` is none of {} and layers.{{i}}.norm.epsilon; the network would be used without it",
+                ENTRIES.join(", ")
+            )),
+        }
+    }
+}
+
+/// The number of the layer that a tensor belongs to.
+fn number_of(name: &str) -> Option<usize> {
+    name.strip_prefix("layers.")?.split('.').next()?.parse().ok()
+}
+
+/// What is wrong with a network, without the words around it.
+fn in_words(error: Error) -> String {
+    match error {
+        Error::Invalid { problem, .. } => problem,
+        other => other.to_string(),
+    }
 }
 
 /// The tensor's numbers.
@@ -166,3 +340,6 @@ fn floats(name: &str, tensor: &TensorView<'_>) -> std::result::Result<Vec<f32>, 
     let float = |bytes: &[u8]| bytes.try_into().map(f32::from_le_bytes).unwrap_or(f32::NAN);
     Ok(tensor.data().chunks_exact(4).map(float).collect())
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,37 +3,32 @@
 use serde::Serialize;
 
 use super::spectral::norm_bound;
-use super::{Activation, Layer, Mlp, OutputActivation};
+use super::{Layer, Mlp, Norm, Rescale, normaliser_range};
 use crate::error::{Error, Result};
 use crate::real::Lanes;
-use crate::real::bound::{Interval, tanh};
-
-/// Largest slope of `x / (1 + exp(-x))`, 1.099839..., rounded up.
-const SILU_SLOPE: f64 = 1.09984;
-/// Around the place of its least value, -1.278464...
-const SILU_VALLEY: Interval = Interval::new(-1.2785, -1.2784);
-/// That value, -0.27846454..., rounded down.
-const SILU_LEAST: f64 = -0.2784646;
+use crate::real::bound::Interval;
 
 /// A network in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
     /// Input width, then the output width of each layer.
     pub widths: Vec<usize>,
-    /// Activation of the hidden layers.
-    pub activation: &'static str,
+    /// Activation of the hidden layers; where they differ, of each.
+    pub activation: String,
     /// Activation of the last layer.
-    pub output: &'static str,
+    pub output: String,
+    /// Whether the inputs go through a map before the first layer, and the outputs through one behind the last.
+    pub maps: [bool; 2],
     /// Names of the inputs, where the file has them.
     pub state_order: Option<Vec<String>>,
-    /// Number of weights and biases.
+    /// Number of weights and biases, those of norms among them.
     pub parameter_count: usize,
     /// SHA-256 over widths, activations and parameters.
     pub digest: String,
     /// The layers, input side first.
     pub layers: Vec<LayerInspection>,
     /// Upper bound of the Lipschitz constant in the Euclidean norm, over all inputs: the product
-    /// of the layers' spectral norms and the slopes of the activations.
+    /// of the layers' spectral norms and the slopes of norms, activations and maps.
     #[serde(with = "crate::files::number")]
     pub lipschitz_bound: f64,
 }
@@ -51,6 +46,10 @@ pub struct LayerInspection {
     /// Least and largest bias.
     #[serde(with = "crate::files::number")]
     pub bias_range: [f32; 2],
+    /// Whether a LayerNorm follows its sums.
+    pub norm: bool,
+    /// Activation behind that.
+    pub activation: String,
     /// Upper bound of the spectral norm of the weight, at most 1.0001 times the norm.
     #[serde(with = "crate::files::number")]
     pub spectral_norm: f64,
@@ -60,17 +59,12 @@ impl Inspection {
     /// The numbers of `network`.
     pub fn of(network: &Mlp) -> Self {
         let layers: Vec<LayerInspection> = network.layers().iter().map(layer).collect();
-        // All activations but SiLU, that of the last layer too, have slopes of at most 1.
-        let slope = match network.activation() {
-            Activation::Silu => SILU_SLOPE,
-            Activation::Relu | Activation::Tanh => 1.0,
-        };
-        let hidden = std::iter::repeat_n(slope, layers.len() - 1);
-        let factors = layers.iter().map(|layer| layer.spectral_norm).chain(hidden);
+        let factors = layers.iter().map(|layer| layer.spectral_norm).chain(slopes(network));
         Self {
             widths: network.widths(),
-            activation: network.activation().name(),
+            activation: network.hidden_words(),
             output: network.output().name(),
+            maps: [network.input_map().is_some(), network.output_map().is_some()],
             state_order: network.state_order().map(<[String]>::to_vec),
             parameter_count: network.parameter_count(),
             digest: network.digest(),
@@ -80,15 +74,32 @@ impl Inspection {
     }
 }
 
+/// The largest slopes of all that is not a weight: those of hidden activations, and others but for 1.
+fn slopes(network: &Mlp) -> impl Iterator<Item = f64> {
+    let last = network.layers().len() - 1;
+    let activations = network.layers().iter().enumerate();
+    let activations = activations.map(move |(i, layer)| (i < last, layer.activation.slope()));
+    let norms = network.layers().iter().filter_map(|layer| layer.norm.as_ref()).map(Norm::slope);
+    let maps =
+        [network.input_map(), network.output_map()].into_iter().flatten().map(Rescale::slope);
+    let others = norms.chain(maps).map(|slope| (true, slope));
+    activations
+        .chain(others)
+        .filter(|(counts, slope)| *counts || *slope != 1.0)
+        .map(|(_, slope)| slope)
+}
+
 /// The numbers of a layer.
 fn layer(layer: &Layer) -> LayerInspection {
-    let Layer { weight, bias, inputs, outputs } = layer;
+    let Layer { weight, bias, inputs, outputs, norm, activation } = layer;
     let (inputs, outputs) = (*inputs, *outputs);
     LayerInspection {
         inputs,
         outputs,
         weight_range: range(weight),
         bias_range: range(bias),
+        norm: norm.is_some(),
+        activation: activation.name(),
         spectral_norm: norm_bound(weight, [outputs, inputs]),
     }
 }
@@ -110,47 +121,51 @@ pub fn output_intervals(network: &Mlp, inputs: &[Interval]) -> Result<Vec<Interv
         let problem = format!("{has} intervals for the {width} inputs of the network");
         return Err(Error::invalid("inputs", problem));
     }
-    let last = network.layers().len() - 1;
-    let layers = network.layers().iter().enumerate();
-    Ok(layers.fold(inputs.to_vec(), |x, (i, layer)| {
-        let rows = layer.weight.chunks_exact(layer.inputs).zip(&layer.bias);
-        let sum = |(row, &bias): (&[f32], &f32)| {
-            let products = row.iter().zip(&x).map(|(&w, &x)| Interval::point(w.into()) * x);
-            products.fold(Interval::point(bias.into()), |sum, product| sum + product)
-        };
-        let sums = rows.map(sum);
-        match (i == last, network.output()) {
-            (false, _) => sums.map(|sum| activated(network.activation(), sum)).collect(),
-            (true, OutputActivation::Tanh) => sums.map(tanh).collect(),
-            (true, OutputActivation::Identity) => sums.collect(),
-        }
-    }))
+    let seen = network.input_map().map_or_else(|| inputs.to_vec(), |map| mapped(map, inputs));
+    let said = network.layers().iter().fold(seen, |x, layer| layer_intervals(layer, &x));
+    Ok(network.output_map().map_or_else(|| said.clone(), |map| mapped(map, &said)))
 }
 
-/// The range of an activation.
-fn activated(activation: Activation, x: Interval) -> Interval {
-    match activation {
-        Activation::Relu => Interval::new(x.low.max(0.0), x.high.max(0.0)),
-        Activation::Tanh => tanh(x),
-        Activation::Silu => {
-            let ends = silu(x.low).hull(silu(x.high));
-            let valley = x.low <= SILU_VALLEY.high && x.high >= SILU_VALLEY.low;
-            // It falls up to the valley and rises from there on.
-            Interval::new(if valley { SILU_LEAST } else { ends.low }, ends.high)
-        }
-    }
+/// The range of each output of a layer.
+fn layer_intervals(layer: &Layer, x: &[Interval]) -> Vec<Interval> {
+    let rows = layer.weight.chunks_exact(layer.inputs).zip(&layer.bias);
+    let sum = |(row, &bias): (&[f32], &f32)| {
+        let products = row.iter().zip(x).map(|(&w, &x)| Interval::point(w.into()) * x);
+        products.fold(Interval::point(bias.into()), |sum, product| sum + product)
+    };
+    let sums: Vec<Interval> = rows.map(sum).collect();
+    let normed = layer.norm.as_ref().map_or_else(|| sums.clone(), |norm| normed(norm, &sums));
+    normed.into_iter().map(|x| layer.activation.range(x).0).collect()
 }
 
-/// SiLU at `x`, as `x (1 + tanh(x / 2)) / 2`; an infinite `x` is the limit.
-fn silu(x: f64) -> Interval {
-    match x {
-        f64::NEG_INFINITY => Interval::ZERO,
-        f64::INFINITY => Interval::new(0.0, x),
-        _ => {
-            let half = Interval::point(0.5) * Interval::point(x);
-            half + half * tanh(half)
-        }
-    }
+/// The range of each output of a norm.
+fn normed(norm: &Norm, sums: &[Interval]) -> Vec<Interval> {
+    let share = Interval::point(sums.len() as f64).reciprocal();
+    let total =
+        |all: &mut dyn Iterator<Item = Interval>| all.fold(Interval::ZERO, |sum, x| sum + x);
+    let mean = total(&mut sums.iter().copied()) * share;
+    let apart: Vec<Interval> = sums.iter().map(|&sum| sum - mean).collect();
+    let variance = total(&mut apart.iter().map(|gap| gap.square())) * share;
+    let (factor, _) = normaliser_range(variance, norm.epsilon);
+    // No number is farther from the mean than the root of one less than their count, in deviations.
+    let most = Interval::point(sums.len() as f64 - 1.0).sqrt().high;
+    let each = apart.iter().zip(norm.scale.iter().zip(&norm.shift));
+    each.map(|(&gap, (&scale, &shift))| {
+        let product = gap * factor;
+        let held = Interval::new(product.low.clamp(-most, most), product.high.clamp(-most, most));
+        held * Interval::point(scale.into()) + Interval::point(shift.into())
+    })
+    .collect()
+}
+
+/// The range of each number behind a map.
+fn mapped(map: &Rescale, x: &[Interval]) -> Vec<Interval> {
+    let each = x.iter().enumerate().map(|(i, &x)| {
+        let moved = Interval::point(map.scale[i].into()) * x + Interval::point(map.shift[i].into());
+        let (low, high) = (f64::from(map.low[i]), f64::from(map.high[i]));
+        Interval::new(moved.low.clamp(low, high), moved.high.clamp(low, high))
+    });
+    each.collect()
 }
 
 /// Least and largest value of each output over batches of inputs.

@@ -2,112 +2,76 @@
 
 use std::sync::Arc;
 
+use super::{Activation, Layer, Rescale};
 use crate::digest;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Activation of the hidden layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Activation {
-    /// `max(0, x)`.
-    Relu,
-    /// Hyperbolic tangent.
-    Tanh,
-    /// `x / (1 + exp(-x))`.
-    Silu,
-}
-
-impl Activation {
-    /// The name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Relu => "relu",
-            Self::Tanh => "tanh",
-            Self::Silu => "silu",
-        }
-    }
-
-    /// The activation at `x`; NaN stays NaN.
-    #[inline(always)]
-    pub fn apply<R: Real>(self, x: R) -> R {
-        let half = R::lit(0.5);
-        match self {
-            Self::Relu => x.if_lt(R::lit(0.0), R::lit(0.0), x),
-            Self::Tanh => x.tanh(),
-            // The logistic function is (1 + tanh(x / 2)) / 2.
-            Self::Silu => {
-                let scaled = half * x;
-                scaled + scaled * scaled.tanh()
-            }
-        }
-    }
-}
-
-/// Activation of the last layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OutputActivation {
-    /// Hyperbolic tangent: controls in `[-1, 1]`.
-    Tanh,
-    /// None.
-    Identity,
-}
-
-impl OutputActivation {
-    /// The name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tanh => "tanh",
-            Self::Identity => "identity",
-        }
-    }
-
-    /// The activation at `x`.
-    #[inline(always)]
-    pub fn apply<R: Real>(self, x: R) -> R {
-        match self {
-            Self::Tanh => x.tanh(),
-            Self::Identity => x,
-        }
-    }
-}
-
-/// One dense layer, `y = W x + b`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Layer {
-    /// `W`, `[outputs, inputs]` row by row.
-    pub weight: Vec<f32>,
-    /// `b`, `[outputs]`.
-    pub bias: Vec<f32>,
-    /// Columns of `W`.
-    pub inputs: usize,
-    /// Rows of `W`.
-    pub outputs: usize,
-}
-
-/// A dense network.
+/// A dense network, and the maps at its ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mlp {
     /// Shared by copies of the network.
-    pub(super) layers: Arc<[Layer]>,
-    pub(super) activation: Activation,
-    pub(super) output: OutputActivation,
-    pub(super) state_order: Option<Vec<String>>,
+    layers: Arc<[Layer]>,
+    /// What a file without hidden layers says of them; else that of the first one.
+    hidden: Activation,
+    /// What its inputs go through.
+    input: Option<Arc<Rescale>>,
+    /// What its outputs go through.
+    output: Option<Arc<Rescale>>,
+    state_order: Option<Vec<String>>,
 }
 
 impl Mlp {
-    /// A network from its layers.
+    /// A network from its layers, `hidden` behind each but the last, and `last` behind that.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there is no layer, a shape does not fit its neighbour, or a weight
-    /// is not finite.
-    pub fn new(
-        layers: Vec<Layer>,
-        activation: Activation,
-        output: OutputActivation,
-    ) -> Result<Self> {
-        let mlp = Self { layers: layers.into(), activation, output, state_order: None };
-        mlp.validate().map_err(|problem| Error::invalid("network", problem))?;
-        Ok(mlp)
+    /// As those of [`Mlp::from_layers`].
+    pub fn new(mut layers: Vec<Layer>, hidden: Activation, last: Activation) -> Result<Self> {
+        let count = layers.len();
+        for (i, layer) in layers.iter_mut().enumerate() {
+            layer.activation = if i + 1 == count { last } else { hidden };
+        }
+        Self { hidden, ..Self::bare(layers) }.checked()
+    }
+
+    /// A network from its layers, each with an activation of its own.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there is no layer, a shape does not fit its neighbour, a parameter of an activation has
+    /// no sense, or a number is not finite.
+    pub fn from_layers(layers: Vec<Layer>) -> Result<Self> {
+        Self::bare(layers).checked()
+    }
+
+    /// The network of these layers, unchecked.
+    fn bare(layers: Vec<Layer>) -> Self {
+        let hidden = match layers.as_slice() {
+            [first, _, ..] => first.activation,
+            _ => Activation::Relu,
+        };
+        Self { layers: layers.into(), hidden, input: None, output: None, state_order: None }
+    }
+
+    fn checked(self) -> Result<Self> {
+        self.validate().map_err(|problem| Error::invalid("network", problem))?;
+        Ok(self)
+    }
+
+    /// The same network behind a map of its inputs.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the map has another size, a number that is not finite, or a limit that is not below the
+    /// other.
+    pub fn with_input(self, map: Rescale) -> Result<Self> {
+        Self { input: Some(Arc::new(map)), ..self }.checked()
+    }
+
+    /// The same network before a map of its outputs.
+    ///
+    /// # Errors
+    /// As those of [`Mlp::with_input`].
+    pub fn with_output(self, map: Rescale) -> Result<Self> {
+        Self { output: Some(Arc::new(map)), ..self }.checked()
     }
 
     /// The same network with the names of its inputs.
@@ -135,18 +99,53 @@ impl Mlp {
 
     /// Whether `other` is this network or a copy of it, told without a look at its numbers.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
-        let shape = (self.activation, self.output) == (other.activation, other.output);
-        shape && Arc::ptr_eq(&self.layers, &other.layers)
+        let same = |one: &Option<Arc<Rescale>>, other: &Option<Arc<Rescale>>| match (one, other) {
+            (None, None) => true,
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+            _ => false,
+        };
+        let maps = same(&self.input, &other.input) && same(&self.output, &other.output);
+        maps && Arc::ptr_eq(&self.layers, &other.layers)
     }
 
-    /// Activation of the hidden layers.
-    pub fn activation(&self) -> Activation {
-        self.activation
+    /// Activation of the hidden layers; none where they differ.
+    pub fn activation(&self) -> Option<Activation> {
+        let hidden = &self.layers[..self.layers.len() - 1];
+        hidden.iter().all(|layer| layer.activation == self.hidden).then_some(self.hidden)
+    }
+
+    /// The activation of the hidden layers in words; where they differ, of each of them.
+    pub fn hidden_words(&self) -> String {
+        let hidden = self.layers[..self.layers.len() - 1].iter();
+        let each = || hidden.map(|layer| layer.activation.name()).collect::<Vec<_>>().join(", ");
+        self.activation().map_or_else(each, Activation::name)
     }
 
     /// Activation of the last layer.
-    pub fn output(&self) -> OutputActivation {
-        self.output
+    pub fn output(&self) -> Activation {
+        self.layers.last().map_or(Activation::Identity, |layer| layer.activation)
+    }
+
+    /// What its inputs go through before the first layer.
+    pub fn input_map(&self) -> Option<&Rescale> {
+        self.input.as_deref()
+    }
+
+    /// What the outputs of the last layer go through.
+    pub fn output_map(&self) -> Option<&Rescale> {
+        self.output.as_deref()
+    }
+
+    /// The same network with other layers of the same shapes, without maps.
+    pub(super) fn of_layers(&self, layers: Vec<Layer>) -> Self {
+        let same = layers == *self.layers;
+        let layers = if same { Arc::clone(&self.layers) } else { layers.into() };
+        Self { layers, hidden: self.hidden, input: None, output: None, state_order: None }
+    }
+
+    /// Whether a layer has a norm.
+    pub fn has_norm(&self) -> bool {
+        self.layers.iter().any(|layer| layer.norm.is_some())
     }
 
     /// Names of the inputs, where the file has them.
@@ -160,17 +159,44 @@ impl Mlp {
         first.into_iter().chain(self.layers.iter().map(|layer| layer.outputs)).collect()
     }
 
-    /// Number of weights and biases.
+    /// Number of weights and biases, those of norms among them.
     pub fn parameter_count(&self) -> usize {
-        self.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum()
+        let norms = self.layers.iter().filter_map(|layer| layer.norm.as_ref());
+        let norms: usize = norms.map(|norm| norm.scale.len() + norm.shift.len()).sum();
+        self.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum::<usize>() + norms
     }
 
-    /// SHA-256 over widths, activations and parameters, in hexadecimal.
+    /// SHA-256 over widths, activations and parameters, in hexadecimal; over norms and maps, too, where there are
+    /// some.
     pub fn digest(&self) -> String {
-        let shape = format!("{:?} {:?} {:?}", self.widths(), self.activation, self.output);
-        let parameters = self.layers.iter().flat_map(|layer| [&layer.weight, &layer.bias]);
-        let bytes = parameters.map(|values| bytemuck::cast_slice(values));
-        digest::sha256(std::iter::once(shape.as_bytes()).chain(bytes))
+        let shape = self.shape();
+        digest::sha256(std::iter::once(shape.as_bytes()).chain(self.numbers()))
+    }
+
+    /// What the digest has of it besides numbers: two networks with the same numbers in the same order, which are
+    /// not the same, differ here.
+    fn shape(&self) -> String {
+        let widths = self.widths();
+        let plain = !self.has_norm() && self.input.is_none() && self.output.is_none();
+        if let Some(hidden) = self.activation().filter(|_| plain) {
+            return format!("{widths:?} {hidden:?} {:?}", self.output());
+        }
+        let layers = self.layers.iter();
+        let norm = |layer: &Layer| layer.norm.as_ref().map(|norm| norm.epsilon);
+        let layers: Vec<_> = layers.map(|layer| (layer.activation, norm(layer))).collect();
+        let maps = [self.input.is_some(), self.output.is_some()];
+        format!("{widths:?} {layers:?} {:?} {maps:?}", self.hidden)
+    }
+
+    /// The bytes of all numbers: layer by layer weights, biases and those of the norm, then the maps.
+    fn numbers(&self) -> impl Iterator<Item = &[u8]> {
+        let layers = self.layers.iter().flat_map(|layer| {
+            let norm = layer.norm.iter().flat_map(|norm| [&norm.scale, &norm.shift]);
+            [&layer.weight, &layer.bias].into_iter().chain(norm)
+        });
+        let maps = [&self.input, &self.output].into_iter().flatten();
+        let maps = maps.flat_map(|map| map.tensors().map(|(_, values)| values));
+        layers.chain(maps).map(|values| bytemuck::cast_slice(values))
     }
 
     /// Checks the network against a system of `states` (names in order) and `controls`.
@@ -230,40 +256,34 @@ impl Mlp {
     /// If `input` has not the input width.
     pub fn forward<R: Real>(&self, input: &[R]) -> Vec<R> {
         assert_eq!(input.len(), self.layers[0].inputs, "input width of the network");
-        let mut x = input.to_vec();
-        for (i, layer) in self.layers.iter().enumerate() {
-            let last = i + 1 == self.layers.len();
-            let activate =
-                |sum: R| if last { self.output.apply(sum) } else { self.activation.apply(sum) };
-            let sums = R::dense(&layer.weight, &layer.bias, &x);
-            x = sums.into_iter().map(activate).collect();
+        let seen = self.input.as_ref().map_or_else(|| input.to_vec(), |map| map.apply(input));
+        let said = self.layers.iter().fold(seen, |x, layer| layer.forward(&x));
+        match &self.output {
+            Some(map) => map.apply(&said),
+            None => said,
         }
-        x
     }
 
-    /// Its kind and widths: `mlp 12-64-64-3`.
+    /// Its kind and widths, `mlp 12-64-64-3`, and what else it has: norms, which adapters run in layers, and maps.
     pub fn in_words(&self) -> String {
         let widths: Vec<String> = self.widths().iter().map(ToString::to_string).collect();
-        format!("mlp {}", widths.join("-"))
+        let norms = if self.has_norm() { ", norms in layers" } else { "" };
+        let maps = match (&self.input, &self.output) {
+            (None, None) => "",
+            (Some(_), None) => ", map of inputs",
+            (None, Some(_)) => ", map of outputs",
+            (Some(_), Some(_)) => ", maps of inputs and outputs",
+        };
+        format!("mlp {}{norms}{maps}", widths.join("-"))
     }
 
-    /// Refuses a network without layers, with shapes that do not fit, or a weight not finite.
+    /// Refuses a network without layers, with shapes that do not fit, or a number not finite.
     pub(super) fn validate(&self) -> std::result::Result<(), String> {
         if self.layers.is_empty() {
             return Err("no tensor `layers.0.weight`: the network has no layer".to_owned());
         }
         for (i, layer) in self.layers.iter().enumerate() {
-            let shape = layer.outputs.checked_mul(layer.inputs);
-            if layer.inputs == 0 || shape != Some(layer.weight.len()) || layer.outputs == 0 {
-                return Err(format!("layers.{i}.weight has not the shape [out, in]"));
-            }
-            if layer.bias.len() != layer.outputs {
-                return Err(format!(
-                    "layers.{i}.bias has {} entries, layers.{i}.weight has {} rows",
-                    layer.bias.len(),
-                    layer.outputs
-                ));
-            }
+            layer.validate(i)?;
             if let Some(before) = i.checked_sub(1).map(|before| &self.layers[before])
                 && before.outputs != layer.inputs
             {
@@ -274,12 +294,13 @@ impl Mlp {
                     before.outputs
                 ));
             }
-            for (kind, values) in [("weight", &layer.weight), ("bias", &layer.bias)] {
-                if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-                    return Err(format!("layers.{i}.{kind}[{at}] is {}, not finite", values[at]));
-                }
-            }
         }
-        Ok(())
+        self.hidden.check()?;
+        let ends = [("input", &self.input, self.layers[0].inputs)];
+        let outputs = self.layers[self.layers.len() - 1].outputs;
+        let mut ends = ends.into_iter().chain([("output", &self.output, outputs)]);
+        ends.try_for_each(|(end, map, count)| {
+            map.iter().try_for_each(|map| map.validate(end, count))
+        })
     }
 }

@@ -1,13 +1,20 @@
 //! Policies: a formula over `Real`, or a trained network.
 
+mod activation;
+mod core;
 mod file;
 #[cfg(feature = "import")]
 pub mod import;
 pub mod inspect;
+mod layer;
 mod mlp;
 mod spectral;
 
-pub use mlp::{Activation, Layer, Mlp, OutputActivation};
+pub use activation::Activation;
+pub(crate) use core::Parts;
+pub use layer::{Layer, Norm, Rescale};
+pub(crate) use layer::{normaliser, normaliser_range};
+pub use mlp::Mlp;
 
 use crate::real::Real;
 

@@ -3,6 +3,7 @@
 mod approx;
 pub mod bound;
 mod lanes;
+mod normal;
 mod scalar;
 pub(crate) mod simd;
 mod vector;
@@ -227,6 +228,36 @@ pub trait Real:
     #[inline(always)]
     fn exp_negative(self) -> Self {
         approx::exp_negative(self)
+    }
+
+    /// `exp(self) - 1` of a number that is not positive, of any other 0: error below 5 ulp.
+    #[inline(always)]
+    fn exp_m1_negative(self) -> Self {
+        approx::exp_m1_negative(self)
+    }
+
+    /// By what `ln(1 + exp(self))` lies above the larger of 0 and `self`: `ln(1 + exp(-|self|))`. Error below
+    /// 4 ulp down to 1e-37. Of no meaning for NaN.
+    #[inline(always)]
+    fn softplus_excess(self) -> Self {
+        approx::softplus_excess(self)
+    }
+
+    /// The probability of a standard normal number within `|self|`, with the sign of `self`:
+    /// `erf(self / sqrt(2))`. Error below 4e-7 everywhere.
+    #[inline(always)]
+    fn normal_share(self) -> Self {
+        approx::normal_share(self)
+    }
+
+    /// The function of it whose values and slopes over an interval are `range`, where that is all that is asked: of
+    /// the bound type. Any other number has to take its formula.
+    #[inline(always)]
+    fn known_by(
+        self,
+        _range: impl Fn(bound::Interval) -> (bound::Interval, bound::Interval),
+    ) -> Option<Self> {
+        None
     }
 
     /// Natural logarithm of a number in `[2^-24, 1]`, the range of a uniform draw; the bits of

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::Real;
 use super::approx::Exponent;
+use super::normal::normal_share;
 
 /// What both have of their own: the primitives, and choices that look for NaN no more often than needed.
 macro_rules! primitives {
@@ -119,6 +120,16 @@ impl Real for f64 {
     }
     fn exp_negative(self) -> Self {
         if self.is_nan() { 0.0 } else { f64::exp(self) }
+    }
+    fn exp_m1_negative(self) -> Self {
+        // The smaller of two drops no NaN here.
+        Real::min(self, 0.0).exp_m1()
+    }
+    fn softplus_excess(self) -> Self {
+        f64::exp(-f64::abs(self)).ln_1p()
+    }
+    fn normal_share(self) -> Self {
+        normal_share(self)
     }
     fn ln_unit(self) -> Self {
         f64::ln(self)

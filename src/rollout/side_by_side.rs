@@ -148,20 +148,20 @@ fn margins(model: &Model, states: &[Vec<Lane>]) -> Vec<LaneMargins> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+    use crate::policy::{Activation, Layer, Mlp};
     use crate::race::system::DroneRace;
     use crate::rollout::replay::{looks, pair_measures, states};
 
     /// A network with weights that are no round numbers.
     fn network() -> Mlp {
-        let layer = |inputs: usize, outputs: usize| Layer {
-            weight: (0..inputs * outputs).map(|i| (0.7 * i as f32).sin() * 0.4).collect(),
-            bias: (0..outputs).map(|i| (0.3 * i as f32).cos() * 0.1).collect(),
-            inputs,
-            outputs,
+        let layer = |inputs: usize, outputs: usize| {
+            Layer::dense(
+                (0..inputs * outputs).map(|i| (0.7 * i as f32).sin() * 0.4).collect(),
+                (0..outputs).map(|i| (0.3 * i as f32).cos() * 0.1).collect(),
+            )
         };
         let layers = vec![layer(12, 20), layer(20, 20), layer(20, 3)];
-        Mlp::new(layers, Activation::Silu, OutputActivation::Tanh).unwrap()
+        Mlp::new(layers, Activation::Silu, Activation::Tanh).unwrap()
     }
 
     #[test]

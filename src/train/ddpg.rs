@@ -20,7 +20,7 @@ use super::score::{share, successes};
 use super::settings::DdpgSettings;
 use super::starts::check_stationary;
 use crate::error::Result;
-use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::policy::{Activation, Mlp};
 use crate::rollout::{RolloutSpec, StateList, States, Stream};
 
 /// The backup knows no horizon: what the critic tells is compared with rollouts so many times as
@@ -70,7 +70,7 @@ impl<'a> Ddpg<'a> {
             Agent::new(Network::random(shape, stream, last))
         };
         let actor =
-            |number, inputs, outputs| random(number, inputs, outputs, OutputActivation::Tanh, LAST);
+            |number, inputs, outputs| random(number, inputs, outputs, Activation::Tanh, LAST);
         let seen = task.interface.intervals(&states);
         let acts = vec![[-1.0, 1.0]; outputs + pushes];
         let joint = [states.clone(), acts].concat();
@@ -79,7 +79,7 @@ impl<'a> Ddpg<'a> {
             control: actor(0, seen, outputs),
             disturbance: actor(1, states, pushes),
             replay: Replay::new(settings.replay, joint.len()),
-            critic: random(2, joint, 1, OutputActivation::Identity, 1.0),
+            critic: random(2, joint, 1, Activation::Identity, 1.0),
             environments: Environments::new(
                 task.mixture.clone(),
                 task.seed,

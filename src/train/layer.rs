@@ -10,37 +10,60 @@ use burn_autodiff::ops::{Backward, Ops, OpsKind};
 use burn_backend::TensorMetadata;
 use burn_backend::ops::FloatTensorOps;
 use burn_backend::tensor::FloatTensor;
-use burn_tensor::{Tensor, activation};
+use burn_tensor::Tensor;
+use burn_tensor::activation as library;
 
 use super::device::{Host, on_host, parts, primitive, values};
-use crate::policy::{Activation, OutputActivation};
+use crate::policy::Activation;
 use crate::real::Real;
 
-/// What follows the affine part of a layer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Curve {
-    /// Of a hidden layer.
-    Hidden(Activation),
-    /// Of the last one.
-    Last(OutputActivation),
-}
-
-/// `curve(x W + b)` `[rows, outputs]` for `x` `[rows, inputs]`, `W` `[inputs, outputs]` and `b`
+/// `activation(x W + b)` `[rows, outputs]` for `x` `[rows, inputs]`, `W` `[inputs, outputs]` and `b`
 /// `[1, outputs]`, with derivatives, on the device of `x`.
-pub fn layer(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, curve: Curve) -> Tensor<2> {
+pub fn layer(
+    x: Tensor<2>,
+    weight: Tensor<2>,
+    bias: Tensor<2>,
+    activation: Activation,
+) -> Tensor<2> {
     match on_host(&x) {
-        true => fused(x, weight, bias, curve),
-        false => curved(x.matmul(weight) + bias, curve),
+        true => fused(x, weight, bias, activation),
+        false => curved(x.matmul(weight) + bias, activation),
     }
 }
 
 /// The activation of `sums` as operations of the library: nothing leaves the device.
-fn curved(sums: Tensor<2>, curve: Curve) -> Tensor<2> {
-    match curve {
-        Curve::Last(OutputActivation::Identity) => sums,
-        Curve::Hidden(Activation::Relu) => activation::relu(sums),
-        Curve::Hidden(Activation::Tanh) | Curve::Last(OutputActivation::Tanh) => sums.tanh(),
-        Curve::Hidden(Activation::Silu) => activation::silu(sums),
+fn curved(sums: Tensor<2>, activation: Activation) -> Tensor<2> {
+    // `scale (exp(x / width) - 1)` below 0.
+    let below =
+        |scale: f32, width: f32| ((sums.clone().clamp_max(0.0) / width).exp() - 1.0) * scale;
+    let above = || library::relu(sums.clone());
+    match activation {
+        Activation::Identity => sums,
+        Activation::Relu => library::relu(sums),
+        Activation::LeakyRelu { slope } => library::leaky_relu(sums, f64::from(slope)),
+        Activation::Elu { alpha } => above() + below(alpha, 1.0),
+        Activation::Selu => {
+            let [scale, alpha] = Activation::SELU;
+            above() * scale + below(scale * alpha, 1.0)
+        }
+        Activation::Celu { alpha } => above() + below(alpha, alpha),
+        Activation::Gelu => library::gelu(sums),
+        Activation::GeluTanh => {
+            let [first, third] = Activation::GELU_TANH;
+            let cube = sums.clone().powi_scalar(3) * third;
+            let inside = sums.clone() * first + cube;
+            sums * 0.5 * (inside.tanh() + 1.0)
+        }
+        Activation::Silu => library::silu(sums),
+        Activation::Mish => library::mish(sums),
+        Activation::Tanh => sums.tanh(),
+        Activation::Sigmoid => library::sigmoid(sums),
+        Activation::Softplus { beta } => {
+            above() + (-(sums.clone() * beta).abs()).exp().log1p() / beta
+        }
+        Activation::Softsign => sums.clone() / (sums.abs() + 1.0),
+        Activation::Hardtanh { low, high } => sums.clamp(low, high),
+        Activation::Relu6 => sums.clamp(0.0, 6.0),
     }
 }
 
@@ -48,7 +71,7 @@ fn curved(sums: Tensor<2>, curve: Curve) -> Tensor<2> {
 ///
 /// The products are the library's; bias and activation are one pass over them, and so are both
 /// derivatives. As operations of their own they took a third of the time of a training.
-fn fused(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, curve: Curve) -> Tensor<2> {
+fn fused(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, activation: Activation) -> Tensor<2> {
     let [(x, of_x), (weight, of_weight), (bias, of_bias)] = [x, weight, bias].map(parts::<Host>);
     let products = Host::float_matmul(x.clone(), weight.clone());
     let (device, shape) = (products.device(), products.shape().dims());
@@ -56,7 +79,7 @@ fn fused(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, curve: Curve) -> Tens
     for row in outputs.chunks_exact_mut(shape[1]) {
         row.iter_mut().zip(&bias).for_each(|(sum, bias)| *sum += bias);
     }
-    let slopes = bend(&mut outputs, curve);
+    let slopes = bend(&mut outputs, activation);
     let outputs = primitive::<Host>(outputs, shape, &device);
     let nodes = [of_x, of_weight, of_bias];
     let outputs = match Dense.prepare::<NoCheckpointing>(nodes).compute_bound().stateful() {
@@ -69,7 +92,7 @@ fn fused(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<2>, curve: Curve) -> Tens
 }
 
 /// Puts the activation of each sum in its place; the derivatives there.
-fn bend(sums: &mut [f32], curve: Curve) -> Vec<f32> {
+fn bend(sums: &mut [f32], activation: Activation) -> Vec<f32> {
     let each = |sums: &mut [f32], one: &dyn Fn(f32) -> [f32; 2]| {
         let bent = sums.iter_mut().map(|sum| {
             let [value, slope] = one(*sum);
@@ -78,23 +101,22 @@ fn bend(sums: &mut [f32], curve: Curve) -> Vec<f32> {
         });
         bent.collect()
     };
-    match curve {
-        Curve::Last(OutputActivation::Identity) => vec![1.0; sums.len()],
-        Curve::Hidden(Activation::Relu) => {
+    match activation {
+        Activation::Identity => vec![1.0; sums.len()],
+        Activation::Relu => {
             let slopes = sums.iter().map(|sum| f32::from(u8::from(*sum > 0.0))).collect();
             sums.iter_mut().for_each(|sum| *sum = Activation::Relu.apply(*sum));
             slopes
         }
-        Curve::Hidden(Activation::Tanh) | Curve::Last(OutputActivation::Tanh) => {
-            each(sums, &|sum| {
-                let value = Real::tanh(sum);
-                [value, 1.0 - value * value]
-            })
-        }
-        Curve::Hidden(Activation::Silu) => each(sums, &|sum| {
+        Activation::Tanh => each(sums, &|sum| {
+            let value = Real::tanh(sum);
+            [value, 1.0 - value * value]
+        }),
+        Activation::Silu => each(sums, &|sum| {
             let logistic = 0.5 + 0.5 * Real::tanh(0.5 * sum);
             [sum * logistic, logistic * (1.0 + sum * (1.0 - logistic))]
         }),
+        other => each(sums, &|sum| [other.apply(sum), other.slope_at(sum)]),
     }
 }
 

@@ -3,9 +3,9 @@
 use burn_tensor::{Gradients, Tensor};
 
 use super::device::{Device, floats};
-use super::layer::{Curve, layer};
+use super::layer::layer;
 use crate::error::Result;
-use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+use crate::policy::{Activation, Layer, Mlp};
 use crate::rollout::Stream;
 
 /// What a network looks like.
@@ -20,7 +20,7 @@ pub struct Architecture {
     /// Activation of the hidden layers.
     pub activation: Activation,
     /// Activation of the last layer.
-    pub output: OutputActivation,
+    pub output: Activation,
 }
 
 impl Architecture {
@@ -117,9 +117,8 @@ impl Network {
     pub fn export(&self, order: impl Into<Option<Vec<String>>>) -> Result<Mlp> {
         let bound = self.fixed(&Device::cpu());
         let layers = bound.layers.into_iter().map(|[weight, bias]| {
-            let [inputs, outputs] = weight.dims();
             let weight = floats(weight.inner().transpose());
-            Layer { weight, bias: floats(bias.inner()), inputs, outputs }
+            Layer::dense(weight, floats(bias.inner()))
         });
         let mlp = Mlp::new(layers.collect(), self.shape.activation, self.shape.output)?;
         match order.into() {
@@ -135,7 +134,7 @@ pub struct Bound {
     leaves: Vec<Tensor<2>>,
     layers: Vec<[Tensor<2>; 2]>,
     activation: Activation,
-    output: OutputActivation,
+    output: Activation,
 }
 
 impl Bound {
@@ -143,11 +142,9 @@ impl Bound {
     pub fn forward(&self, inputs: Tensor<2>) -> Tensor<2> {
         let mut x = inputs;
         for (i, [weight, bias]) in self.layers.iter().enumerate() {
-            let curve = match i + 1 == self.layers.len() {
-                true => Curve::Last(self.output),
-                false => Curve::Hidden(self.activation),
-            };
-            x = layer(x, weight.clone(), bias.clone(), curve);
+            let last = i + 1 == self.layers.len();
+            let activation = if last { self.output } else { self.activation };
+            x = layer(x, weight.clone(), bias.clone(), activation);
         }
         x
     }

@@ -15,7 +15,7 @@ use super::run::Learner;
 use super::score::share;
 use super::settings::PpoSettings;
 use crate::error::Result;
-use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::policy::{Activation, Mlp};
 use crate::rollout::{StateList, Stream};
 
 /// What is rewarded, and what the networks see.
@@ -76,8 +76,8 @@ impl<'a> Ppo<'a> {
             let shape = Architecture { inputs, hidden, outputs, activation, output };
             Network::random(shape, Stream::new(task.seed, purpose::WEIGHT, number), last)
         };
-        let policy = random(0, seen, width, OutputActivation::Tanh, LAST);
-        let value = random(1, states, 1, OutputActivation::Identity, 1.0);
+        let policy = random(0, seen, width, Activation::Tanh, LAST);
+        let value = random(1, states, 1, Activation::Identity, 1.0);
         let moments = [policy.parameters.len(), width, value.parameters.len()].map(Adam::new);
         let (horizon, count) = (task.spec.horizon, settings.environments);
         Self {

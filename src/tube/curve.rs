@@ -2,6 +2,7 @@
 
 use super::affine::{Affine, Symbols};
 use crate::formula::Function;
+use crate::policy::{Activation, normaliser_range};
 use crate::real::bound::{Interval, elementary};
 
 /// A function of one number.
@@ -17,6 +18,10 @@ pub(super) enum Curve {
     Power(f32),
     /// An elementary function without jumps.
     Apply(Function),
+    /// An activation of a network.
+    Activated(Activation),
+    /// The factor of a norm with this epsilon, of a variance.
+    Normaliser(f32),
 }
 
 /// A line and what the function may be off it: `slope x + offset`.
@@ -48,7 +53,8 @@ impl Curve {
             Self::Apply(Function::Ln | Function::LnUnit) => x.low > 0.0,
             Self::Apply(Function::Tan) => elementary::tan_defined(x),
             Self::Apply(Function::Asin | Function::Acos) => elementary::within_one(x),
-            Self::Apply(_) => true,
+            Self::Normaliser(_) => x.low >= 0.0,
+            Self::Apply(_) | Self::Activated(_) => true,
         }
     }
 
@@ -63,6 +69,8 @@ impl Curve {
             Self::Whole(exponent) => elementary::powi(x, exponent),
             Self::Power(exponent) => elementary::powf(x, f64::from(exponent)),
             Self::Apply(function) => applied(function, x),
+            Self::Activated(activation) => activation.range(x),
+            Self::Normaliser(epsilon) => normaliser_range(x, epsilon),
         }
     }
 
@@ -78,7 +86,9 @@ impl Curve {
                 let factor = f64::from(exponent) * (f64::from(exponent) - 1.0);
                 point(factor) * elementary::powi(x, exponent - 2).0
             }
-            Self::Whole(_) | Self::Power(_) => return None,
+            Self::Whole(_) | Self::Power(_) | Self::Activated(_) | Self::Normaliser(_) => {
+                return None;
+            }
             Self::Apply(function) => bent(function, x)?,
         };
         Some(curvature)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use reachcast::policy::{Activation, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Mlp};
 
 /// The network of a file under `configs`, as a function.
 pub(crate) fn network(file: &str) -> impl Fn(&[f64]) -> Vec<f64> + use<> {
@@ -13,18 +13,18 @@ pub(crate) fn network(file: &str) -> impl Fn(&[f64]) -> Vec<f64> + use<> {
 
 fn outputs(network: &Mlp, x: &[f64]) -> Vec<f64> {
     let mut x = x.to_vec();
-    for (number, layer) in network.layers().iter().enumerate() {
-        let last = number + 1 == network.layers().len();
+    for layer in network.layers() {
         let sum = |row: usize| {
             let weights = &layer.weight[row * layer.inputs..][..layer.inputs];
             let products = weights.iter().zip(&x).map(|(weight, x)| f64::from(*weight) * x);
             products.sum::<f64>() + f64::from(layer.bias[row])
         };
-        let value = |sum: f64| match (last, network.activation(), network.output()) {
-            (true, _, OutputActivation::Identity) => sum,
-            (true, _, OutputActivation::Tanh) | (false, Activation::Tanh, _) => sum.tanh(),
-            (false, Activation::Relu, _) => sum.max(0.0),
-            (false, Activation::Silu, _) => sum / (1.0 + (-sum).exp()),
+        let value = |sum: f64| match layer.activation {
+            Activation::Identity => sum,
+            Activation::Tanh => sum.tanh(),
+            Activation::Relu => sum.max(0.0),
+            Activation::Silu => sum / (1.0 + (-sum).exp()),
+            other => unreachable!("no carried network has {other}"),
         };
         x = (0..layer.outputs).map(|row| value(sum(row))).collect();
     }

@@ -9,7 +9,7 @@ use crate::common::adapter;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Form, Gpu, NetworkKernels};
 use reachcast::model::Plant;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::real::Real;
 use reachcast::rollout::{NON_FINITE, RolloutSpec};
 use reachcast::system::{Axis, System};
@@ -51,14 +51,11 @@ impl System<1, 1> for Line {
 /// A network whose first hidden layer is infinite from the state 4 on, and whose second is 0 then: what
 /// pads it would be no number, and what pads the last layer sees it.
 fn overflowing() -> Mlp {
-    let layer = |weight: f32, inputs: usize, outputs: usize| Layer {
-        weight: vec![weight; inputs * outputs],
-        bias: vec![0.0; outputs],
-        inputs,
-        outputs,
+    let layer = |weight: f32, inputs: usize, outputs: usize| {
+        Layer::dense(vec![weight; inputs * outputs], vec![0.0; outputs])
     };
     let layers = vec![layer(1e38, 1, 65), layer(-1.0, 65, 65), layer(1.0, 65, 1)];
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers, Activation::Relu, Activation::Tanh).expect("a whole network")
 }
 
 /// Measures of starts under `network`, run in `form`.

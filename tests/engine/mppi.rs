@@ -10,7 +10,7 @@ use crate::common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
 use reachcast::cost::{Cost, Obstacle, Quadratic};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::race::{
     DroneRace, Fence, LaneCost, QuadraticCost, RaceCost, RaceReference, RecoveryCost, Safety,
     SafetyCone,
@@ -215,16 +215,16 @@ fn weights_sum_to_one_and_follow_the_temperature() {
 }
 
 fn network(inputs: usize, outputs: usize, scale: f32) -> Mlp {
-    let layer = |inputs: usize, outputs: usize, seed: usize| Layer {
-        weight: (0..inputs * outputs)
-            .map(|i| scale * (((i * 37 + seed * 11) % 41) as f32 / 20.0 - 1.0))
-            .collect(),
-        bias: (0..outputs).map(|i| 0.1 * (i as f32 - 0.5)).collect(),
-        inputs,
-        outputs,
+    let layer = |inputs: usize, outputs: usize, seed: usize| {
+        Layer::dense(
+            (0..inputs * outputs)
+                .map(|i| scale * (((i * 37 + seed * 11) % 41) as f32 / 20.0 - 1.0))
+                .collect(),
+            (0..outputs).map(|i| 0.1 * (i as f32 - 0.5)).collect(),
+        )
     };
     let layers = vec![layer(inputs, 20, 1), layer(20, outputs, 2)];
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap()
+    Mlp::new(layers, Activation::Relu, Activation::Tanh).unwrap()
 }
 
 /// Compares a task with the f64 loop on every backend: the costs, and the plan that the f64 costs

@@ -9,7 +9,7 @@ use reachcast::backend::Backend;
 use reachcast::backend::gpu::NetworkKernels;
 use reachcast::cost::Cost;
 use reachcast::model::Plant;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Layer, Mlp, Policy};
 use reachcast::real::Real;
 use reachcast::report::html;
 use reachcast::rollout::{
@@ -112,11 +112,11 @@ fn network(hidden: &[f32], output: &[f32]) -> Mlp {
     let width = hidden.len();
     let layer = |weight: Vec<f32>, inputs: usize| {
         let outputs = weight.len() / inputs;
-        Layer { weight, bias: vec![0.0; outputs], inputs, outputs }
+        Layer::dense(weight, vec![0.0; outputs])
     };
     let passed = layer(vec![0.5; width * width], width);
     let layers = vec![layer(hidden.to_vec(), 1), passed, layer(output.to_vec(), width)];
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers, Activation::Relu, Activation::Tanh).expect("a whole network")
 }
 
 /// 401 starts over [-2, 2].

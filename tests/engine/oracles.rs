@@ -7,7 +7,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::backend::{Backend, Program};
 use reachcast::model::{Controller, Model, Plant};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use reachcast::policy::{Activation, Layer, Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{
@@ -48,14 +48,14 @@ fn context<'a>(program: &'a Program<'a>) -> Context<'a> {
 /// A network of the race with random weights.
 fn random_policy(seed: u64) -> Mlp {
     let mut rng = StdRng::seed_from_u64(seed);
-    let mut layer = |inputs: usize, outputs: usize| Layer {
-        weight: (0..inputs * outputs).map(|_| rng.random_range(-1.0..1.0)).collect(),
-        bias: (0..outputs).map(|_| rng.random_range(-1.0..1.0)).collect(),
-        inputs,
-        outputs,
+    let mut layer = |inputs: usize, outputs: usize| {
+        Layer::dense(
+            (0..inputs * outputs).map(|_| rng.random_range(-1.0..1.0)).collect(),
+            (0..outputs).map(|_| rng.random_range(-1.0..1.0)).collect(),
+        )
     };
     let layers = vec![layer(12, 9), layer(9, 3)];
-    Mlp::new(layers, Activation::Tanh, OutputActivation::Tanh).expect("network")
+    Mlp::new(layers, Activation::Tanh, Activation::Tanh).expect("network")
 }
 
 /// Proportional feedback of the ego toward the gate: a formula policy of the race.
@@ -616,7 +616,7 @@ fn a_network_of_some_states_runs_as_one_that_ignores_the_others() {
     };
     let network = |first: Layer| {
         let layers = vec![first, layers[1].clone()];
-        Mlp::new(layers, Activation::Tanh, OutputActivation::Tanh).expect("network")
+        Mlp::new(layers, Activation::Tanh, Activation::Tanh).expect("network")
     };
     let named = network(few(&layers[0]))
         .with_state_order(seen.map(|place| names[place].clone()).to_vec())

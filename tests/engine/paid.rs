@@ -14,7 +14,7 @@ use reachcast::backend::cpu::Cpu;
 use reachcast::cost::Cost;
 use reachcast::formula::{Node, record};
 use reachcast::model::{StageCost, TermKind, TerminalCost, text};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::real::Real;
 use reachcast::rollout::{
     CostQuery, Disturbance, MppiProblem, MppiResult, MppiSettings, MppiSpec, MppiTask, Planning,
@@ -157,8 +157,8 @@ fn landing(horizon: u32) -> (Planning, Vec<MppiProblem>) {
 /// Behind value network and disturbance, too: the end is the state that the last push left.
 #[test]
 fn a_terminal_cost_from_rust_agrees_with_an_f64_loop() {
-    let layer = Layer { weight: vec![0.7, -0.9], bias: vec![0.2], inputs: 2, outputs: 1 };
-    let network = Mlp::new(vec![layer], Activation::Tanh, OutputActivation::Tanh).unwrap();
+    let layer = Layer::dense(vec![0.7, -0.9], vec![0.2]);
+    let network = Mlp::new(vec![layer], Activation::Tanh, Activation::Tanh).unwrap();
     let network = Arc::new(network);
     for (horizon, networked) in [(1, false), (17, false), (1, true), (17, true)] {
         let (mut planning, problems) = landing(horizon);
@@ -251,8 +251,8 @@ fn a_map_hands_a_nan_on() {
 #[test]
 fn costs_may_call_networks_on_the_cpu() {
     let folder = tempfile::tempdir().unwrap();
-    let layer = Layer { weight: vec![-0.5], bias: vec![0.25], inputs: 1, outputs: 1 };
-    let line = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity).unwrap();
+    let layer = Layer::dense(vec![-0.5], vec![0.25]);
+    let line = Mlp::new(vec![layer], Activation::Relu, Activation::Identity).unwrap();
     std::fs::write(folder.path().join("line.safetensors"), line.to_bytes()).unwrap();
     let begin = costs::SKIFF.split("[model.costs]").next().unwrap();
     let planning = |formula: &str| {

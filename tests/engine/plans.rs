@@ -13,7 +13,7 @@ use reachcast::backend::{Backend, PlanProgram};
 use reachcast::control::DriveBenchmark;
 use reachcast::formula::{Expr, record};
 use reachcast::model::{StageCost, text};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::race::{
     DroneRace, Fence, RaceCost, RaceReference, RecoveryCost, Safety, SafetyCone,
 };
@@ -186,14 +186,14 @@ fn models_whose_step_does_not_fit_are_refused() {
 
 /// A network from the states.
 fn network(outputs: usize) -> Arc<Mlp> {
-    let layer = |inputs: usize, outputs: usize, seed: usize| Layer {
-        weight: (0..inputs * outputs).map(|i| ((i * 37 + seed) % 41) as f32 / 60.0 - 0.3).collect(),
-        bias: vec![0.05; outputs],
-        inputs,
-        outputs,
+    let layer = |inputs: usize, outputs: usize, seed: usize| {
+        Layer::dense(
+            (0..inputs * outputs).map(|i| ((i * 37 + seed) % 41) as f32 / 60.0 - 0.3).collect(),
+            vec![0.05; outputs],
+        )
     };
     let layers = vec![layer(12, 20, 1), layer(20, outputs, 2)];
-    Arc::new(Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).unwrap())
+    Arc::new(Mlp::new(layers, Activation::Relu, Activation::Tanh).unwrap())
 }
 
 /// Without their compiled form, model and cost give the same numbers to the last bit.
@@ -345,8 +345,8 @@ fn plans_of_a_text_see_its_time_and_parameters() {
 #[test]
 fn networks_inside_formulas_are_planned_through_on_the_cpu() {
     let folder = tempfile::tempdir().unwrap();
-    let layer = Layer { weight: vec![-0.5], bias: vec![0.0], inputs: 1, outputs: 1 };
-    let drag = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity).unwrap();
+    let layer = Layer::dense(vec![-0.5], vec![0.0]);
+    let drag = Mlp::new(vec![layer], Activation::Relu, Activation::Identity).unwrap();
     std::fs::write(folder.path().join("drag.safetensors"), drag.to_bytes()).unwrap();
     let written = CART.replace("wind * sin(3 * t) + 0.01 * step", "-0.5 * speed");
     let called =

@@ -2,6 +2,7 @@
 //!
 //! Without an adapter every test says so and passes, unless `REACHCAST_REQUIRE_GPU` is 1.
 
+mod activations;
 mod cache;
 mod calls;
 mod certificates;
@@ -38,7 +39,7 @@ use reachcast::Result;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Choice, Gpu, NetworkKernels};
 use reachcast::model::Plant;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::rollout::{
     DeviationTask, Farthest, PairMeasure, Purpose, ReachAvoidTask, Region, RolloutSpec, Starts,
     Stream, Tightening,
@@ -142,14 +143,12 @@ fn random_network(widths: &[usize], activation: Activation) -> Mlp {
     };
     let layers = widths.windows(2).map(|pair| {
         let bound = (3.0 / pair[0] as f32).sqrt();
-        Layer {
-            weight: (0..pair[0] * pair[1]).map(|_| bound * uniform()).collect(),
-            bias: (0..pair[1]).map(|_| 0.1 * uniform()).collect(),
-            inputs: pair[0],
-            outputs: pair[1],
-        }
+        Layer::dense(
+            (0..pair[0] * pair[1]).map(|_| bound * uniform()).collect(),
+            (0..pair[1]).map(|_| 0.1 * uniform()).collect(),
+        )
     });
-    Mlp::new(layers.collect(), activation, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers.collect(), activation, Activation::Tanh).expect("a whole network")
 }
 
 /// How far a GPU may lie from f64: a multiple of the host's worst f32 distance.

@@ -38,7 +38,7 @@ impl System<3, 1> for Squares {
 }
 
 /// Whether the adapter rounds a product before it is added: it is asked.
-fn rounds_products(gpu: Gpu) -> (Gpu, bool) {
+pub(crate) fn rounds_products(gpu: Gpu) -> (Gpu, bool) {
     let starts: Vec<[f32; 3]> = (1..400)
         .map(|i| 1.0 + i as f32 / 1024.0 + f32::EPSILON)
         .map(|a| [a, a, -(a * a)])

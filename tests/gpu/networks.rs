@@ -17,7 +17,7 @@ use crate::{
     deviation, drawn, each_way, gpu, measures, race_policy, random_network, reach_avoid, whole_box,
 };
 
-fn fusing() -> Option<Gpu> {
+pub(crate) fn fusing() -> Option<Gpu> {
     gpu().map(|gpu| gpu.with_networks(NetworkKernels::Fused))
 }
 

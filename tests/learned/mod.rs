@@ -9,7 +9,7 @@ use std::path::Path;
 
 use reachcast::model::Plant;
 use reachcast::model::text::read;
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::rollout::{PairControl, RolloutSpec, Tightening};
 
 /// The plant; `LAW` is replaced by a policy.
@@ -72,30 +72,29 @@ impl Law {
 
 /// The networks by the names that the text has for them.
 pub(crate) fn networks() -> [(&'static str, Mlp); 5] {
-    use Activation::{Relu, Silu, Tanh};
-    use OutputActivation as Output;
+    use Activation::{Identity, Relu, Silu, Tanh};
     [
-        ("drag.safetensors", network(&[2, 9, 2], 1, Tanh, Output::Identity)),
-        ("nets/grip.safetensors", network(&[3, 5, 6, 1], 2, Relu, Output::Tanh)),
-        ("inside.safetensors", network(&[2, 7, 3], 3, Silu, Output::Identity)),
-        ("pull.safetensors", network(&[2, 11, 1], 4, Tanh, Output::Tanh)),
-        ("policy.safetensors", network(&[2, 6, 2], 5, Relu, Output::Tanh)),
+        ("drag.safetensors", network(&[2, 9, 2], 1, Tanh, Identity)),
+        ("nets/grip.safetensors", network(&[3, 5, 6, 1], 2, Relu, Tanh)),
+        ("inside.safetensors", network(&[2, 7, 3], 3, Silu, Identity)),
+        ("pull.safetensors", network(&[2, 11, 1], 4, Tanh, Tanh)),
+        ("policy.safetensors", network(&[2, 6, 2], 5, Relu, Tanh)),
     ]
 }
 
 /// Weights of both signs, told from others by `seed`.
-fn network(widths: &[usize], seed: u64, hidden: Activation, output: OutputActivation) -> Mlp {
+fn network(widths: &[usize], seed: u64, hidden: Activation, output: Activation) -> Mlp {
     let mut state = seed;
     let mut uniform = move || {
         state =
             state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1 << 23) as f32 - 1.0
     };
-    let layer = |pair: &[usize]| Layer {
-        weight: (0..pair[0] * pair[1]).map(|_| uniform()).collect(),
-        bias: (0..pair[1]).map(|_| 0.3 * uniform()).collect(),
-        inputs: pair[0],
-        outputs: pair[1],
+    let layer = |pair: &[usize]| {
+        Layer::dense(
+            (0..pair[0] * pair[1]).map(|_| uniform()).collect(),
+            (0..pair[1]).map(|_| 0.3 * uniform()).collect(),
+        )
     };
     let layers = widths.windows(2).map(layer).collect();
     Mlp::new(layers, hidden, output).expect("a whole network")
@@ -129,19 +128,19 @@ struct Layers(Mlp);
 impl Layers {
     /// The outputs at `x`: sums of products, then the activation, layer by layer.
     fn at(&self, x: &[f64]) -> Vec<f64> {
-        let count = self.0.layers().len();
         let mut x = x.to_vec();
-        for (number, layer) in self.0.layers().iter().enumerate() {
+        for layer in self.0.layers() {
             let mut next = Vec::new();
             for row in 0..layer.outputs {
                 let weights = &layer.weight[row * layer.inputs..][..layer.inputs];
                 let products = weights.iter().zip(&x).map(|(w, x)| f64::from(*w) * x);
                 let sum = products.sum::<f64>() + f64::from(layer.bias[row]);
-                next.push(match (number + 1 == count, self.0.activation(), self.0.output()) {
-                    (true, _, OutputActivation::Identity) => sum,
-                    (true, _, OutputActivation::Tanh) | (false, Activation::Tanh, _) => sum.tanh(),
-                    (false, Activation::Relu, _) => sum.max(0.0),
-                    (false, Activation::Silu, _) => sum / (1.0 + (-sum).exp()),
+                next.push(match layer.activation {
+                    Activation::Identity => sum,
+                    Activation::Tanh => sum.tanh(),
+                    Activation::Relu => sum.max(0.0),
+                    Activation::Silu => sum / (1.0 + (-sum).exp()),
+                    other => unreachable!("no carried network has {other}"),
                 });
             }
             x = next;

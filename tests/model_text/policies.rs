@@ -4,21 +4,18 @@ use std::path::Path;
 
 use reachcast::model::text::{Description, read};
 use reachcast::model::{Controller, Law, Plant};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 
 use super::{cart_with, refusal};
 
 /// A network of 3 inputs and 2 outputs whose numbers are all different.
 fn network() -> Mlp {
     let numbers = |count: usize, from: f32| (0..count).map(|i| from - 0.13 * i as f32).collect();
-    let layer = |inputs: usize, outputs: usize| Layer {
-        weight: numbers(inputs * outputs, 0.9),
-        bias: numbers(outputs, 0.2),
-        inputs,
-        outputs,
+    let layer = |inputs: usize, outputs: usize| {
+        Layer::dense(numbers(inputs * outputs, 0.9), numbers(outputs, 0.2))
     };
     let layers = vec![layer(3, 4), layer(4, 2)];
-    Mlp::new(layers, Activation::Tanh, OutputActivation::Identity).expect("a network")
+    Mlp::new(layers, Activation::Tanh, Activation::Identity).expect("a network")
 }
 
 /// The cart with `policy` in place of its own, read where `net.safetensors` is `network`.
@@ -71,8 +68,8 @@ fn observe_and_act() {
 
 #[test]
 fn a_bare_network_sees_the_states_and_is_the_control() {
-    let layer = Layer { weight: vec![1.0, 2.0], bias: vec![0.0], inputs: 2, outputs: 1 };
-    let fits = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Tanh).expect("a network");
+    let layer = Layer::dense(vec![1.0, 2.0], vec![0.0]);
+    let fits = Mlp::new(vec![layer], Activation::Relu, Activation::Tanh).expect("a network");
     let file = "file = \"net.safetensors\"";
     let (_, controller) = with_network(&fits, file).expect("a controller");
     assert!(matches!(controller.law, Law::Network { observe: None, act: None, .. }));
@@ -94,7 +91,7 @@ fn a_network_sees_the_states_that_its_file_names() {
     let layer = |weight: Vec<f32>| {
         let inputs = weight.len();
         let layer = Layer { weight, bias: vec![0.0], inputs, outputs: 1 };
-        Mlp::new(vec![layer], Activation::Relu, OutputActivation::Identity).expect("a network")
+        Mlp::new(vec![layer], Activation::Relu, Activation::Identity).expect("a network")
     };
     let file = "file = \"net.safetensors\"";
     for (weight, names, expected) in [

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use reachcast::formula::{Expr, Graph, record};
 use reachcast::model::{Controller, Law, Model, Parameter, Plant};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use reachcast::real::Real;
 use reachcast::rollout::{PairControl, RolloutSpec, Tightening};
 use reachcast::system::{Axis, System};
@@ -133,14 +133,14 @@ pub(crate) fn network(widths: &[usize]) -> Mlp {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (state >> 40) as f32 / (1 << 23) as f32 - 1.0
     };
-    let layer = |pair: &[usize]| Layer {
-        weight: (0..pair[0] * pair[1]).map(|_| uniform()).collect(),
-        bias: (0..pair[1]).map(|_| 0.2 * uniform()).collect(),
-        inputs: pair[0],
-        outputs: pair[1],
+    let layer = |pair: &[usize]| {
+        Layer::dense(
+            (0..pair[0] * pair[1]).map(|_| uniform()).collect(),
+            (0..pair[1]).map(|_| 0.2 * uniform()).collect(),
+        )
     };
     let layers = widths.windows(2).map(layer).collect();
-    Mlp::new(layers, Activation::Tanh, OutputActivation::Tanh).expect("a whole network")
+    Mlp::new(layers, Activation::Tanh, Activation::Tanh).expect("a whole network")
 }
 
 /// Who drives the drift in a test.

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::command::{Folder, document, done, reachcast, refused};
-use reachcast::policy::{Activation, Layer, Mlp, OutputActivation};
+use reachcast::policy::{Activation, Layer, Mlp};
 use serde_json::Value;
 
 /// A mass with learned drag, toward the middle; its target is moved by a learned margin.
@@ -37,14 +37,14 @@ const SET: [&str; 4] =
     ["global.draws=1000", "deviation.pilot=100", "growth.rounds=3", "rollout.horizon=20"];
 
 fn network(inputs: usize, outputs: usize, weight: f32) -> Mlp {
-    let layer = |inputs: usize, outputs: usize| Layer {
-        weight: (0..inputs * outputs).map(|i| weight / (1.0 + i as f32)).collect(),
-        bias: vec![0.01; outputs],
-        inputs,
-        outputs,
+    let layer = |inputs: usize, outputs: usize| {
+        Layer::dense(
+            (0..inputs * outputs).map(|i| weight / (1.0 + i as f32)).collect(),
+            vec![0.01; outputs],
+        )
     };
     let layers = vec![layer(inputs, 5), layer(5, outputs)];
-    Mlp::new(layers, Activation::Tanh, OutputActivation::Identity).unwrap()
+    Mlp::new(layers, Activation::Tanh, Activation::Identity).unwrap()
 }
 
 /// The model and its networks, one of them beside the folder of the model.

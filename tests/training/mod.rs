@@ -8,7 +8,7 @@ use std::sync::Arc;
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
 use reachcast::model::{Interface, Model};
-use reachcast::policy::{Activation, OutputActivation};
+use reachcast::policy::Activation;
 use reachcast::rollout::{RolloutSpec, Stream, Tightening};
 use reachcast::system::System;
 use reachcast::train::analytic::Task;
@@ -44,7 +44,7 @@ pub(crate) fn random<S: System<NX, NU>, const NX: usize, const NU: usize>(
     last: f32,
 ) -> Network {
     let (inputs, hidden) = (intervals(system), hidden.to_vec());
-    let (activation, output) = (Activation::Relu, OutputActivation::Tanh);
+    let (activation, output) = (Activation::Relu, Activation::Tanh);
     let shape = Architecture { inputs, hidden, outputs: NU, activation, output };
     Network::random(shape, Stream::new(5, purpose::WEIGHT, 0), last)
 }

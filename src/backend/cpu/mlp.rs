@@ -6,9 +6,9 @@ use std::ops::Range;
 use super::dispatch::Unit;
 use super::kernel::{GRANULE, Kernel, Panel};
 use crate::error::{Error, Result};
-use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+use crate::policy::{Activation, Layer, Mlp, Norm, normaliser};
 use crate::real::simd::Body;
-use crate::real::{Lanes, Real};
+use crate::real::{Lanes, Real, Vector};
 use crate::tile::Frame;
 
 /// A network whose weights are in the order in which a kernel reads them.
@@ -25,14 +25,8 @@ struct PackedLayer {
     weights: Vec<f32>,
     bias: Vec<f32>,
     inputs: usize,
-    squash: Squash,
-}
-
-/// What comes after the sums.
-#[derive(Clone, Copy, Debug)]
-enum Squash {
-    Hidden(Activation),
-    Output(OutputActivation),
+    norm: Option<Norm>,
+    activation: Activation,
 }
 
 impl Packed {
@@ -54,18 +48,13 @@ impl Packed {
     }
 
     /// Packs `network` for panels of `rows` neurons.
+    ///
+    /// # Panics
+    /// If it has a map at an end.
     pub(super) fn new(network: &Mlp, rows: usize) -> Self {
-        let last = network.layers().len() - 1;
-        let squash = |i| {
-            if i == last {
-                Squash::Output(network.output())
-            } else {
-                Squash::Hidden(network.activation())
-            }
-        };
-        let layers = network.layers().iter().enumerate();
+        assert!(!network.is_mapped(), "maps are formulas around a network");
         Self {
-            layers: layers.map(|(i, layer)| PackedLayer::new(layer, rows, squash(i))).collect(),
+            layers: network.layers().iter().map(|layer| PackedLayer::new(layer, rows)).collect(),
             widest: network.widths().into_iter().max().unwrap_or(0),
         }
     }
@@ -77,14 +66,16 @@ impl Packed {
 }
 
 impl PackedLayer {
-    fn new(layer: &Layer, rows: usize, squash: Squash) -> Self {
+    fn new(layer: &Layer, rows: usize) -> Self {
         let mut weights = Vec::with_capacity(layer.weight.len());
         for panel in layer.weight.chunks(rows * layer.inputs) {
             for column in 0..layer.inputs {
                 weights.extend(panel[column..].iter().step_by(layer.inputs));
             }
         }
-        Self { weights, bias: layer.bias.clone(), inputs: layer.inputs, squash }
+        let Layer { bias, inputs, norm, activation, .. } = layer;
+        let (bias, norm) = (bias.clone(), norm.clone());
+        Self { weights, bias, inputs: *inputs, norm, activation: *activation }
     }
 
     /// The layer for `lanes` trajectories; `inputs` and `outputs` are `[blocks, features, BLOCK]`.
@@ -95,10 +86,11 @@ impl PackedLayer {
         inputs: &[f32],
         outputs: &mut [f32],
     ) {
-        let floor = match self.squash {
-            Squash::Hidden(Activation::Relu) => 0.0,
+        let floor = match (self.activation, &self.norm) {
+            (Activation::Relu, None) => 0.0,
             _ => f32::NEG_INFINITY,
         };
+        let squashes = self.squashes();
         let (block_in, block_out) = (self.inputs * K::BLOCK, self.bias.len() * K::BLOCK);
         let panels = self.weights.chunks(K::ROWS * self.inputs);
         for (p, (weights, bias)) in panels.zip(self.bias.chunks(K::ROWS)).enumerate() {
@@ -108,33 +100,30 @@ impl PackedLayer {
                 let first = block * block_out + p * K::ROWS * K::BLOCK;
                 let y = &mut outputs[first..][..bias.len() * K::BLOCK];
                 kernel.panel(panel, lanes - block * K::BLOCK, x, y);
-                if !self.squash.done_by_kernel() {
-                    let squash = self.squash;
-                    kernel.call(Squashing::<N> { squash, values: y });
+                if squashes {
+                    kernel.call(Squashing::<N> { activation: self.activation, values: y });
                 }
             }
         }
-    }
-}
-
-impl Squash {
-    /// Whether nothing is left to do once the kernel has bounded the sums.
-    fn done_by_kernel(self) -> bool {
-        matches!(self, Self::Hidden(Activation::Relu) | Self::Output(OutputActivation::Identity))
-    }
-
-    #[inline(always)]
-    fn apply<R: Real>(self, x: R) -> R {
-        match self {
-            Self::Hidden(activation) => activation.apply(x),
-            Self::Output(activation) => activation.apply(x),
+        if let Some(norm) = &self.norm {
+            for values in outputs.chunks_mut(block_out).take(lanes.div_ceil(K::BLOCK)) {
+                let activation = self.activation;
+                kernel.call(Normalising { norm, activation, values, columns: K::BLOCK });
+            }
         }
+    }
+
+    /// Whether the activation is left to do of each panel: the kernel bounds sums itself, and a norm has to see all
+    /// of a layer first.
+    fn squashes(&self) -> bool {
+        let bounded = matches!(self.activation, Activation::Relu | Activation::Identity);
+        self.norm.is_none() && !bounded
     }
 }
 
 /// Activation of a panel's sums, a multiple of a granule, by the widest lanes that fit.
 struct Squashing<'a, const N: usize> {
-    squash: Squash,
+    activation: Activation,
     values: &'a mut [f32],
 }
 
@@ -145,10 +134,47 @@ impl<const N: usize> Body for Squashing<'_, N> {
     fn run(self) {
         let (groups, rest) = self.values.as_chunks_mut::<N>();
         for group in groups {
-            *group = self.squash.apply(Lanes(*group)).0;
+            *group = self.activation.apply(Lanes(*group)).0;
         }
         for group in rest.as_chunks_mut::<GRANULE>().0 {
-            *group = self.squash.apply(Lanes(*group)).0;
+            *group = self.activation.apply(Lanes(*group)).0;
+        }
+    }
+}
+
+/// Norm and activation of a layer's sums in a block, `[neurons, columns]`. Twin: shaders/norm.wgsl.
+struct Normalising<'a> {
+    norm: &'a Norm,
+    activation: Activation,
+    values: &'a mut [f32],
+    columns: usize,
+}
+
+impl Body for Normalising<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { norm, activation, values, columns } = self;
+        let rows = values.len() / columns;
+        let count = Lanes::<GRANULE>::lit(rows as f32);
+        for first in (0..columns).step_by(GRANULE) {
+            let mut total = Lanes::lit(0.0);
+            for row in 0..rows {
+                total = total + Lanes::load(&values[row * columns + first..]);
+            }
+            let mean = total / count;
+            let mut total = Lanes::lit(0.0);
+            for row in 0..rows {
+                let gap = Lanes::load(&values[row * columns + first..]) - mean;
+                total = total + gap * gap;
+            }
+            let factor = normaliser(total / count, Lanes::lit(norm.epsilon));
+            for row in 0..rows {
+                let place = &mut values[row * columns + first..];
+                let normed = (Lanes::load(place) - mean) * factor * Lanes::lit(norm.scale[row]);
+                activation.apply(normed + Lanes::lit(norm.shift[row])).store(place);
+            }
         }
     }
 }

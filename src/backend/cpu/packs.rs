@@ -29,11 +29,11 @@ impl Packs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::policy::{Activation, Layer, OutputActivation};
+    use crate::policy::{Activation, Layer};
 
     fn network(bias: f32) -> Mlp {
-        let layer = Layer { weight: vec![1.0, 2.0], bias: vec![bias], inputs: 2, outputs: 1 };
-        Mlp::new(vec![layer], Activation::Relu, OutputActivation::Tanh).expect("a network")
+        let layer = Layer::dense(vec![1.0, 2.0], vec![bias]);
+        Mlp::new(vec![layer], Activation::Relu, Activation::Tanh).expect("a network")
     }
 
     #[test]

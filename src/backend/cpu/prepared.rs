@@ -53,7 +53,8 @@ struct Needs<'a> {
 impl Cpu {
     /// See [`crate::backend::Backend::prepare`].
     pub(in crate::backend) fn prepare(&self, plant: &Plant) -> Result<Prepared> {
-        let Plant { model, controller } = plant;
+        let model = &plant.model;
+        let controller = &*plant.controller.unmapped(model);
         let layout = Layout { states: model.states.len(), controls: model.controls.len(), own: 0 };
         let values = model.values();
         let pack = &|network: &Mlp| self.packed(network);

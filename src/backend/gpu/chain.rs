@@ -116,9 +116,8 @@ impl ChainBinder<'_> {
     /// The layers of a network: from what it is asked to what it says.
     fn ask(&self, chain: &ChainText, ask: &AskShape) -> Result<BoundAsk> {
         let mlp = &chain.networks()[ask.network];
-        let count = mlp.layers().len();
-        let layer = |i: usize| {
-            let kernel = if i + 1 == count { Kernel::OutputLayer } else { Kernel::HiddenLayer };
+        let shapes = LayerShape::of(mlp);
+        let layer = |(i, kernel): (usize, Kernel)| {
             let pipeline = self.compiled.given(
                 &self.flight.device,
                 kernel,
@@ -130,8 +129,11 @@ impl ChainBinder<'_> {
                 part.unwrap_or_else(|| self.end(slot, mlp, ask, i))
             }))
         };
-        let layers = (0..count).map(layer).collect::<Result<_>>()?;
-        Ok(BoundAsk { layers, shapes: LayerShape::of(mlp) })
+        let kernels = shapes.iter().enumerate();
+        let kernels =
+            kernels.flat_map(|(i, shape)| shape.kernels().into_iter().map(move |one| (i, one)));
+        let layers = kernels.map(layer).collect::<Result<_>>()?;
+        Ok(BoundAsk { layers, shapes })
     }
 
     /// What layer `i` of a network binds in `slot`.

@@ -1,6 +1,8 @@
 //! What formulas that call networks cost, as far as it decides the chunks.
 
-use super::compose::{AskShape, ChainSizes, ChainText, input_quads, output_quads, parameter_quads};
+use super::compose::{
+    AskShape, ChainSizes, ChainText, layer_dispatches, layer_trips, output_quads, parameter_quads,
+};
 use super::network::network_flops;
 use crate::policy::Mlp;
 
@@ -28,7 +30,7 @@ impl ChainLoad {
         let networks = chain.networks();
         let most = |of: fn(&Mlp) -> u64| networks.iter().map(|mlp| of(mlp)).max().unwrap_or(0);
         let asks = || (0..chain.count()).flat_map(|link| chain.asks(link));
-        let layers = |ask: &AskShape| networks[ask.network].layers().len();
+        let layers = |ask: &AskShape| layer_dispatches(&networks[ask.network]);
         let activations = VECTOR_BYTES * most(widest_quads);
         let ChainSizes { kept, asked, said } = chain.sizes();
         let vectors = |numbers: usize| VECTOR_BYTES * numbers.div_ceil(4) as u64;
@@ -36,7 +38,7 @@ impl ChainLoad {
             bytes: [4 * kept as u64, vectors(asked), vectors(said), activations, activations],
             flops: asks().map(|ask| network_flops(&networks[ask.network])).sum(),
             parameters: VECTOR_BYTES * most(|mlp| parameter_quads(mlp) as u64),
-            inputs: most(|mlp| mlp.layers().iter().map(|one| input_quads(one.inputs) as u64).sum()),
+            inputs: most(layer_trips),
             dispatches: chain.count() + asks().map(layers).sum::<usize>(),
         }
     }

@@ -2,7 +2,9 @@
 
 use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS};
 use super::chain_load::ChainLoad;
-use super::compose::{Fused, WORKGROUP, input_quads, output_quads, parameter_quads};
+use super::compose::{
+    Fused, WORKGROUP, input_quads, layer_dispatches, layer_trips, output_quads, parameter_quads,
+};
 use super::fusing::step_trips;
 use super::listing::Adapter;
 use super::network::network_flops;
@@ -105,7 +107,7 @@ pub(super) struct Size<'a> {
 impl Size<'_> {
     /// Most dispatches of a step: the rollout, what its network sees, layers and links.
     pub(super) fn step_dispatches(&self) -> u64 {
-        let layers = self.network.map_or(0, |mlp| mlp.layers().len());
+        let layers = self.network.map_or(0, layer_dispatches);
         let chained = self.chain.map_or(0, |load| load.dispatches);
         (2 + layers + chained) as u64
     }
@@ -240,8 +242,7 @@ fn longest_trips(states: usize, network: Option<&Mlp>, stride: u64, steps: u64) 
     // at most 4 times each, and over half as many pairs.
     let blocks = states.div_ceil(4) + 2;
     let sample = 2 * (10 * blocks + 5 * states);
-    let layers = network.into_iter().flat_map(Mlp::layers);
-    let layer = layers.map(|layer| input_quads(layer.inputs) as u64).max();
+    let layer = network.map(layer_trips);
     let reduce = stride.div_ceil(u64::from(WORKGROUP)) + 8;
     let compact = states.div_ceil(4);
     [sample, layer.unwrap_or(0), reduce, compact, steps].into_iter().max().unwrap_or(0)

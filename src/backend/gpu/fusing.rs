@@ -119,6 +119,11 @@ fn fitting(adapter: &Adapter, mlp: &Mlp, form: Form) -> Option<Fused> {
 
 /// Why `mlp` does not run inside of rollouts on `adapter`.
 fn does_not_fuse(adapter: &Adapter, mlp: &Mlp) -> Error {
+    if mlp.has_norm() {
+        let problem = "a network with a norm behind a layer does not fuse, since that needs all sums of the layer \
+                       at once; run it in layers";
+        return Error::Device(problem.to_owned());
+    }
     let widest = mlp.widths().into_iter().max().unwrap_or(0);
     Error::Device(format!(
         "a network of {widest} neurons per layer does not fuse: at most {FUSED_WIDTH}, and {} has {} \
@@ -135,18 +140,13 @@ pub(super) fn step_trips(fused: &Fused, sides: u32) -> u64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::policy::{Activation, Layer, OutputActivation};
+    use crate::policy::{Activation, Layer};
 
     /// A network of these widths, all of it 0.
     pub(in crate::backend::gpu) fn network(widths: &[usize]) -> Mlp {
-        let layer = |pair: &[usize]| Layer {
-            weight: vec![0.0; pair[0] * pair[1]],
-            bias: vec![0.0; pair[1]],
-            inputs: pair[0],
-            outputs: pair[1],
-        };
+        let layer = |pair: &[usize]| Layer::dense(vec![0.0; pair[0] * pair[1]], vec![0.0; pair[1]]);
         let layers = widths.windows(2).map(layer).collect();
-        Mlp::new(layers, Activation::Relu, OutputActivation::Tanh).expect("a whole network")
+        Mlp::new(layers, Activation::Relu, Activation::Tanh).expect("a whole network")
     }
 
     /// The forms of a network of these widths on an adapter with `bytes` of workgroup memory, each with

@@ -4,7 +4,8 @@
 use super::attempt::{COLUMN_UNIT, FORMULA_COLUMNS, Limit, MAX_TRIPS};
 use super::chunking::{MEMORY_BYTES, NETWORK_COLUMNS};
 use super::compose::{
-    PARTIAL_HEADER, WORKGROUP, input_quads, output_quads, parameter_quads, tile_steps,
+    PARTIAL_HEADER, WORKGROUP, input_quads, layer_dispatches, layer_trips, output_quads,
+    parameter_quads, tile_steps,
 };
 use super::listing::Adapter;
 use super::network::network_flops;
@@ -68,7 +69,7 @@ impl Size<'_> {
 
     /// Layers of all networks.
     fn layers(&self) -> u64 {
-        self.networks.into_iter().flatten().map(|mlp| mlp.layers().len() as u64).sum()
+        self.networks.into_iter().flatten().map(|mlp| layer_dispatches(mlp) as u64).sum()
     }
 
     /// Operations of one step of one sample: formulas, noise and networks.
@@ -226,8 +227,7 @@ fn update_trips(size: &Size<'_>, rounds: u32, steps: u64) -> u64 {
 /// Most steps of a dispatch of the rollout.
 fn rollout_steps(size: &Size<'_>) -> Result<u32> {
     let networked = size.networks.iter().any(Option::is_some);
-    let layers = size.networks.into_iter().flatten().flat_map(Mlp::layers);
-    let layer = layers.map(|layer| input_quads(layer.inputs) as u64).max().unwrap_or(0);
+    let layer = size.networks.into_iter().flatten().map(layer_trips).max().unwrap_or(0);
     if layer > MAX_TRIPS {
         return Err(too_long(layer));
     }

@@ -67,7 +67,7 @@ impl PlanCompiled {
             return Ok(Arc::clone(pipeline));
         }
         device.counters.add(Count::Text);
-        let layer = matches!(kernel, Kernel::HiddenLayer | Kernel::OutputLayer);
+        let layer = matches!(kernel, Kernel::Layer(_) | Kernel::Sums | Kernel::Norm(_));
         let (bindings, text) = match self.source.networks()[network].filter(|_| layer) {
             Some(mlp) => (kernel.bindings(false), layer_kernel(mlp, kernel)),
             None => (self.source.text.bindings(kernel), self.source.text.compose(kernel)),

@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::policy::{Layer, Mlp};
 
 /// Appends biases `[outputs / 4]`, then weights `[inputs / 4, outputs / 4]` in blocks of 4 columns
-/// of 4 neurons, padded with 0: a padded neuron stays 0 under every activation.
+/// of 4 neurons, padded with 0; then epsilon, factors and summands of its norm, if it has one.
 fn pack(layer: &Layer, out: &mut Vec<[f32; 4]>) {
     let neuron = |quad: usize, i: usize| Some(4 * quad + i).filter(|&row| row < layer.outputs);
     let quads = output_quads(layer.outputs);
@@ -32,6 +32,13 @@ fn pack(layer: &Layer, out: &mut Vec<[f32; 4]>) {
                 };
                 out.push(std::array::from_fn(|i| neuron(quad, i).map_or(0.0, weight)));
             }
+        }
+    }
+    if let Some(norm) = &layer.norm {
+        out.push([norm.epsilon, 0.0, 0.0, 0.0]);
+        for values in [&norm.scale, &norm.shift] {
+            let of = |quad, i| neuron(quad, i).map_or(0.0, |row| values[row]);
+            out.extend((0..quads).map(|quad| std::array::from_fn(|i| of(quad, i))));
         }
     }
 }
@@ -98,13 +105,12 @@ impl Layers {
         input: &Buffer,
         bind: impl Fn(Kernel, [&Buffer; 2]) -> Result<Bound>,
     ) -> Result<Vec<Bound>> {
-        let layer = |i: usize| {
-            let last = i + 1 == self.shapes.len();
-            let kernel = if last { Kernel::OutputLayer } else { Kernel::HiddenLayer };
+        let layers = self.shapes.iter().enumerate().flat_map(|(i, shape)| {
             let source = if i == 0 { input } else { &self.activations[(i + 1) % 2] };
-            bind(kernel, [source, &self.activations[i % 2]])
-        };
-        (0..self.shapes.len()).map(layer).collect()
+            let ends = [source, &self.activations[i % 2]];
+            shape.kernels().into_iter().map(move |kernel| (kernel, ends))
+        });
+        layers.map(|(kernel, ends)| bind(kernel, ends)).collect()
     }
 
     /// Adds the dispatches of all layers over the first `columns` columns, in rows of `row`.
@@ -127,8 +133,9 @@ pub(super) fn push_layers<'a>(
     columns: u32,
     row: u32,
 ) {
-    for (bound, layer) in bound.iter().zip(shapes) {
-        let params = Params {
+    let mut bound = bound.iter();
+    for layer in shapes {
+        let sums = Params {
             columns,
             stride: row,
             layer_offset: layer.offset,
@@ -137,9 +144,14 @@ pub(super) fn push_layers<'a>(
             layer_neurons: layer.neurons,
             ..Params::default()
         };
+        let norm = Params { layer_offset: layer.norm(), ..sums };
         let across = columns.div_ceil(WORKGROUP);
         let neurons = (layer.outputs / TILE_QUADS).div_ceil(TILE_PITCH);
-        batch.push(bound, &params, [across, neurons]);
+        let dispatches = [(sums, [across, neurons]), (norm, [across, 1])];
+        let count = layer.kernels().len();
+        for ((params, groups), bound) in dispatches[..count].iter().zip(bound.by_ref()) {
+            batch.push(bound, params, *groups);
+        }
     }
 }
 
@@ -147,17 +159,12 @@ pub(super) fn push_layers<'a>(
 mod tests {
     use super::*;
     use crate::backend::gpu::compose::parameter_quads;
-    use crate::policy::{Activation, OutputActivation};
+    use crate::policy::Activation;
 
     #[test]
     fn packed_by_columns_of_four_neurons() {
-        let layer = Layer {
-            weight: (0..15).map(|i| i as f32).collect(),
-            bias: vec![10.0, 20.0, 30.0],
-            inputs: 5,
-            outputs: 3,
-        };
-        let mlp = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Tanh).expect("whole");
+        let layer = Layer::dense((0..15).map(|i| i as f32).collect(), vec![10.0, 20.0, 30.0]);
+        let mlp = Mlp::new(vec![layer], Activation::Relu, Activation::Tanh).expect("whole");
         let packed = packed(&mlp);
         assert_eq!(packed.len(), parameter_quads(&mlp));
         assert_eq!(packed[0], [10.0, 20.0, 30.0, 0.0]);

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::compose::PlantText;
 use crate::error::Result;
 use crate::model::{Controller, Model, Plant};
-use crate::policy::Mlp;
+use crate::policy::{Layer, Mlp};
 
 /// Sources that are remembered.
 const REMEMBERED: usize = 16;
@@ -25,6 +25,7 @@ impl Source {
     /// # Errors
     /// [`crate::Error::Invalid`] where their parts do not fit.
     pub(super) fn new(model: &Model, controller: &Controller) -> Result<Self> {
+        let controller = &*controller.unmapped(model);
         let text = PlantText::new(model, controller)?;
         // In a chain it is one of the networks that are called.
         let driving = controller.shared_network().filter(|_| text.chain().is_none());
@@ -56,10 +57,24 @@ pub(super) fn same_bits(one: &Mlp, other: &Mlp) -> bool {
     let bits = |numbers: &[f32], others: &[f32]| {
         bytemuck::cast_slice::<f32, u32>(numbers) == bytemuck::cast_slice::<f32, u32>(others)
     };
+    let norms = |one: &Layer, other: &Layer| match (&one.norm, &other.norm) {
+        (None, None) => true,
+        (Some(one), Some(other)) => {
+            let epsilon = one.epsilon.to_bits() == other.epsilon.to_bits();
+            epsilon && bits(&one.scale, &other.scale) && bits(&one.shift, &other.shift)
+        }
+        _ => false,
+    };
+    let activations = |one: &Layer, other: &Layer| {
+        let [one, other] = [one, other].map(|layer| layer.activation);
+        one == other && bits(&one.parameters(), &other.parameters())
+    };
     let mut layers = one.layers().iter().zip(other.layers());
     one.widths() == other.widths()
-        && (one.activation(), one.output()) == (other.activation(), other.output())
-        && layers.all(|(a, b)| bits(&a.weight, &b.weight) && bits(&a.bias, &b.bias))
+        && layers.all(|(a, b)| {
+            let sums = bits(&a.weight, &b.weight) && bits(&a.bias, &b.bias);
+            sums && norms(a, b) && activations(a, b)
+        })
 }
 
 /// The sources that were asked for last.

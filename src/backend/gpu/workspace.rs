@@ -6,7 +6,7 @@ use super::chain::{BoundChain, ChainBinder, ChainBuffers, ChainStep};
 use super::chain_load::ChainLoad;
 use super::chunking::{Chunking, Work};
 use super::compiled::Compiled;
-use super::compose::{Kernel, PlantText, Slot};
+use super::compose::{Kernel, PlantText, Slot, layer_dispatches};
 use super::counting;
 use super::flight::Flight;
 use super::inputs::{InputSizes, Inputs};
@@ -84,7 +84,7 @@ impl Workspace {
         let (device, pool) = (&flight.device, flight.pool);
         let rows = compiled.text.rows();
         let (quads, chunking) = (compiled.text.states().div_ceil(4), shape.chunking);
-        let layers = network.map_or(0, |mlp| mlp.layers().len());
+        let layers = network.map_or(0, layer_dispatches);
         let chain = compiled.text.chain().map(ChainLoad::new);
         let chained = chain.map_or(0, |load| load.dispatches);
         // Each step with what its networks need; compaction or reduction.

@@ -16,7 +16,7 @@ use crate::config::Config;
 use crate::error::Result;
 use crate::files::{Existing, Staged, json};
 use crate::model::{Model, Plant};
-use crate::policy::{Activation, OutputActivation};
+use crate::policy::Activation;
 use crate::report::train_html;
 use crate::rollout::{Purpose, RolloutSpec, Stream};
 use crate::rounding::number;
@@ -92,7 +92,7 @@ impl Training<'_> {
         &self,
         inputs: Vec<[f32; 2]>,
         outputs: usize,
-        output: OutputActivation,
+        output: Activation,
         last: f32,
     ) -> Network {
         let hidden = self.settings.hidden.clone();
@@ -143,7 +143,7 @@ impl Training<'_> {
         task.check_room(&settings.hidden, settings.analytic.batch)?;
         let interface = task.interface.clone();
         let inputs = interface.intervals(&self.intervals(model)?);
-        let network = self.network(inputs, interface.outputs, OutputActivation::Tanh, LAST);
+        let network = self.network(inputs, interface.outputs, Activation::Tanh, LAST);
         // On a plant that is linear in the state, replayed controls deviate by the same under any
         // policy; on others this is the deviation under the untrained one.
         let policy = network.export(interface.order(model))?;
@@ -197,7 +197,7 @@ impl Training<'_> {
             device: self.device.clone(),
             seed: config.seed,
         };
-        let network = self.network(inputs, 1, OutputActivation::Identity, 1.0);
+        let network = self.network(inputs, 1, Activation::Identity, 1.0);
         let mut learner = Value::new(lesson, network, settings.value)?;
         self.train(&mut learner, settings.value.iterations, &program)
     }

@@ -2,18 +2,13 @@
 
 use super::*;
 use crate::formula::Scalar;
-use crate::policy::{Activation, Layer, OutputActivation};
+use crate::policy::{Activation, Layer};
 use crate::real::Real;
 
 /// A network of two numbers with two outputs, told from others by `scale`.
 fn network(scale: f32) -> Arc<Mlp> {
-    let layer = Layer {
-        weight: vec![scale, -0.5, 0.25, 2.0 * scale],
-        bias: vec![0.1, -scale],
-        inputs: 2,
-        outputs: 2,
-    };
-    Arc::new(Mlp::new(vec![layer], Activation::Tanh, OutputActivation::Tanh).expect("a network"))
+    let layer = Layer::dense(vec![scale, -0.5, 0.25, 2.0 * scale], vec![0.1, -scale]);
+    Arc::new(Mlp::new(vec![layer], Activation::Tanh, Activation::Tanh).expect("a network"))
 }
 
 /// What the chain gives for `inputs`, link by link.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::kind::Cast;
 use super::layers::MOST_LAYERS;
 use super::onnx::{Ends, Graph, Node, Shaped, Tensor};
-use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+use crate::policy::{Activation, Layer, Mlp};
 
 /// A step from the input to the output.
 enum Step {
@@ -22,7 +22,6 @@ struct Dense {
     /// `[outputs, inputs]`.
     weight: Vec<f32>,
     bias: Option<Vec<f32>>,
-    inputs: usize,
     outputs: usize,
 }
 
@@ -166,14 +165,14 @@ impl<'a> Walk<'a> {
         let &[rows, columns] = shape.as_slice() else {
             return Err(format!("`{name}` has shape {shape:?}; a weight has two dimensions"));
         };
-        let (inputs, outputs, weight) = match order {
-            Order::OutIn => (columns, rows, numbers),
+        let (outputs, weight) = match order {
+            Order::OutIn => (rows, numbers),
             Order::InOut => {
                 let row = |row| numbers[row..].iter().step_by(columns);
-                (rows, columns, (0..columns).flat_map(row).copied().collect())
+                (columns, (0..columns).flat_map(row).copied().collect())
             }
         };
-        Ok(Dense { name: name.clone(), weight, bias: None, inputs, outputs })
+        Ok(Dense { name: name.clone(), weight, bias: None, outputs })
     }
 
     /// The bias `name` of a layer with so many outputs.
@@ -214,10 +213,10 @@ fn unknown(node: &Node) -> String {
 /// The network of these steps: layers with the same activation between all of them.
 fn network(mut steps: Vec<Step>) -> Result<GraphNetwork, String> {
     let output = match steps.pop() {
-        Some(Step::Activation(Activation::Tanh)) => OutputActivation::Tanh,
+        Some(Step::Activation(Activation::Tanh)) => Activation::Tanh,
         Some(last @ Step::Dense(_)) => {
             steps.push(last);
-            OutputActivation::Identity
+            Activation::Identity
         }
         Some(Step::Activation(other)) => {
             return Err(format!("ends in {}; a policy ends in tanh or a layer", other.name()));
@@ -228,9 +227,9 @@ fn network(mut steps: Vec<Step>) -> Result<GraphNetwork, String> {
     for (i, step) in steps.into_iter().enumerate() {
         match step {
             Step::Dense(dense) if i % 2 == 0 => {
-                let Dense { name, weight, bias, inputs, outputs } = dense;
+                let Dense { name, weight, bias, outputs, .. } = dense;
                 let bias = bias.unwrap_or_else(|| vec![0.0; outputs]);
-                layers.push(Layer { weight, bias, inputs, outputs });
+                layers.push(Layer::dense(weight, bias));
                 names.push(name);
             }
             Step::Activation(activation) if i % 2 == 1 => {

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Activation, Layer, Mlp, OutputActivation};
+use super::{Activation, Layer, Mlp};
 use crate::error::{Error, Result};
 use crate::files;
 use checkpoint::{Checkpoint, Opened};
@@ -34,7 +34,7 @@ pub struct Request {
     /// Activation of the hidden layers.
     pub activation: Option<Activation>,
     /// Activation of the last layer.
-    pub output: Option<OutputActivation>,
+    pub output: Option<Activation>,
     /// What is done with floats of another width.
     pub cast: Cast,
 }
@@ -114,18 +114,16 @@ fn from_checkpoint(bytes: &[u8], request: &Request) -> std::result::Result<Impor
     let mut layers = Vec::new();
     for layer in &chosen {
         let bias = layer.bias.map(&mut numbers).transpose()?;
-        layers.push(Layer {
-            weight: numbers(layer.weight)?,
-            bias: bias.unwrap_or_else(|| vec![0.0; layer.outputs()]),
-            inputs: layer.inputs(),
-            outputs: layer.outputs(),
-        });
+        layers.push(Layer::dense(
+            numbers(layer.weight)?,
+            bias.unwrap_or_else(|| vec![0.0; layer.outputs()]),
+        ));
     }
     let names: Vec<String> = chosen.iter().map(|layer| layer.name.to_owned()).collect();
     let usual = match names.iter().any(|name| name.split('.').any(|key| key.starts_with("critic")))
     {
-        true => OutputActivation::Identity,
-        false => OutputActivation::Tanh,
+        true => Activation::Identity,
+        false => Activation::Tanh,
     };
     let origin = |stated: bool| if stated { Origin::Stated } else { Origin::Default };
     let network = Mlp::new(
@@ -152,11 +150,11 @@ fn as_stated(found: GraphNetwork, request: &Request) -> Result<Imported> {
         Err(Error::invalid(place, format!("{stated} is stated, the graph has {has}; leave it out")))
     };
     match (request.activation, request.output) {
-        (Some(stated), _) if stated != network.activation() => {
-            differs("activation", stated.name(), network.activation().name())
+        (Some(stated), _) if network.activation().is_none_or(|has| has != stated) => {
+            differs("activation", &stated.name(), &network.hidden_words())
         }
         (_, Some(stated)) if stated != network.output() => {
-            differs("output", stated.name(), network.output().name())
+            differs("output", &stated.name(), &network.output().name())
         }
         _ => Ok(Imported {
             network,

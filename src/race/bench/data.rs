@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::bench;
 use crate::error::{Error, Result};
-use crate::policy::{Activation, Layer, Mlp, OutputActivation};
+use crate::policy::{Activation, Layer, Mlp};
 use crate::race::cost::{Fence, LaneCost, RaceCost, RaceReference, Safety};
 use crate::race::system::DroneRace;
 use crate::rollout::{
@@ -98,15 +98,10 @@ fn random_network(widths: &[usize], seed: u64, number: u32) -> Result<Mlp> {
         let first = drawn;
         drawn += (inputs * outputs) as u64;
         let weight = |index| uniform.point(stream, index)[0];
-        Ok(Layer {
-            weight: (first..drawn).map(weight).collect(),
-            bias: vec![0.1; outputs],
-            inputs,
-            outputs,
-        })
+        Ok(Layer::dense((first..drawn).map(weight).collect(), vec![0.1; outputs]))
     };
     let layers = widths.windows(2).map(|pair| layer(pair[0], pair[1])).collect::<Result<_>>()?;
-    Mlp::new(layers, Activation::Relu, OutputActivation::Tanh)
+    Mlp::new(layers, Activation::Relu, Activation::Tanh)
 }
 
 /// [`STARTS`] starts near those of the study.

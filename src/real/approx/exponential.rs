@@ -36,11 +36,60 @@ const HALVINGS: [(f32, f32); 7] = [
 /// truth after rounding; saturates to 1 at 8.2, where the truth is 1.5e-7 below.
 #[inline(always)]
 pub(in crate::real) fn tanh<R: Real>(x: R) -> R {
-    let x = x.clamp(R::lit(-8.2), R::lit(8.2));
+    let x = x.clamp(R::lit(-SATURATED), R::lit(SATURATED));
+    let [above, below] = tanh_parts(x);
+    x * (above / below)
+}
+
+/// Where the hyperbolic tangent is 1.
+const SATURATED: f32 = 8.2;
+
+/// Numerator and denominator of `tanh(x) / x` for `|x|` up to 8.2.
+#[inline(always)]
+fn tanh_parts<R: Real>(x: R) -> [R; 2] {
     let square = x * x;
     let above = [1.0, 0.134_345_38, 0.003_559_528_6, 2.168_320_3e-5, 1.490_322_2e-8];
     let below = [1.0, 0.467_678_67, 0.026_119_178, 0.000_339_104_97, 8.396_420_4e-7];
-    x * (polynomial(square, above) / polynomial(square, below))
+    [polynomial(square, above), polynomial(square, below)]
+}
+
+/// `exp(x) - 1` of `x <= 0`: `2 t / (1 - t)` with `t = tanh(x / 2)`, a quotient of the same polynomials. No
+/// difference of it cancels.
+#[inline(always)]
+pub(in crate::real) fn exp_m1_negative<R: Real>(x: R) -> R {
+    let half = (R::lit(0.5) * x).clamp(R::lit(-SATURATED), R::lit(0.0));
+    let [above, below] = tanh_parts(half);
+    let share = half * above;
+    (share + share) / (below - share)
+}
+
+/// `ln(1 + e)` of `e = exp(-|x|)`: `2 atanh(r)` with `r = e / (2 + e)` up to 1/3, as a series, relative error
+/// 2e-8.
+#[inline(always)]
+pub(in crate::real) fn softplus_excess<R: Real>(x: R) -> R {
+    let e = (-x.abs()).exp_negative();
+    let ratio = e / (R::lit(2.0) + e);
+    let square = ratio * ratio;
+    let series =
+        polynomial(square, [1.0 / 3.0, 1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0]);
+    (ratio + ratio) * (R::lit(1.0) + square * series)
+}
+
+/// `erf(x / sqrt(2))` as the hyperbolic tangent of an odd polynomial, fitted to relative error 1e-7; 1 from 5.65
+/// on, where the truth is 1.6e-8 below.
+#[inline(always)]
+pub(in crate::real) fn normal_share<R: Real>(x: R) -> R {
+    let x = x.clamp(R::lit(-5.65), R::lit(5.65));
+    let series = [
+        0.79788463,
+        0.036334355,
+        -3.3917601e-05,
+        -5.4779685e-05,
+        3.8728052e-06,
+        -1.2524703e-07,
+        1.5673046e-09,
+    ];
+    tanh(x * polynomial(x * x, series))
 }
 
 /// Logistic function.

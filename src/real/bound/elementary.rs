@@ -3,6 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use super::interval::Interval;
+use crate::real::normal;
+pub(crate) use crate::real::normal::{normal, normal_density};
 
 /// Relative error allowed to the platform's functions: 8 units in the last place, where the
 /// libraries of the supported platforms state less than 2.
@@ -84,6 +86,17 @@ pub(crate) fn sigmoid(x: Interval) -> (Interval, Interval) {
     let ends = at(range.low).hull(at(range.high));
     let steepest = if range.contains(0.5) { 0.25 } else { ends.high.min(0.25) };
     (range, Interval::new(ends.low.max(0.0), steepest))
+}
+
+/// Shares of the standard normal distribution within the numbers of `x`, signed, and their slopes.
+pub(crate) fn normal_share(x: Interval) -> (Interval, Interval) {
+    // Its error is 20 times that of the functions of the platform.
+    let slack = Interval::new(1.0 - 40.0 * PLATFORM, 1.0 + 40.0 * PLATFORM);
+    let range = rising(x, normal::normal_share) * slack;
+    let slope = |x: f64| Interval::point(2.0 * normal_density(x)) * slack;
+    let most = if x.contains(0.0) { slope(0.0) } else { slope(x.smallest()) };
+    let slopes = Interval::new(slope(x.magnitude()).low.max(0.0), most.high);
+    (Interval::new(range.low.max(-1.0), range.high.min(1.0)), slopes)
 }
 
 /// Whether no angle of `x` is an odd quarter of a turn.

@@ -14,7 +14,6 @@ use std::rc::Rc;
 
 use super::Real;
 use super::approx::Exponent;
-pub(crate) use elementary::tanh;
 pub use interval::Interval;
 pub use pieces::{Caveats, Enclosure, Piece};
 
@@ -336,6 +335,22 @@ impl Real for Bound {
 
     fn exp_negative(self) -> Self {
         self.exp()
+    }
+
+    fn exp_m1_negative(self) -> Self {
+        Real::min(self, Self::lit(0.0)).exp() - Self::lit(1.0)
+    }
+
+    fn softplus_excess(self) -> Self {
+        (Self::lit(1.0) + (-self.abs()).exp()).ln()
+    }
+
+    fn normal_share(self) -> Self {
+        self.map(elementary::normal_share)
+    }
+
+    fn known_by(self, range: impl Fn(Interval) -> (Interval, Interval)) -> Option<Self> {
+        Some(self.map(range))
     }
 
     fn sigmoid(self) -> Self {

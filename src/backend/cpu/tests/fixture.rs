@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::Cpu;
 use crate::model::Plant;
-use crate::policy::{Activation, Layer, Mlp, OutputActivation, Policy};
+use crate::policy::{Activation, Layer, Mlp, Policy};
 use crate::race::system::DroneRace;
 use crate::real::Real;
 use crate::real::simd::Instructions;
@@ -59,7 +59,7 @@ pub(super) fn race_policy() -> Mlp {
 }
 
 /// A network with weights that keep the size of its activations, from a fixed generator.
-pub(super) fn network(widths: &[usize], activation: Activation, output: OutputActivation) -> Mlp {
+pub(super) fn network(widths: &[usize], activation: Activation, output: Activation) -> Mlp {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut number = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -67,12 +67,10 @@ pub(super) fn network(widths: &[usize], activation: Activation, output: OutputAc
     };
     let mut layer = |inputs: usize, outputs: usize| {
         let scale = (3.0 / inputs as f32).sqrt();
-        Layer {
-            weight: (0..inputs * outputs).map(|_| scale * number()).collect(),
-            bias: (0..outputs).map(|_| 0.1 * number()).collect(),
-            inputs,
-            outputs,
-        }
+        Layer::dense(
+            (0..inputs * outputs).map(|_| scale * number()).collect(),
+            (0..outputs).map(|_| 0.1 * number()).collect(),
+        )
     };
     let layers = widths.windows(2).map(|pair| layer(pair[0], pair[1])).collect();
     Mlp::new(layers, activation, output).expect("a valid network")

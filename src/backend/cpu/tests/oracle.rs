@@ -1,7 +1,7 @@
 //! Measures, signs and deviations against scalar loops in f32 and the reference in f64.
 
 use super::fixture::*;
-use crate::policy::{Activation, Mlp, OutputActivation, Policy};
+use crate::policy::{Activation, Mlp, Policy};
 use crate::race::system::DroneRace;
 use crate::rollout::{
     DeviationTask, Farthest, Fold, PairControl, PairMeasure, Query, RolloutSpec, Tightening, replay,
@@ -15,7 +15,7 @@ fn networks() -> Vec<Mlp> {
         [&[12, 3], &[12, 1, 3], &[12, 3, 7, 3], &[12, 64, 64, 3], &[12, 100, 17, 3]];
     for widths in shapes {
         for activation in [Activation::Relu, Activation::Tanh, Activation::Silu] {
-            for output in [OutputActivation::Tanh, OutputActivation::Identity] {
+            for output in [Activation::Tanh, Activation::Identity] {
                 networks.push(network(widths, activation, output));
             }
         }

@@ -6,7 +6,7 @@ use super::fixture::*;
 use crate::backend::Backend;
 use crate::error::Error;
 use crate::model::Plant;
-use crate::policy::{Activation, Mlp, OutputActivation};
+use crate::policy::{Activation, Mlp};
 use crate::rollout::{
     DeviationTask, Farthest, PairControl, Query, ReachAvoidTask, Starts, Tightening,
 };
@@ -23,7 +23,7 @@ fn ranges(cuts: &[u64]) -> Vec<Range<u64>> {
 
 #[test]
 fn measures_and_signs_do_not_depend_on_threads_or_place() {
-    let odd = network(&[12, 7, 100, 3], Activation::Silu, OutputActivation::Tanh);
+    let odd = network(&[12, 7, 100, 3], Activation::Silu, Activation::Tanh);
     for plant in [race_under(odd), race_under(race_policy())] {
         for query in [Query::Measure, Query::Sign] {
             let whole = bits(&race(&cpu(1), &plant, 0..COUNT, query));
@@ -99,7 +99,7 @@ fn physics_is_the_same_on_all_instructions() {
 
 #[test]
 fn fused_kernels_agree_to_the_bit() {
-    let policy = network(&[12, 100, 3, 3], Activation::Tanh, OutputActivation::Identity);
+    let policy = network(&[12, 100, 3, 3], Activation::Tanh, Activation::Identity);
     let plant = race_under(policy);
     let mut cpus = every_cpu();
     let baseline = cpus.pop().expect("baseline instructions are always there");
@@ -155,7 +155,7 @@ fn wrong_tasks_are_refused() {
     let none = Tightening::none(&spec);
     assert_eq!(run(5, &none, &policy), None);
     let short = Tightening { target: vec![0.0; 30], ..none.clone() };
-    let wide = network(&[12, 4], Activation::Relu, OutputActivation::Tanh);
+    let wide = network(&[12, 4], Activation::Relu, Activation::Tanh);
     let cases = [
         (run(6, &none, &policy), "the list has 5 starts"),
         (run(5, &short, &policy), "30 values, expected 31"),

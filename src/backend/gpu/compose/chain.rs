@@ -251,7 +251,7 @@ impl Printer<'_> {
     /// The networks behind a link.
     fn asks(&mut self, link: &Link) -> Vec<AskShape> {
         let shape = |ask: &Ask| {
-            let known = self.networks.iter().position(|known| Arc::ptr_eq(known, &ask.network));
+            let known = self.networks.iter().position(|known| known.is_same(&ask.network));
             let network = known.unwrap_or_else(|| {
                 self.networks.push(Arc::clone(&ask.network));
                 self.networks.len() - 1

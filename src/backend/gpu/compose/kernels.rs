@@ -36,10 +36,12 @@ pub enum Kernel {
     Observe,
     /// Evaluates the part of that number of formulas that call networks.
     Link(u32),
-    /// A hidden layer of the network.
-    HiddenLayer,
-    /// The last layer of the network.
-    OutputLayer,
+    /// A layer of the network, with the activation of that number of its kinds.
+    Layer(u32),
+    /// A layer of the network without what comes behind its sums.
+    Sums,
+    /// The norm of a layer and its activation, of that number of the kinds of the network.
+    Norm(u32),
     /// Puts the samples of MPPI problems at their starts.
     MppiStart,
     /// Rolls the samples of MPPI problems and adds up their costs.
@@ -145,7 +147,7 @@ pub enum Slot {
 }
 
 impl Kernel {
-    /// The kernels of measures, pairs and networks.
+    /// The kernels of measures, pairs and networks, those of layers for a network with two activations.
     pub const ROLLOUT: [Self; 11] = [
         Self::Sample,
         Self::ReachAvoid,
@@ -155,8 +157,8 @@ impl Kernel {
         Self::Reduce,
         Self::Count,
         Self::CountPairs,
-        Self::HiddenLayer,
-        Self::OutputLayer,
+        Self::Layer(0),
+        Self::Layer(1),
         Self::Observe,
     ];
 
@@ -179,7 +181,8 @@ impl Kernel {
             Self::CountPairs => "count_pairs",
             Self::Observe => "observe",
             Self::Link(_) => "link",
-            Self::HiddenLayer | Self::OutputLayer => "mlp",
+            Self::Layer(_) | Self::Sums => "mlp",
+            Self::Norm(_) => "norm",
             Self::MppiStart => "mppi_start",
             Self::MppiRollout => "mppi_rollout",
             Self::MppiTerminal => "mppi_terminal",
@@ -238,9 +241,10 @@ impl Kernel {
             Self::Count | Self::CountPairs => &[(S::Measures, Read), (S::Counts, ReadWrite)],
             Self::Observe => &[(S::State, Read), (S::Sink, ReadWrite)],
             Self::Link(_) => &[(S::State, Read), (S::Kept, ReadWrite)],
-            Self::HiddenLayer | Self::OutputLayer => {
+            Self::Layer(_) | Self::Sums => {
                 &[(S::Weights, Read), (S::Source, Read), (S::Sink, ReadWrite)]
             }
+            Self::Norm(_) => &[(S::Weights, Read), (S::Sink, ReadWrite)],
             Self::MppiStart => &[(S::Starts, Read), (S::State, ReadWrite), (S::Totals, ReadWrite)],
             Self::MppiRollout => &[
                 (S::Streams, Read),

@@ -21,7 +21,9 @@ pub use fused::{Form, Fused};
 pub use kernels::{
     Access, COUNTED, Kernel, PARTIAL_HEADER, Slot, TILE_COLUMNS, TILE_PITCH, TILE_QUADS, WORKGROUP,
 };
-pub(super) use layers::{LayerShape, input_quads, output_quads, parameter_quads};
+pub(super) use layers::{
+    LayerShape, input_quads, layer_dispatches, layer_trips, output_quads, parameter_quads,
+};
 pub use limits::limit_kernel;
 pub use mppi::MppiText;
 pub(super) use mppi::tile_steps;

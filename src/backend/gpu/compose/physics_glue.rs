@@ -2,7 +2,7 @@
 
 use super::fused::Fused;
 use super::kernels::Slot;
-use super::layers::Activations;
+use super::layers::Kinds;
 use crate::backend::physics::{Function, Part, Physics, Role};
 use crate::model::share;
 use crate::policy::Mlp;
@@ -27,10 +27,10 @@ pub(super) struct Outline {
 }
 
 /// What the texts have of the network that drives.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct DrivingNetwork {
-    /// Activation of hidden layers and of the last one.
-    pub(super) activations: Activations,
+    /// What comes behind the sums of its layers.
+    pub(super) kinds: Kinds,
     /// Numbers that it sees.
     pub(super) inputs: usize,
     /// Numbers that it says.
@@ -44,7 +44,7 @@ impl DrivingNetwork {
     pub(super) fn new(mlp: &Mlp) -> Self {
         let widths = mlp.widths();
         Self {
-            activations: Activations::of(mlp),
+            kinds: Kinds::of(mlp),
             inputs: widths[0],
             outputs: widths[widths.len() - 1],
             fused: None,

@@ -188,9 +188,9 @@ impl PlantText {
             }
             Kernel::Compact => vec![folds(), COMPACT.to_owned()],
             Kernel::Reduce => vec![REDUCE.to_owned()],
-            Kernel::HiddenLayer | Kernel::OutputLayer => {
-                let activations = self.outline.driving.as_ref().map(|driving| driving.activations);
-                vec![layer_text(activations, kernel == Kernel::OutputLayer)]
+            Kernel::Layer(_) | Kernel::Sums | Kernel::Norm(_) => {
+                let kinds = self.outline.driving.as_ref().map(|driving| driving.kinds.clone());
+                vec![layer_text(&kinds.unwrap_or_default(), kernel)]
             }
             Kernel::Observe => vec![self.observation(), OBSERVE.to_owned()],
             Kernel::Link(number) if self.chain.is_some() => {
@@ -331,7 +331,7 @@ impl PlantText {
                 + NOTHING_TO_BEGIN;
         };
         if let Some(fused) = &driving.fused {
-            return fused_text(driving.activations, fused, driving.outputs);
+            return fused_text(fused, driving.outputs);
         }
         let slot = Slot::Control as u32;
         let mut text = format!(
@@ -348,10 +348,10 @@ impl PlantText {
     }
 }
 
-/// The WGSL module of a hidden or the last layer of `mlp`, whoever it drives.
+/// The WGSL module of `kernel`, one of those of the layers of `mlp`, whoever it drives.
 pub(in super::super) fn layer_kernel(mlp: &Mlp, kernel: Kernel) -> String {
-    let DrivingNetwork { activations, inputs, outputs, .. } = DrivingNetwork::new(mlp);
-    let text = layer_text(Some(activations), kernel == Kernel::OutputLayer);
+    let DrivingNetwork { kinds, inputs, outputs, .. } = DrivingNetwork::new(mlp);
+    let text = layer_text(&kinds, kernel);
     [constants(inputs, outputs), PARAMS.to_owned(), CHOICES.to_owned(), text].join("\n")
 }
 

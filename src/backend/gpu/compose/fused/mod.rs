@@ -15,11 +15,12 @@ pub use network::Fused;
 pub(in crate::backend::gpu) use shape::packed;
 
 use super::glue::component;
-use super::layers::{Activations, recorded_activations};
+use super::layers::recorded_activation;
+use crate::policy::Activation;
 
 /// `drive` by a network that the rollout runs itself, and `begin_drive`, which every thread calls once
 /// before.
-pub(super) fn fused_text(activations: Activations, fused: &Fused, outputs: usize) -> String {
+pub(super) fn fused_text(fused: &Fused, outputs: usize) -> String {
     let layers = match fused.form() {
         Form::Tiles { .. } | Form::Slices { .. } => tiles::text(fused),
         Form::Rows { .. } => rows::text(fused),
@@ -31,8 +32,29 @@ pub(super) fn fused_text(activations: Activations, fused: &Fused, outputs: usize
         all.join(", ")
     );
     let weights = "@group(0) @binding(14) var<storage, read> weights: array<vec4<f32>>;\n";
-    [recorded_activations(Some(activations)), weights.to_owned(), layers, outputs, DRIVE.to_owned()]
-        .join("\n")
+    [activations(fused), weights.to_owned(), layers, outputs, DRIVE.to_owned()].join("\n")
+}
+
+/// `hidden_activation` and `output_activation`. Where hidden layers differ, the first is told which, and each has one
+/// by its number besides.
+fn activations(fused: &Fused) -> String {
+    let output = recorded_activation("output_activation", fused.output());
+    let hidden = match fused.hidden_activations() {
+        [] => recorded_activation("hidden_activation", Activation::Identity),
+        [shared] => recorded_activation("hidden_activation", *shared),
+        several => {
+            let name = |number: usize| format!("hidden_activation_{number}");
+            let each = several.iter().enumerate();
+            let each = each.map(|(number, one)| recorded_activation(&name(number), *one));
+            let mut text = each.collect::<Vec<_>>().join("\n");
+            text += "\nfn hidden_activation(number: u32, x: f32) -> f32 {\n    switch number {\n";
+            for number in 1..several.len() {
+                text += &format!("        case {number}u: {{ return {}(x); }}\n", name(number));
+            }
+            text + &format!("        default: {{ return {}(x); }}\n    }}\n}}\n", name(0))
+        }
+    };
+    [hidden, output].join("\n")
 }
 
 /// Who calls it calls it with all threads; threads from `COLUMNS` on only help.

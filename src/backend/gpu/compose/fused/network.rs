@@ -1,27 +1,44 @@
 //! A network that the rollouts run themselves: its layers, and how the threads share them.
 
 use super::form::Form;
-use super::shape::FusedLayer;
-use crate::policy::Mlp;
+use super::shape::{FusedLayer, hidden_activations};
+use crate::policy::{Activation, Mlp};
 
 /// Bytes of a vector of 4 numbers.
 const VECTOR_BYTES: u64 = 16;
 
 /// The layers of a network that the rollouts run themselves, all steps in one dispatch.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Fused {
     pub(super) layers: Vec<FusedLayer>,
+    /// Of the hidden layers, each once.
+    hidden: Vec<Activation>,
+    /// Of the last layer.
+    output: Activation,
     /// Numbers that the network sees.
     inputs: u32,
     form: Form,
 }
 
 impl Fused {
-    /// All layers of `mlp`, shared as `form` says; none where the network has no such form.
+    /// All layers of `mlp`, shared as `form` says; none where the network has no such form, or norms, which need all
+    /// sums of a layer at once.
     pub fn new(mlp: &Mlp, form: Form) -> Option<Self> {
         let layers = FusedLayer::of(mlp);
         let inputs = mlp.widths()[0] as u32;
-        form.fits(&layers).then_some(Self { layers, inputs, form })
+        let fits = !mlp.has_norm() && form.fits(&layers);
+        let (hidden, output) = (hidden_activations(mlp), mlp.output());
+        fits.then_some(Self { layers, hidden, output, inputs, form })
+    }
+
+    /// Activations of the hidden layers, each once.
+    pub(super) fn hidden_activations(&self) -> &[Activation] {
+        &self.hidden
+    }
+
+    /// The activation of the last layer.
+    pub(super) fn output(&self) -> Activation {
+        self.output
     }
 
     /// How the threads share them.

@@ -106,7 +106,11 @@ fn layer(fused: &Fused, number: usize) -> String {
     for c in 0..fused.trajectories() {
         let padded = layer.neurons != 4 * layer.quads;
         let neurons = format!("{}u", layer.neurons);
-        let value = masked(&format!("hidden_activation(s_{c})"), "lane", &neurons, padded);
+        let activated = match fused.hidden_activations() {
+            [_] => format!("hidden_activation(s_{c})"),
+            _ => format!("hidden_activation_{}(s_{c})", layer.activation),
+        };
+        let value = masked(&activated, "lane", &neurons, padded);
         // As in the tiles, neighbours write the parts of a vector.
         let place = format!("{to}[{c}u * INPUT_QUADS + lane / 4u][lane % 4u]");
         text += &format!("        {place} = {value};\n");

@@ -1,6 +1,6 @@
 //! Where the parameters of a fused network lie.
 
-use crate::policy::{Layer, Mlp};
+use crate::policy::{Activation, Layer, Mlp};
 
 /// Inputs and neurons of a layer are padded to a multiple of it.
 pub(super) const BLOCK: u32 = 8;
@@ -16,16 +16,32 @@ pub(in crate::backend::gpu) struct FusedLayer {
     pub(super) quads: u32,
     /// Neurons, without those that pad them.
     pub(super) neurons: u32,
+    /// Which of the activations of the hidden layers it has, if it is one.
+    pub(super) activation: u32,
+}
+
+/// The activations of the hidden layers of `mlp`, each once, in order of the first layer that has it.
+pub(super) fn hidden_activations(mlp: &Mlp) -> Vec<Activation> {
+    let (_, hidden) = mlp.layers().split_last().expect("a network has a layer");
+    let mut found = Vec::new();
+    for layer in hidden {
+        if !found.contains(&layer.activation) {
+            found.push(layer.activation);
+        }
+    }
+    found
 }
 
 impl FusedLayer {
     /// The layers of `mlp`, one after the other.
     pub(in crate::backend::gpu) fn of(mlp: &Mlp) -> Vec<Self> {
-        let mut offset = 0;
+        let (mut offset, hidden) = (0, hidden_activations(mlp));
         let shape = |layer: &Layer| {
+            let known = hidden.iter().position(|one| *one == layer.activation);
             let depth = (layer.inputs as u32).next_multiple_of(BLOCK);
             let quads = (layer.outputs as u32).next_multiple_of(BLOCK) / 4;
-            let shape = Self { offset, depth, quads, neurons: layer.outputs as u32 };
+            let activation = known.unwrap_or(0) as u32;
+            let shape = Self { offset, depth, quads, neurons: layer.outputs as u32, activation };
             offset = shape.end();
             shape
         };
@@ -73,19 +89,17 @@ pub(super) fn pads(hidden: &[FusedLayer]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::policy::{Activation, OutputActivation};
+    use crate::policy::Activation;
 
     #[test]
     fn packed_by_inputs() {
-        let layer = Layer {
-            weight: (0..15).map(|i| i as f32).collect(),
-            bias: vec![10.0, 20.0, 30.0],
-            inputs: 5,
-            outputs: 3,
-        };
-        let mlp = Mlp::new(vec![layer], Activation::Relu, OutputActivation::Tanh).expect("whole");
+        let layer = Layer::dense((0..15).map(|i| i as f32).collect(), vec![10.0, 20.0, 30.0]);
+        let mlp = Mlp::new(vec![layer], Activation::Relu, Activation::Tanh).expect("whole");
         let (packed, shapes) = (packed(&mlp), FusedLayer::of(&mlp));
-        assert_eq!(shapes, [FusedLayer { offset: 0, depth: 8, quads: 2, neurons: 3 }]);
+        assert_eq!(
+            shapes,
+            [FusedLayer { offset: 0, depth: 8, quads: 2, neurons: 3, activation: 0 }]
+        );
         assert_eq!(packed.len(), shapes[0].end() as usize);
         assert_eq!(packed[..2], [[10.0, 20.0, 30.0, 0.0], [0.0; 4]], "biases");
         assert_eq!(packed[2 + 2], [1.0, 6.0, 11.0, 0.0], "input 1");

@@ -12,9 +12,10 @@ const PARTS: [&str; 4] = ["x", "y", "z", "w"];
 
 /// `put_inputs`, `begin_drive` and `run_hidden`.
 pub(super) fn text(fused: &Fused) -> String {
-    let tile = Tile { form: fused.form(), loads: loads(fused) };
+    let several = fused.hidden_activations().len() > 1;
+    let tile = Tile { form: fused.form(), loads: loads(fused), several };
     let staged = matches!(fused.form(), Form::Slices { .. });
-    let mut text = sizes(fused) + &inputs(fused) + &layer_table(fused.hidden());
+    let mut text = sizes(fused) + &inputs(fused) + &layer_table(fused.hidden(), several);
     if staged {
         text += &slice_memory(fused);
     }
@@ -46,10 +47,11 @@ fn sizes(fused: &Fused) -> String {
         "const COLUMN_QUADS: u32 = {}u;\nconst PITCH: u32 = {}u;\n\
          var<workgroup> activations: array<vec4<f32>, {}>;\n\
          struct Layer {{\n    // Of the biases, which [depth, quads] vectors of weights follow.\n    \
-         offset: u32,\n    depth: u32,\n    quads: u32,\n    neurons: u32,\n}}\n",
+         offset: u32,\n    depth: u32,\n    quads: u32,\n    neurons: u32,\n{}}}\n",
         trajectories / 4,
         trajectories / fused.form().tile_columns(),
         rows * trajectories / 4,
+        if fused.hidden_activations().len() > 1 { "    activation: u32,\n" } else { "" },
     )
 }
 
@@ -68,12 +70,14 @@ fn inputs(fused: &Fused) -> String {
 }
 
 /// `layer_at`: the hidden layers by number.
-fn layer_table(hidden: &[FusedLayer]) -> String {
+fn layer_table(hidden: &[FusedLayer], several: bool) -> String {
     let mut text = String::from("fn layer_at(number: u32) -> Layer {\n    switch number {\n");
-    for (number, FusedLayer { offset, depth, quads, neurons }) in hidden.iter().enumerate() {
+    for (number, layer) in hidden.iter().enumerate() {
+        let FusedLayer { offset, depth, quads, neurons, activation } = layer;
+        let activation = if several { format!(", {activation}u") } else { String::new() };
         let last = number + 1 == hidden.len();
         let case = if last { "default".to_owned() } else { format!("case {number}u") };
-        let layer = format!("Layer({offset}u, {depth}u, {quads}u, {neurons}u)");
+        let layer = format!("Layer({offset}u, {depth}u, {quads}u, {neurons}u{activation})");
         text += &format!("        {case}: {{ return {layer}; }}\n");
     }
     if hidden.is_empty() {
@@ -116,6 +120,8 @@ struct Tile {
     form: Form,
     /// Vectors of a slice that a thread loads.
     loads: u32,
+    /// Whether layers say which activation is theirs.
+    several: bool,
 }
 
 impl Tile {
@@ -219,7 +225,8 @@ impl Tile {
             let neuron = format!("4u * ({}u * span + down) + {}u", i / 4, i % 4);
             text += &format!("        let n_{i} = {neuron};\n");
             for quad in 0..self.across() {
-                let sum = |j: u32| format!("hidden_activation(a_{i}_{})", 4 * quad + j);
+                let which = if self.several { "layer.activation, " } else { "" };
+                let sum = |j: u32| format!("hidden_activation({which}a_{i}_{})", 4 * quad + j);
                 let value = |j| masked(&sum(j), &format!("n_{i}"), "layer.neurons", padded);
                 let values = [0, 1, 2, 3].map(value).join(", ");
                 let place = format!("n_{i} * COLUMN_QUADS + across + {quad}u * PITCH");
