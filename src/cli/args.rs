@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::effort::USUAL;
+use super::export::Target;
 use super::falsify::FalsifyArguments;
 use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
@@ -225,7 +226,7 @@ Examples:
         #[command(flatten, next_help_heading = "Configuration")]
         changes: Changes,
     },
-    /// Import a policy from PyTorch or ONNX, or tell what is in a policy file
+    /// Import a policy of another program, evaluate or export one, or tell what is in it
     #[command(subcommand)]
     Policy(PolicyCommand),
     /// Tell how many scenarios a claim needs
@@ -276,6 +277,12 @@ impl Command {
             Self::Policy(PolicyCommand::Import(asked)) => {
                 own(no_seed(&asked.keys), &asked.out, asked.replace)
             }
+            Self::Policy(PolicyCommand::Eval(asked)) => {
+                own(Changes::default(), &None, asked.replace)
+            }
+            Self::Policy(PolicyCommand::Export(asked)) => {
+                own(Changes::default(), &asked.out, asked.replace)
+            }
             Self::Policy(PolicyCommand::Inspect { changes, .. }) => {
                 Own { changes: changes.clone(), ..Own::default() }
             }
@@ -313,12 +320,14 @@ pub(super) struct BenchArguments {
 /// What is done with a policy file.
 #[derive(Debug, Subcommand)]
 pub(super) enum PolicyCommand {
-    /// Write a dense network of a PyTorch checkpoint or an ONNX graph as a policy file
+    /// Write a dense network of another program as a policy file
     ///
-    /// Nothing in the file is executed. A checkpoint (.pth, .pt) holds a state dict, or dictionaries
-    /// with state dicts in them; its layers are applied in the order of the file. It does not say
-    /// what lies between them: --activation and --output do. An ONNX graph (.onnx) says it: Gemm,
-    /// MatMul and Add, Relu, Tanh, Sigmoid and Mul (SiLU).
+    /// Nothing in the file is executed. Read are checkpoints of PyTorch (.pth, .pt, .ckpt; TorchScript; before
+    /// 1.6), models of stable-baselines3 (.zip), parameters of JAX (pickles of Brax and flax), safetensors of any
+    /// names, ONNX graphs (.onnx), .nnet, and the texts of Sherlock and POLAR. Where a library's layout is recognised
+    /// (stable-baselines3, rsl_rl, rl_games, CleanRL, tianshou, omnisafe, safe-control-gym, Brax and others), its
+    /// layers, normalisers and activations are taken, and said. What would be lost is refused, unless --network asks
+    /// for the layers by name. docs/import.md has all of it.
     #[command(after_help = "\
 A network is what stands before the layers' own names: `actor` of `actor.0.weight`, and of
 `actor.preprocess.model.model.0.weight` and `actor.last.model.0.weight` as tianshou names them. If
@@ -326,11 +335,23 @@ there are several, they are listed, and --network names one. A critic takes the 
 controls of both players.
 
 Examples:
+  reachcast policy import model.zip --out policy.safetensors
   reachcast policy import actor.pth --out policy.safetensors --config configs/race.toml
   reachcast policy import policy.pth --network actor1_old --out policy.safetensors
   reachcast policy import ppo.pt --network net.body,net.mean --activation tanh --out ppo.safetensors
   reachcast policy import policy.onnx --out policy.safetensors")]
     Import(ImportArguments),
+    /// Evaluate a policy file at inputs from a .npy file
+    #[command(after_help = "\
+Example:
+  reachcast policy eval policy.safetensors --inputs x.npy --outputs u.npy")]
+    Eval(EvalArguments),
+    /// Write a policy file as an ONNX graph or as NumPy arrays
+    #[command(after_help = "\
+Examples:
+  reachcast policy export policy.safetensors --to onnx --out policy.onnx
+  reachcast policy export policy.safetensors --to npz --out policy.npz")]
+    Export(ExportArguments),
     /// Tell widths, parameters, a Lipschitz bound and the range of actions of a policy file
     #[command(after_help = "\
 The Lipschitz bound is the product of the layers' spectral norms, never below the true constant.
@@ -351,18 +372,49 @@ Example:
     },
 }
 
+/// What `policy eval` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(super) struct EvalArguments {
+    /// Policy (.safetensors)
+    pub(super) file: PathBuf,
+    /// Inputs, f32 or f64 of shape [N, inputs] or [inputs] (.npy)
+    #[arg(long, value_name = "FILE")]
+    pub(super) inputs: PathBuf,
+    /// The outputs to write, f32 of shape [N, outputs] or [outputs] (.npy)
+    #[arg(long, value_name = "FILE")]
+    pub(super) outputs: PathBuf,
+    #[command(flatten)]
+    pub(super) replace: Replace,
+}
+
+/// What `policy export` is asked for.
+#[derive(Args, Clone, Debug)]
+pub(super) struct ExportArguments {
+    /// Policy (.safetensors)
+    pub(super) file: PathBuf,
+    /// What to write
+    #[arg(long, value_enum)]
+    pub(super) to: Target,
+    /// The file to write, OUT.onnx or OUT.npz
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) replace: Replace,
+}
+
 /// What `policy import` is asked for.
 #[derive(Args, Clone, Debug)]
 pub(super) struct ImportArguments {
-    /// Checkpoint (.pth, .pt) or graph (.onnx)
+    /// File of another program: checkpoint, model, parameters, graph or text
     pub(super) file: PathBuf,
-    /// Prefix of the names of the network's layers; several, separated by commas, are joined
+    /// Prefix of the names of the network's layers, which are imported alone; several, separated by
+    /// commas, are joined; of a graph with several outputs, the name of one
     #[arg(long, value_name = "PREFIX", value_delimiter = ',')]
     pub(super) network: Vec<String>,
-    /// Activation of the hidden layers of a checkpoint, `elu` or `leaky_relu(0.2)` [default: relu]
+    /// Activation of the hidden layers, `elu` or `leaky_relu(0.2)` [default: that of the library, else relu]
     #[arg(long, value_name = "WORD")]
     pub(super) activation: Option<Activation>,
-    /// Activation of its last layer [default: tanh; identity for a critic]
+    /// Activation of its last layer [default: that of the library, else tanh; identity for a critic]
     #[arg(long, value_name = "WORD")]
     pub(super) output: Option<Activation>,
     /// Names of the inputs, separated by commas

@@ -6,6 +6,8 @@ mod caveats;
 mod certify;
 pub(crate) mod devices;
 mod effort;
+mod evaluate;
+mod export;
 mod falsified;
 mod falsify;
 mod init;
@@ -95,6 +97,8 @@ fn dispatch(registry: &Registry, arguments: &Arguments) -> Result<Outcome> {
         Command::Study(asked) => asked.run(global),
         Command::Train { config, method, .. } => train::run(global, config, *method),
         Command::Policy(PolicyCommand::Import(asked)) => policy::import(global, asked),
+        Command::Policy(PolicyCommand::Eval(asked)) => evaluate::run(global, asked),
+        Command::Policy(PolicyCommand::Export(asked)) => export::run(global, asked),
         Command::Policy(PolicyCommand::Inspect { file, config, .. }) => {
             policy::inspect(global, file, config.as_deref())
         }

@@ -20,8 +20,8 @@ use crate::system::Axis;
 
 /// Ending of policy files.
 const ENDING: &str = "safetensors";
-/// Tensors that a line lists.
-const LISTED: usize = 8;
+/// Tensors, or groups of them, that a line lists.
+const LISTED: usize = 12;
 /// Random states that the range of actions is seen over.
 const SAMPLES: u64 = 16_384;
 /// States that are evaluated side by side.
@@ -56,6 +56,10 @@ struct Import {
     layers: Vec<String>,
     /// Names of the tensors in the file that are no part of it.
     left_out: Vec<String>,
+    /// The library or format whose layout the file has.
+    layout: Option<String>,
+    /// What else was made of the file, and what its library does that is not in it.
+    notes: Vec<String>,
     widths: Vec<usize>,
     activation: String,
     activation_from: Origin,
@@ -88,6 +92,8 @@ pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome
         out: out.display().to_string(),
         layers: found.layers,
         left_out: found.left_out,
+        layout: found.layout,
+        notes: found.notes,
         widths: network.widths(),
         activation: network.hidden_words(),
         activation_from: found.activation_from,
@@ -147,22 +153,27 @@ fn as_flag(error: Error) -> Error {
 
 /// What was imported, and what the file did not say.
 fn import_text(import: &Import) -> String {
-    let from = |origin: Origin, flag: &str| match origin {
-        Origin::File => "as the graph has it".to_owned(),
-        Origin::Stated => "as stated".to_owned(),
-        Origin::Default => format!("the default: the file does not say, --{flag} does"),
+    let layout = import.layout.as_deref();
+    let from = |origin: Origin, flag: &str| match (origin, layout) {
+        (Origin::File, _) => "as the file has it".to_owned(),
+        (Origin::Stated, _) => "as stated".to_owned(),
+        (Origin::Layout, Some(layout)) => {
+            format!("as {layout} has it by default; --{flag} states another")
+        }
+        _ => format!("the default: the file does not say, --{flag} does"),
     };
     let inputs = import.state_order.as_ref().map(|names| names.join(","));
     format!(
         "{}: network {}, {} parameters\n\
-         layers      {}\n\
+         {}layers      {}\n\
          activation  {} ({})\n\
          output      {} ({})\n\
          inputs      {}\n\
-         digest      {}\n{}",
+         digest      {}\n{}{}",
         import.out,
         widths(&import.widths),
         import.parameter_count,
+        layout.map_or(String::new(), |layout| format!("layout      {layout}\n")),
         import.layers.join(", "),
         import.activation,
         from(import.activation_from, "activation"),
@@ -170,6 +181,7 @@ fn import_text(import: &Import) -> String {
         from(import.output_from, "output"),
         inputs.as_deref().unwrap_or("not named; --config or --state-order names them"),
         import.digest,
+        import.notes.iter().map(|note| format!("note        {note}\n")).collect::<String>(),
         left_out(&import.left_out),
     )
 }
@@ -179,18 +191,44 @@ fn left_out(names: &[String]) -> String {
     if names.is_empty() {
         return String::new();
     }
-    let listed: Vec<&str> = names.iter().take(LISTED).map(String::as_str).collect();
-    let more = match names.len() - listed.len() {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
     format!(
-        "left out    {}{more}\n\
+        "left out    {}\n\
          note: these tensors of the file are no part of the policy; if some of them act on its \
          inputs or outputs (statistics that normalise observations do), it is another policy \
          without them\n",
-        listed.join(", ")
+        grouped(names).join(", ")
     )
+}
+
+/// All names, those that begin alike together where there are many.
+fn grouped(names: &[String]) -> Vec<String> {
+    if names.len() <= LISTED {
+        return names.to_vec();
+    }
+    let deepest = names.iter().map(|name| name.split('.').count()).max().unwrap_or(1);
+    let at = |depth: usize| groups(names, depth);
+    (1..=deepest)
+        .map(at)
+        .take_while(|groups| groups.len() <= LISTED)
+        .last()
+        .unwrap_or_else(|| at(1))
+}
+
+/// The names that share their first `depth` keys, as these and their number.
+fn groups(names: &[String], depth: usize) -> Vec<String> {
+    let mut groups: Vec<(String, usize)> = Vec::new();
+    for name in names {
+        let group = name.split('.').take(depth).collect::<Vec<_>>().join(".");
+        match groups.iter_mut().find(|(known, _)| *known == group) {
+            Some((_, count)) => *count += 1,
+            None => groups.push((group, 1)),
+        }
+    }
+    let words = |(group, count): (String, usize)| match count {
+        1 => group,
+        _ => format!("{group} ({count} tensors)"),
+    };
+    groups.into_iter().map(words).collect()
 }
 
 /// Widths as in `12-64-3`.

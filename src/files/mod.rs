@@ -37,6 +37,8 @@ pub use inputs::Inputs;
 pub use list::{StateList, States};
 #[cfg(feature = "cli")]
 pub use npz::{Array, Data, npz_bytes, npz_sha256, read_npz};
+#[cfg(feature = "cli")]
+pub(crate) use npz::{npy_array, npy_array_bytes};
 #[cfg(feature = "import")]
 pub(crate) use plain::ARCHIVE_BYTES;
 #[cfg(feature = "gpu")]

@@ -158,9 +158,7 @@ fn add(
     name: &str,
     array: &Array,
 ) -> std::result::Result<(), ZipError> {
-    let shape: Vec<u64> = array.shape.iter().map(|&length| length as u64).collect();
-    let mut bytes = header(array.data.descr(), &shape);
-    bytes.extend(array.data.to_bytes());
+    let bytes = npy_array_bytes(array);
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
         .last_modified_time(DateTime::DEFAULT)
@@ -210,11 +208,30 @@ pub fn read_npz(path: &Path) -> Result<BTreeMap<String, Array>> {
     Ok(arrays)
 }
 
+/// The array of the .npy file `path`.
+///
+/// # Errors
+/// [`Error::File`] if it is missing, damaged, or an array of another kind.
+pub(crate) fn npy_array(path: &Path) -> Result<Array> {
+    let bytes = super::read(path, super::ARCHIVE_BYTES).map_err(|e| Error::file(path, e))?;
+    parse(&bytes).map_err(|problem| Error::file(path, problem))
+}
+
+/// The bytes of a .npy file with `array`.
+pub(crate) fn npy_array_bytes(array: &Array) -> Vec<u8> {
+    let shape: Vec<u64> = array.shape.iter().map(|&length| length as u64).collect();
+    let mut bytes = header(array.data.descr(), &shape);
+    bytes.extend(array.data.to_bytes());
+    bytes
+}
+
 /// The array of a .npy file in memory.
 fn parse(mut bytes: &[u8]) -> std::result::Result<Array, String> {
     let NpyHeader { descr, fortran_order, shape } = NpyHeader::read(&mut bytes)?;
     if fortran_order && shape.len() > 1 {
-        return Err("column-major order is not supported".to_owned());
+        return Err(
+            "column-major order is not supported; in NumPy: numpy.ascontiguousarray(x)".to_owned()
+        );
     }
     let data = Data::parse(&descr, bytes)
         .ok_or_else(|| format!("{} bytes are no array of type `{descr}`", bytes.len()))?;

@@ -2,16 +2,22 @@
 
 mod activation;
 mod core;
+#[cfg(feature = "import")]
+mod export;
 mod file;
 #[cfg(feature = "import")]
 pub mod import;
 pub mod inspect;
 mod layer;
 mod mlp;
+#[cfg(feature = "import")]
+mod onnx;
 mod spectral;
 
 pub use activation::Activation;
 pub(crate) use core::Parts;
+#[cfg(feature = "import")]
+pub use export::onnx_bytes;
 pub use layer::{Layer, Norm, Rescale};
 pub(crate) use layer::{normaliser, normaliser_range};
 pub use mlp::Mlp;

@@ -1,249 +1,287 @@
-//! From an ONNX graph to a network: its operations followed from the input to the output.
+//! From an ONNX graph to a network: the operations that its output needs, one after the other.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
+use super::array::Array;
+use super::constants::folded;
+use super::draft::{Draft, Step};
+use super::elementwise::Expression;
 use super::kind::Cast;
-use super::layers::MOST_LAYERS;
-use super::onnx::{Ends, Graph, Node, Shaped, Tensor};
-use crate::policy::{Activation, Layer, Mlp};
+use super::onnx::{Written, decode};
+use super::operations::{self, OPERATIONS};
+use super::request::{Imported, Origin};
+use crate::policy::Activation;
+use crate::policy::export::{HIDDEN, STATE_ORDER};
+use crate::policy::onnx::{Graph, Node};
 
-/// A step from the input to the output.
-enum Step {
-    /// A dense layer.
-    Dense(Dense),
-    /// An activation.
-    Activation(Activation),
+/// Most operations.
+const MOST_NODES: usize = 4096;
+/// Most numbers of all constants that operations make of others.
+const MOST_MADE: usize = 1 << 24;
+
+/// A value of a graph.
+#[derive(Clone, Debug)]
+pub(super) enum Value {
+    /// Numbers that do not depend on the input.
+    Constant(Array),
+    /// Lengths of what depends on the input: they keep its numbers as they are.
+    Sizes,
+    /// What the network has made of the input so far.
+    Number(Number),
 }
 
-/// A dense layer on the way to its bias.
-struct Dense {
-    /// Name of its weight.
-    name: String,
-    /// `[outputs, inputs]`.
-    weight: Vec<f32>,
-    bias: Option<Vec<f32>>,
-    outputs: usize,
+/// What the network has made of the input so far: an expression of what a step gave.
+#[derive(Clone, Debug)]
+pub(super) struct Number {
+    /// How many times steps were added to the network before.
+    pub(super) at: usize,
+    /// What is done with each number since.
+    pub(super) expression: Expression,
+    /// Which of the numbers, where some are left out.
+    pub(super) rows: Option<Vec<usize>>,
 }
 
-/// The network of a graph.
-pub(super) struct GraphNetwork {
-    pub(super) network: Mlp,
+/// A graph on the way to a network.
+pub(super) struct Walk<'g> {
+    values: HashMap<&'g str, Value>,
+    pub(super) draft: Draft,
+    /// How many times steps were added to it.
+    at: usize,
+    /// Numbers of constants that were made of others.
+    made: usize,
     /// Names of the weights of its layers.
     pub(super) layers: Vec<String>,
+    pub(super) cast: Cast,
 }
 
-/// The network of an ONNX file.
+/// The network of an ONNX file: of the output `asked`, or of the only one.
 ///
 /// # Errors
 /// A sentence about damage, or the operation that no dense network has.
-pub(super) fn read(bytes: &[u8], cast: Cast) -> Result<GraphNetwork, String> {
-    let graph = Graph::decode(bytes)?;
-    let Ends { input, output } = graph.ends()?;
-    let walk = Walk { tensors: graph.tensors(), users: users(&graph), cast };
-    let mut steps = Vec::new();
-    let mut at = input;
-    // Each turn passes an operation, so one more turn than operations is a circle.
-    for _ in 0..=graph.nodes.len() {
-        if at == output && !walk.users.contains_key(at) {
-            return network(steps);
-        }
-        at = walk.step(at, &mut steps)?;
-        if steps.len() > 2 * MOST_LAYERS {
-            return Err(format!("more than {MOST_LAYERS} layers"));
-        }
+pub(super) fn read(bytes: &[u8], asked: &[String], cast: Cast) -> Result<Imported, String> {
+    let written = decode(bytes)?;
+    let graph = &written.graph;
+    if graph.nodes.len() > MOST_NODES {
+        return Err(format!("{} operations; at most {MOST_NODES} are read", graph.nodes.len()));
     }
-    Err(format!("the operations after `{at}` go in a circle"))
-}
-
-/// The operations that take each value.
-fn users(graph: &Graph) -> HashMap<&str, Vec<&Node>> {
-    let mut users: HashMap<&str, Vec<&Node>> = HashMap::new();
-    for node in &graph.nodes {
-        for name in &node.inputs {
-            users.entry(name).or_default().push(node);
-        }
-    }
-    users
-}
-
-/// A graph to be walked through.
-struct Walk<'a> {
-    tensors: HashMap<&'a str, &'a Tensor>,
-    users: HashMap<&'a str, Vec<&'a Node>>,
-    cast: Cast,
-}
-
-impl<'a> Walk<'a> {
-    /// The operations that take the value `name`.
-    fn users(&self, name: &str) -> &[&'a Node] {
-        self.users.get(name).map_or(&[], Vec::as_slice)
-    }
-
-    /// Adds what is done with the value `at` to `steps`; the value that comes of it.
-    fn step(&self, at: &str, steps: &mut Vec<Step>) -> Result<&'a str, String> {
-        match *self.users(at) {
-            [] => Err(format!("`{at}` is not the output and leads nowhere")),
-            [node] => self.operation(node, at, steps),
-            ref several => match self.silu(several, at) {
-                Some(output) => {
-                    steps.push(Step::Activation(Activation::Silu));
-                    Ok(output)
-                }
-                None => {
-                    let names: Vec<_> = several.iter().map(|n| n.operation.as_str()).collect();
-                    let names = names.join(", ");
-                    Err(format!("`{at}` branches into {names}; a plain network does not"))
-                }
-            },
-        }
-    }
-
-    /// The product of `at` and its own sigmoid, if that is what the two operations are.
-    fn silu(&self, pair: &[&'a Node], at: &str) -> Option<&'a str> {
-        let is = |node: &Node, name: &str| node.operation == name && node.is_standard();
-        let (sigmoid, product) = match *pair {
-            [s, m] if is(s, "Sigmoid") && is(m, "Mul") => (s, m),
-            [m, s] if is(s, "Sigmoid") && is(m, "Mul") => (s, m),
-            _ => return None,
-        };
-        let share = sigmoid.output().ok()?;
-        let factors = [product.inputs.first()?.as_str(), product.inputs.get(1)?.as_str()];
-        let both = factors == [at, share] || factors == [share, at];
-        let output = product.output().ok()?;
-        (both && self.users(share).len() == 1).then_some(output)
-    }
-
-    /// Adds the operation `node` on the value `at` to `steps`; the value that comes of it.
-    fn operation(
-        &self,
-        node: &'a Node,
-        at: &str,
-        steps: &mut Vec<Step>,
-    ) -> Result<&'a str, String> {
-        match node.operation.as_str() {
-            _ if !node.is_standard() => return Err(unknown(node)),
-            "Gemm" => steps.push(Step::Dense(self.gemm(node, at)?)),
-            "MatMul" => steps.push(Step::Dense(self.product(node, at, Order::InOut)?)),
-            "Add" => match steps.last_mut() {
-                Some(Step::Dense(dense)) if dense.bias.is_none() => {
-                    let other = node.inputs.iter().find(|name| *name != at);
-                    dense.bias = Some(self.bias(other.map_or("", String::as_str), dense.outputs)?);
-                }
-                _ => return Err("an `Add` that does not follow on a `MatMul`".to_owned()),
-            },
-            "Relu" => steps.push(Step::Activation(Activation::Relu)),
-            "Tanh" => steps.push(Step::Activation(Activation::Tanh)),
-            "Identity" => {}
-            _ => return Err(unknown(node)),
-        }
-        node.output()
-    }
-
-    /// The layer of a `Gemm`: a product and, as its third input, a bias.
-    fn gemm(&self, node: &Node, at: &str) -> Result<Dense, String> {
-        let plain = node.factor("alpha") == 1.0 && node.factor("beta") == 1.0;
-        if !plain || node.integer("transA") != 0 {
-            return Err("a `Gemm` with alpha, beta or transA, which no dense layer has".to_owned());
-        }
-        let order = if node.integer("transB") == 0 { Order::InOut } else { Order::OutIn };
-        let mut dense = self.product(node, at, order)?;
-        if let Some(bias) = node.inputs.get(2).filter(|name| !name.is_empty()) {
-            dense.bias = Some(self.bias(bias, dense.outputs)?);
-        }
-        Ok(dense)
-    }
-
-    /// The layer of a product of `at` and a tensor, without its bias.
-    fn product(&self, node: &Node, at: &str, order: Order) -> Result<Dense, String> {
-        let name = match node.inputs.as_slice() {
-            [value, weight, ..] if value == at => weight,
-            _ => {
-                return Err(format!("a `{}` of which `{at}` is not the left side", node.operation));
-            }
-        };
-        let Shaped { shape, numbers } = self.numbers(name)?;
-        let &[rows, columns] = shape.as_slice() else {
-            return Err(format!("`{name}` has shape {shape:?}; a weight has two dimensions"));
-        };
-        let (outputs, weight) = match order {
-            Order::OutIn => (rows, numbers),
-            Order::InOut => {
-                let row = |row| numbers[row..].iter().step_by(columns);
-                (columns, (0..columns).flat_map(row).copied().collect())
-            }
-        };
-        Ok(Dense { name: name.clone(), weight, bias: None, outputs })
-    }
-
-    /// The bias `name` of a layer with so many outputs.
-    fn bias(&self, name: &str, outputs: usize) -> Result<Vec<f32>, String> {
-        let Shaped { shape, numbers } = self.numbers(name)?;
-        match shape == [outputs] || shape == [1, outputs] {
-            true => Ok(numbers),
-            false => Err(format!("`{name}` has shape {shape:?}, its layer {outputs} outputs")),
-        }
-    }
-
-    /// The numbers of the tensor `name`.
-    fn numbers(&self, name: &str) -> Result<Shaped, String> {
-        let tensor = self.tensors.get(name);
-        let tensor = tensor.ok_or_else(|| format!("`{name}` is no tensor that the file holds"))?;
-        tensor.numbers(self.cast).map_err(|problem| format!("`{name}`: {problem}"))
-    }
-}
-
-/// How a weight lies in its tensor.
-#[derive(Clone, Copy)]
-enum Order {
-    /// `[outputs, inputs]`.
-    OutIn,
-    /// `[inputs, outputs]`.
-    InOut,
-}
-
-/// The refusal of an operation.
-fn unknown(node: &Node) -> String {
-    format!(
-        "operation `{}`; a dense network has Gemm, MatMul and Add, Relu, Tanh, Sigmoid and Mul \
-         (SiLU), Identity",
-        node.operation
-    )
-}
-
-/// The network of these steps: layers with the same activation between all of them.
-fn network(mut steps: Vec<Step>) -> Result<GraphNetwork, String> {
-    let output = match steps.pop() {
-        Some(Step::Activation(Activation::Tanh)) => Activation::Tanh,
-        Some(last @ Step::Dense(_)) => {
-            steps.push(last);
-            Activation::Identity
-        }
-        Some(Step::Activation(other)) => {
-            return Err(format!("ends in {}; a policy ends in tanh or a layer", other.name()));
-        }
-        None => return Err("no operation between input and output".to_owned()),
+    let output = output(graph, asked)?;
+    let needed = needed(graph, output)?;
+    let input = graph.input()?;
+    let mut walk = Walk {
+        values: HashMap::new(),
+        draft: draft(&written, input.width)?,
+        at: 0,
+        made: 0,
+        layers: Vec::new(),
+        cast,
     };
-    let (mut layers, mut names, mut hidden) = (Vec::new(), Vec::new(), None);
-    for (i, step) in steps.into_iter().enumerate() {
-        match step {
-            Step::Dense(dense) if i % 2 == 0 => {
-                let Dense { name, weight, bias, outputs, .. } = dense;
-                let bias = bias.unwrap_or_else(|| vec![0.0; outputs]);
-                layers.push(Layer::dense(weight, bias));
-                names.push(name);
-            }
-            Step::Activation(activation) if i % 2 == 1 => {
-                let first = *hidden.get_or_insert(activation);
-                if first != activation {
-                    let (first, other) = (first.name(), activation.name());
-                    return Err(format!(
-                        "both {first} and {other} between layers; one is supported"
-                    ));
-                }
-            }
-            _ => return Err("layers and activations do not take turns".to_owned()),
+    walk.values.insert(input.name, walk.number());
+    for (name, tensor) in graph.tensors().filter(|(name, _)| needed.names.contains(name)) {
+        let array = tensor.array(cast).map_err(|problem| format!("`{name}`: {problem}"))?;
+        walk.values.insert(name, Value::Constant(array));
+    }
+    for node in needed.nodes {
+        walk.node(node).map_err(|problem| told(graph, node, problem))?;
+    }
+    let Some(Value::Number(last)) = walk.values.remove(output) else {
+        return Err(format!("the output `{output}` does not depend on the input"));
+    };
+    walk.close(last, None).map_err(|_| branches(graph, output))?;
+    let floats =
+        graph.tensors().filter(|(name, tensor)| !needed.names.contains(name) && tensor.is_float());
+    let others = graph.outputs().into_iter().filter(|name| *name != output);
+    let mut network = walk.draft.network()?;
+    if let Some(names) = written.entry(STATE_ORDER) {
+        let names = names.split(',').map(str::to_owned).collect();
+        network = network.with_state_order(names).map_err(|error| error.to_string())?;
+    }
+    Ok(Imported {
+        network,
+        layers: walk.layers,
+        left_out: floats.map(|(name, _)| name).chain(others).map(str::to_owned).collect(),
+        layout: None,
+        notes: Vec::new(),
+        activation_from: Origin::File,
+        output_from: Origin::File,
+    })
+}
+
+/// The network without a step; that of a policy that was exported stays as it was.
+fn draft(written: &Written, inputs: Option<usize>) -> Result<Draft, String> {
+    if !written.is_own() {
+        return Ok(Draft::of(inputs));
+    }
+    let hidden = written.entry(HIDDEN).map(str::parse::<Activation>).transpose()?;
+    Ok(Draft::as_is(inputs, hidden))
+}
+
+/// The output that is asked for, or the only one.
+fn output<'g>(graph: &'g Graph, asked: &[String]) -> Result<&'g str, String> {
+    let outputs = graph.outputs();
+    let named = |name: &String| outputs.iter().copied().find(|output| output == name);
+    match (outputs.as_slice(), asked) {
+        ([one], []) => Ok(one),
+        ([_], _) => Err("the graph holds one network; leave --network out".to_owned()),
+        (several, [one]) if several.len() > 1 => {
+            named(one).ok_or_else(|| format!("no output `{one}`; it has {}", several.join(", ")))
+        }
+        (several, _) => {
+            Err(format!("outputs `{}`; a policy has one: --network names it", several.join(", ")))
         }
     }
-    let network = Mlp::new(layers, hidden.unwrap_or(Activation::Relu), output);
-    Ok(GraphNetwork { network: network.map_err(|e| e.to_string())?, layers: names })
+}
+
+/// The operations that an output needs, in the order of the file, and the values that these take.
+struct Needed<'g> {
+    nodes: Vec<&'g Node>,
+    names: HashSet<&'g str>,
+}
+
+/// What `output` needs.
+fn needed<'g>(graph: &'g Graph, output: &'g str) -> Result<Needed<'g>, String> {
+    let mut names = HashSet::from([output]);
+    let mut nodes = Vec::new();
+    let mut given = HashSet::new();
+    for node in graph.nodes.iter().rev() {
+        if !node.outputs.iter().any(|name| names.contains(name.as_str())) {
+            continue;
+        }
+        if let Some(twice) = node.outputs.iter().find(|name| !given.insert(name.as_str())) {
+            return Err(format!("two operations give `{twice}`"));
+        }
+        names.extend(node.inputs.iter().map(String::as_str).filter(|name| !name.is_empty()));
+        nodes.push(node);
+    }
+    nodes.reverse();
+    Ok(Needed { nodes, names })
+}
+
+/// A problem of an operation, with its name; of a value that was gone on from already, what goes on from it.
+fn told(graph: &Graph, node: &Node, problem: Problem) -> String {
+    match problem {
+        Problem::Stale(name) => branches(graph, &name),
+        Problem::Words(problem) => format!("operation `{}`: {problem}", node.operation),
+        Problem::Unknown => format!(
+            "operation `{}`; what a dense network may have is {}",
+            node.operation,
+            OPERATIONS.join(", ")
+        ),
+    }
+}
+
+/// The refusal of a value that goes several ways.
+fn branches(graph: &Graph, name: &str) -> String {
+    let users = graph.nodes.iter().filter(|node| node.inputs.iter().any(|input| input == name));
+    let users: Vec<&str> = users.map(|node| node.operation.as_str()).collect();
+    format!("`{name}` branches into {}; a plain network does not", users.join(", "))
+}
+
+/// Why an operation is refused.
+#[derive(Debug)]
+pub(super) enum Problem {
+    /// Its value has been gone on from by another one.
+    Stale(String),
+    /// No dense network has it.
+    Unknown,
+    /// In words.
+    Words(String),
+}
+
+impl From<String> for Problem {
+    fn from(words: String) -> Self {
+        Self::Words(words)
+    }
+}
+
+impl From<&str> for Problem {
+    fn from(words: &str) -> Self {
+        Self::Words(words.to_owned())
+    }
+}
+
+impl<'g> Walk<'g> {
+    /// The operation `node`.
+    fn node(&mut self, node: &'g Node) -> Result<(), Problem> {
+        if !node.is_standard() {
+            return Err(Problem::Unknown);
+        }
+        let inputs =
+            node.inputs.iter().map(|name| self.value(name)).collect::<Result<Vec<_>, _>>()?;
+        let constants = inputs.iter().map(|input| match input {
+            None => Some(None),
+            Some(Value::Constant(array)) => Some(Some(array)),
+            _ => None,
+        });
+        let given = match constants.collect::<Option<Vec<_>>>() {
+            Some(constants) => {
+                let constant = folded(node, &constants, self.cast)?;
+                self.made += constant.numbers.len();
+                vec![Value::Constant(constant)]
+            }
+            None => operations::apply(self, node, inputs)?,
+        };
+        if self.made > MOST_MADE {
+            return Err(Problem::Words(format!("more than {MOST_MADE} numbers made of constants")));
+        }
+        for (name, value) in node.outputs.iter().zip(given) {
+            self.values.insert(name, value);
+        }
+        Ok(())
+    }
+
+    /// The value `name`; nothing for an input that is left out.
+    fn value(&self, name: &str) -> Result<Option<Value>, Problem> {
+        match self.values.get(name) {
+            _ if name.is_empty() => Ok(None),
+            Some(value) => Ok(Some(value.clone())),
+            None => Err(Problem::Words(format!("`{name}` is given by nothing before it"))),
+        }
+    }
+
+    /// What the network gives so far.
+    pub(super) fn number(&self) -> Value {
+        Value::Number(Number { at: self.at, expression: Expression::plain(), rows: None })
+    }
+
+    /// Adds what was done with each number to the network, of `width` numbers where it does not know it.
+    ///
+    /// # Errors
+    /// A value that was gone on from already; an expression that is no activation.
+    pub(super) fn close(&mut self, number: Number, width: Option<usize>) -> Result<(), Problem> {
+        if number.at != self.at {
+            return Err(Problem::Stale(String::new()));
+        }
+        if let Some(rows) = &number.rows {
+            self.draft.select(rows)?;
+        }
+        let steps = number
+            .expression
+            .steps()
+            .ok_or("what comes before it is no activation that is known")?;
+        for each in steps {
+            let width = self.draft.width().or(width);
+            let width = width.ok_or("nobody says how many numbers the input has")?;
+            self.draft.push(each.step(width))?;
+        }
+        self.at += 1;
+        Ok(())
+    }
+
+    /// Adds a step behind `number`; what the network gives then.
+    ///
+    /// # Errors
+    /// As [`Walk::close`]; a step of another width.
+    pub(super) fn push(
+        &mut self,
+        number: Number,
+        width: usize,
+        step: Step,
+    ) -> Result<Value, Problem> {
+        if width == 0 {
+            return Err("with a constant that has no numbers".into());
+        }
+        self.close(number, Some(width))?;
+        self.draft.push(step)?;
+        Ok(self.number())
+    }
 }

@@ -2,140 +2,112 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::checkpoint::Tensor;
-
-/// Most layers of a network: layers may share their numbers, memory does not.
-pub(super) const MOST_LAYERS: usize = 64;
+use super::names::{Bearing, around, bearing, compare, holds, numbered, split, starts_with};
+use super::source::{Source, Tensor};
 
 /// The modules of a tianshou actor or critic that hold its layers: a body and a head.
 const TIANSHOU: [&str; 2] = ["preprocess.model.model", "last.model"];
+/// What the weights and biases of a library are called, and how the weights lie.
+const PARTS: [(&str, &str, Order); 3] =
+    [("weight", "bias", Order::OutIn), ("kernel", "bias", Order::InOut), ("w", "b", Order::InOut)];
 /// Most networks that a message lists.
 const MOST_LISTED: usize = 40;
 
-/// A dense layer of a checkpoint.
+/// How a weight lies in its tensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// `[outputs, inputs]`, as PyTorch has it.
+    OutIn,
+    /// `[inputs, outputs]`, as JAX has it.
+    InOut,
+}
+
+/// A dense layer of a file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dense<'a> {
     /// What its tensors are called before `.weight` and `.bias`.
     pub(super) name: &'a str,
-    /// `[outputs, inputs]`.
+    /// Two dimensions.
     pub(super) weight: &'a Tensor,
+    /// How the weight lies.
+    pub(super) order: Order,
     /// `[outputs]`, where it has one.
     pub(super) bias: Option<&'a Tensor>,
 }
 
 impl<'a> Dense<'a> {
-    /// Columns of the weight.
+    /// Numbers that it takes.
     pub(super) fn inputs(&self) -> usize {
-        self.weight.shape[1]
+        self.weight.shape[usize::from(self.order == Order::OutIn)]
     }
 
-    /// Rows of the weight.
+    /// Numbers that it gives.
     pub(super) fn outputs(&self) -> usize {
-        self.weight.shape[0]
+        self.weight.shape[usize::from(self.order == Order::InOut)]
     }
 
     /// The network that the layer belongs to: what its name has before the layer's own part.
     fn network(&self) -> &'a str {
-        let module = self.name.rsplit_once('.').map_or("", |(module, _)| module);
-        let tianshou = TIANSHOU.iter().find_map(|part| module.strip_suffix(part));
-        match tianshou {
-            Some(before) if before.is_empty() || before.ends_with('.') => {
-                before.trim_end_matches('.')
-            }
-            _ => module,
-        }
+        module(self.name)
     }
 }
 
-/// Names of the tensors that are no part of the layers `chosen`; those of no dense layer first, as
-/// the statistics that observations are normalised with.
-pub(super) fn left_out(tensors: &[Tensor], chosen: &[Dense<'_>]) -> Vec<String> {
-    let parts = |layers: &[Dense<'_>]| -> HashSet<String> {
-        let tensors = layers.iter().flat_map(|layer| [Some(layer.weight), layer.bias]);
-        tensors.flatten().map(|tensor| tensor.name.clone()).collect()
-    };
-    let (used, of_layers) = (parts(chosen), parts(&dense(tensors)));
-    let names = tensors.iter().map(|tensor| tensor.name.clone());
-    let mut left: Vec<String> = names.filter(|name| !used.contains(name)).collect();
-    left.sort_by_key(|name| of_layers.contains(name));
-    left
+/// What a layer's name has before its own part.
+pub(super) fn module(layer: &str) -> &str {
+    let module = split(layer).0;
+    let tianshou = TIANSHOU.iter().find_map(|part| module.strip_suffix(part));
+    match tianshou {
+        Some(before) if before.is_empty() || before.ends_with('.') => before.trim_end_matches('.'),
+        _ => module,
+    }
 }
 
-/// The layers of the networks `asked`, one after the other; of the only network if none is.
+/// The dense layers of a file: weights of two dimensions, with their biases.
+pub(super) fn dense<'a>(source: &'a Source<'_>) -> Vec<Dense<'a>> {
+    let tensors: HashMap<&str, &Tensor> =
+        source.tensors.iter().map(|tensor| (tensor.name.as_str(), tensor)).collect();
+    let layer = |weight: &'a Tensor| {
+        let (name, part) = split(&weight.name);
+        let (_, bias, order) = *PARTS.iter().find(|(weight, ..)| *weight == part)?;
+        let bias = if name.is_empty() { bias.to_owned() } else { format!("{name}.{bias}") };
+        let bias = tensors.get(bias.as_str()).copied();
+        (weight.shape.len() == 2).then_some(Dense { name, weight, order, bias })
+    };
+    source.tensors.iter().filter_map(layer).collect()
+}
+
+/// The layers in the order in which they are applied: by their numbers where all have one, and else as they
+/// stand in the file.
+pub(super) fn in_order(mut layers: Vec<Dense<'_>>) -> Vec<Dense<'_>> {
+    let stems: Option<HashSet<&str>> =
+        layers.iter().map(|layer| numbered(layer.name).map(|(stem, _)| stem)).collect();
+    if stems.is_some_and(|stems| stems.len() == 1) {
+        layers.sort_by(|a, b| compare(a.name, b.name));
+    }
+    layers
+}
+
+/// The layers of the networks `asked`, one after the other.
 ///
 /// # Errors
-/// A sentence that lists the networks of the file if the choice is not clear, names a tensor that
-/// no dense layer has, or a layer that does not follow on the one before.
-pub(super) fn choose<'a>(
-    tensors: &'a [Tensor],
-    asked: &[String],
-) -> Result<Vec<Dense<'a>>, String> {
-    let layers = dense(tensors);
-    if layers.is_empty() {
-        return Err(format!(
-            "no dense layer among its {} tensors: none is called `.weight` and has the shape \
-             [out, in]",
-            tensors.len()
-        ));
-    }
-    let chosen = match asked {
-        [] => pick(tensors, &layers, only(&layers)?, starts_with)?,
-        _ => named(tensors, &layers, asked)?,
-    };
-    if chosen.len() > MOST_LAYERS {
-        return Err(format!("{} layers; a network has at most {MOST_LAYERS}", chosen.len()));
-    }
-    chosen.iter().try_for_each(check_bias)?;
-    chosen.windows(2).try_for_each(|pair| check_pair(&pair[0], &pair[1]))?;
-    Ok(chosen)
-}
-
-/// The dense layers: weights of two dimensions, with their biases.
-fn dense(tensors: &[Tensor]) -> Vec<Dense<'_>> {
-    let of = |tensor| Some((layer_of(tensor, "bias")?, tensor));
-    let biases: HashMap<&str, &Tensor> = tensors.iter().filter_map(of).collect();
-    let layer = |weight| {
-        let name = layer_of(weight, "weight").filter(|_| weight.shape.len() == 2)?;
-        Some(Dense { name, weight, bias: biases.get(name).copied() })
-    };
-    tensors.iter().filter_map(layer).collect()
-}
-
-/// The layer whose `part` the tensor is.
-fn layer_of<'a>(tensor: &'a Tensor, part: &str) -> Option<&'a str> {
-    let before = tensor.name.strip_suffix(part)?;
-    if before.is_empty() { Some(before) } else { before.strip_suffix('.') }
-}
-
-/// The name of the only network.
-fn only<'a>(layers: &[Dense<'a>]) -> Result<&'a str, String> {
-    match networks(layers).as_slice() {
-        [(name, _)] => Ok(name),
-        several => Err(format!(
-            "{} networks; name the one that is meant with --network:{}",
-            several.len(),
-            listing(several)
-        )),
-    }
-}
-
-/// The layers of the networks `asked`.
-fn named<'a>(
-    tensors: &'a [Tensor],
+/// A sentence that lists the networks of the file if the choice is not clear, or names a tensor that no
+/// dense layer has.
+pub(super) fn named<'a>(
+    source: &'a Source<'_>,
     layers: &[Dense<'a>],
     asked: &[String],
 ) -> Result<Vec<Dense<'a>>, String> {
     let each = asked.iter().map(|prefix| {
         let begins = layers.iter().any(|layer| starts_with(layer.name, prefix));
         let rule = if begins { starts_with } else { holds };
-        let chosen = pick(tensors, layers, prefix, rule)?;
+        let chosen = pick(source, layers, prefix, rule)?;
         let several = networks(&chosen);
         match several.len() {
             0 => {
                 let listing = listing(&networks(layers));
                 Err(format!("no dense layer under `{prefix}`; it has the networks:{listing}"))
             }
-            1 => Ok(chosen),
+            1 => Ok(in_order(chosen)),
             _ => {
                 let listing = listing(&several);
                 Err(format!("`{prefix}` may be one of several networks; name one:{listing}"))
@@ -145,30 +117,45 @@ fn named<'a>(
     Ok(each.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// Whether `name` lies under `prefix`.
-fn starts_with(name: &str, prefix: &str) -> bool {
-    let rest = name.strip_prefix(prefix);
-    prefix.is_empty() || rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-}
-
-/// Whether some keys of `name`, one after the other, are those of `keys`.
-fn holds(name: &str, keys: &str) -> bool {
-    format!(".{name}.").contains(&format!(".{keys}."))
+/// The layers of the only network.
+///
+/// # Errors
+/// As [`named`].
+pub(super) fn only<'a>(
+    source: &'a Source<'_>,
+    layers: &[Dense<'a>],
+) -> Result<Vec<Dense<'a>>, String> {
+    match networks(layers).as_slice() {
+        [(name, _)] => pick(source, layers, name, starts_with).map(in_order),
+        several => Err(format!(
+            "{} networks; name the one that is meant with --network:{}",
+            several.len(),
+            listing(several)
+        )),
+    }
 }
 
 /// The layers that lie under `prefix`, which must be all that lies there.
 fn pick<'a>(
-    tensors: &'a [Tensor],
+    source: &'a Source<'_>,
     layers: &[Dense<'a>],
     prefix: &str,
     rule: fn(&str, &str) -> bool,
 ) -> Result<Vec<Dense<'a>>, String> {
     let chosen = layers.iter().filter(|layer| rule(layer.name, prefix));
     let chosen: Vec<Dense<'a>> = chosen.copied().collect();
-    let known = chosen.iter().flat_map(|layer| [Some(layer.weight), layer.bias]).flatten();
-    let known: HashSet<&str> = known.map(|tensor| tensor.name.as_str()).collect();
-    let mut under = tensors.iter().filter(|tensor| rule(&tensor.name, prefix));
-    match under.find(|tensor| !known.contains(tensor.name.as_str())) {
+    let known = parts(&chosen);
+    let bears = |tensor: &&Tensor| {
+        let name = tensor.name.as_str();
+        let inside = if prefix.is_empty() {
+            name
+        } else {
+            around(name, prefix).map_or(name, |(_, inside)| inside)
+        };
+        let other = rule(name, prefix) && !known.contains(name);
+        other && tensor.is_float() && bearing(inside) != Bearing::None
+    };
+    match source.tensors.iter().find(bears) {
         Some(Tensor { name, shape, .. }) if !chosen.is_empty() => Err(format!(
             "`{name}` of shape {shape:?} is no part of a dense layer, so this is not a plain \
              network; if it does not bear on the output, give --network the prefixes of its \
@@ -178,8 +165,14 @@ fn pick<'a>(
     }
 }
 
+/// Names of the tensors of these layers.
+pub(super) fn parts<'a>(layers: &[Dense<'a>]) -> HashSet<&'a str> {
+    let tensors = layers.iter().flat_map(|layer| [Some(layer.weight), layer.bias]);
+    tensors.flatten().map(|tensor| tensor.name.as_str()).collect()
+}
+
 /// The networks that the layers form, in the order of the file.
-fn networks<'a>(layers: &[Dense<'a>]) -> Vec<(&'a str, Vec<Dense<'a>>)> {
+pub(super) fn networks<'a>(layers: &[Dense<'a>]) -> Vec<(&'a str, Vec<Dense<'a>>)> {
     let mut numbers = HashMap::new();
     let mut found: Vec<(&str, Vec<Dense<'_>>)> = Vec::new();
     for layer in layers {
@@ -189,25 +182,37 @@ fn networks<'a>(layers: &[Dense<'a>]) -> Vec<(&'a str, Vec<Dense<'a>>)> {
         });
         found[number].1.push(*layer);
     }
-    found
+    found.into_iter().map(|(name, layers)| (name, in_order(layers))).collect()
 }
 
 /// A line per network: its name and widths.
 fn listing(networks: &[(&str, Vec<Dense<'_>>)]) -> String {
     let line = |(name, layers): &(&str, Vec<Dense<'_>>)| {
-        let name = if name.is_empty() { "(no prefix)" } else { name };
+        let title = if name.is_empty() { "(no prefix)" } else { name };
         if layers.windows(2).all(|pair| pair[0].outputs() == pair[1].inputs()) {
             let outputs: String = layers.iter().map(|l| format!("-{}", l.outputs())).collect();
-            return format!("\n  {name}  {}{outputs}", layers[0].inputs());
+            let alone =
+                if layers.len() == 1 { format!("  {}", layers[0].name) } else { String::new() };
+            return format!("\n  {title}  {}{outputs}{alone}", layers[0].inputs());
         }
-        let shapes: Vec<String> = layers.iter().map(|l| format!("{:?}", l.weight.shape)).collect();
-        format!("\n  {name}  not one after the other: {}", shapes.join(" "))
+        let each =
+            layers.iter().map(|l| format!("\n    {}  {}-{}", l.name, l.inputs(), l.outputs()));
+        format!("\n  {title}  not one after the other:{}", each.collect::<String>())
     };
     let more = match networks.len().saturating_sub(MOST_LISTED) {
         0 => String::new(),
         more => format!("\n  and {more} more"),
     };
     networks.iter().take(MOST_LISTED).map(line).collect::<String>() + &more
+}
+
+/// Refuses layers that do not follow on one another, or have a bias that is not theirs.
+///
+/// # Errors
+/// A sentence that names the two tensors that do not go together.
+pub(super) fn check(layers: &[Dense<'_>]) -> Result<(), String> {
+    layers.iter().try_for_each(check_bias)?;
+    layers.windows(2).try_for_each(|pair| check_pair(&pair[0], &pair[1]))
 }
 
 /// Refuses a bias that is not one number per output.
@@ -234,16 +239,10 @@ fn check_pair(before: &Dense<'_>, after: &Dense<'_>) -> Result<(), String> {
             before.outputs()
         ));
     }
-    match (number(before.name), number(after.name)) {
+    match (numbered(before.name), numbered(after.name)) {
         (Some((module, i)), Some((same, j))) if module == same && i >= j => Err(format!(
             "`{first}` stands before `{second}` in the file; the order of the layers is not clear"
         )),
         _ => Ok(()),
     }
-}
-
-/// The module of a numbered layer, and its number.
-fn number(layer: &str) -> Option<(&str, u64)> {
-    let (module, number) = layer.rsplit_once('.').unwrap_or(("", layer));
-    Some((module, number.parse().ok()?))
 }

@@ -1,156 +1,122 @@
-//! The messages of an ONNX file, as far as a dense network needs them, and their tensors.
-//!
-//! Field numbers are those of `onnx.proto`; other fields are skipped.
-
-use std::collections::HashMap;
+//! ONNX files read: what a graph begins and ends with, the attributes of its nodes, and its numbers.
 
 use prost::Message;
 
+use super::array::Array;
 use super::kind::{Cast, FloatReader, Kind};
+use crate::policy::export::PRODUCER;
+use crate::policy::onnx::{Attribute, Entry, Graph, Model, Named, Node, Tensor};
 
-/// `ModelProto`.
-#[derive(Clone, PartialEq, Message)]
-struct Model {
-    #[prost(message, optional, tag = "7")]
-    graph: Option<Graph>,
+/// The numbers of two kinds of integers.
+const INT32: i32 = 6;
+const INT64: i32 = 7;
+
+/// The value that a graph begins with.
+pub(super) struct Input<'a> {
+    /// Its name.
+    pub(super) name: &'a str,
+    /// Numbers of one input, where the graph says it.
+    pub(super) width: Option<usize>,
 }
 
-/// `GraphProto`.
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Graph {
-    #[prost(message, repeated, tag = "1")]
-    pub(super) nodes: Vec<Node>,
-    #[prost(message, repeated, tag = "5")]
-    initializers: Vec<Tensor>,
-    #[prost(message, repeated, tag = "11")]
-    inputs: Vec<Named>,
-    #[prost(message, repeated, tag = "12")]
-    outputs: Vec<Named>,
+/// A graph, and what its file says about it.
+#[derive(Debug)]
+pub(super) struct Written {
+    pub(super) graph: Graph,
+    /// The program that wrote it.
+    producer: String,
+    entries: Vec<Entry>,
 }
 
-/// `NodeProto`: an operation.
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Node {
-    /// Names of the values that it takes.
-    #[prost(string, repeated, tag = "1")]
-    pub(super) inputs: Vec<String>,
-    #[prost(string, repeated, tag = "2")]
-    outputs: Vec<String>,
-    #[prost(string, tag = "4")]
-    pub(super) operation: String,
-    #[prost(message, repeated, tag = "5")]
-    attributes: Vec<Attribute>,
-    #[prost(string, tag = "7")]
-    domain: String,
+impl Written {
+    /// Whether it is a policy that was exported.
+    pub(super) fn is_own(&self) -> bool {
+        self.producer == PRODUCER
+    }
+
+    /// What a policy that was exported says about itself.
+    pub(super) fn entry(&self, key: &str) -> Option<&str> {
+        let entry = self.entries.iter().find(|entry| entry.key == key);
+        entry.filter(|_| self.is_own()).map(|entry| entry.value.as_str())
+    }
 }
 
-/// `AttributeProto`.
-#[derive(Clone, PartialEq, Message)]
-struct Attribute {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(float, tag = "2")]
-    float: f32,
-    #[prost(int64, tag = "3")]
-    integer: i64,
-    #[prost(message, optional, tag = "5")]
-    tensor: Option<Tensor>,
-}
-
-/// `TensorProto`.
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Tensor {
-    #[prost(int64, repeated, tag = "1")]
-    lengths: Vec<i64>,
-    #[prost(int32, tag = "2")]
-    data_type: i32,
-    #[prost(float, repeated, tag = "4")]
-    floats: Vec<f32>,
-    #[prost(string, tag = "8")]
-    name: String,
-    #[prost(bytes = "vec", tag = "9")]
-    raw: Vec<u8>,
-    /// 1 if the numbers are in another file.
-    #[prost(int32, tag = "14")]
-    location: i32,
-}
-
-/// `ValueInfoProto`.
-#[derive(Clone, PartialEq, Message)]
-struct Named {
-    #[prost(string, tag = "1")]
-    name: String,
-}
-
-/// The values that a graph begins and ends with.
-pub(super) struct Ends<'a> {
-    /// Name of the input.
-    pub(super) input: &'a str,
-    /// Name of the output.
-    pub(super) output: &'a str,
-}
-
-/// The numbers of a tensor.
-pub(super) struct Shaped {
-    /// Length of each dimension.
-    pub(super) shape: Vec<usize>,
-    /// The numbers, the last index the fastest.
-    pub(super) numbers: Vec<f32>,
+/// The graph of an ONNX file.
+///
+/// # Errors
+/// A sentence about bytes that are no such file.
+pub(super) fn decode(bytes: &[u8]) -> Result<Written, String> {
+    let model = Model::decode(bytes).map_err(|e| format!("damaged, or no ONNX file ({e})"))?;
+    let graph = model.graph.ok_or("no graph in it: damaged, or no ONNX file")?;
+    Ok(Written { graph, producer: model.producer, entries: model.entries })
 }
 
 impl Graph {
-    /// The graph of an ONNX file.
-    ///
-    /// # Errors
-    /// A sentence about bytes that are no such file.
-    pub(super) fn decode(bytes: &[u8]) -> Result<Self, String> {
-        let model = Model::decode(bytes).map_err(|e| format!("damaged, or no ONNX file ({e})"))?;
-        model.graph.ok_or_else(|| "no graph in it: damaged, or no ONNX file".to_owned())
-    }
-
     /// The tensors that the graph carries, by name.
-    pub(super) fn tensors(&self) -> HashMap<&str, &Tensor> {
-        let constants = self.nodes.iter().filter_map(Node::constant);
-        let initializers = self.initializers.iter().map(|tensor| (tensor.name.as_str(), tensor));
-        initializers.chain(constants).collect()
+    pub(super) fn tensors(&self) -> impl Iterator<Item = (&str, &Tensor)> {
+        self.initializers.iter().map(|tensor| (tensor.name.as_str(), tensor))
     }
 
-    /// The names of the input and the output, if there is one of each.
+    /// The input, if there is one.
     ///
     /// # Errors
     /// A sentence with the names of all of them.
-    pub(super) fn ends(&self) -> Result<Ends<'_>, String> {
-        let tensors = self.tensors();
-        let inputs = self.inputs.iter().map(|input| input.name.as_str());
-        let inputs: Vec<&str> = inputs.filter(|name| !tensors.contains_key(name)).collect();
-        let outputs: Vec<&str> = self.outputs.iter().map(|output| output.name.as_str()).collect();
-        match (inputs.as_slice(), outputs.as_slice()) {
-            ([input], [output]) => Ok(Ends { input, output }),
-            _ => Err(format!(
-                "inputs `{}` and outputs `{}`; a policy has one of each",
-                inputs.join(", "),
-                outputs.join(", ")
-            )),
+    pub(super) fn input(&self) -> Result<Input<'_>, String> {
+        let tensor =
+            |input: &&Named| self.initializers.iter().any(|tensor| tensor.name == input.name);
+        let inputs: Vec<&Named> = self.inputs.iter().filter(|input| !tensor(input)).collect();
+        match inputs.as_slice() {
+            [input] => Ok(Input { name: &input.name, width: input.width() }),
+            several => {
+                let names: Vec<&str> = several.iter().map(|input| input.name.as_str()).collect();
+                Err(format!(
+                    "inputs `{}`; a policy has one, and a state of its own, as recurrent networks have, is none",
+                    names.join(", ")
+                ))
+            }
         }
+    }
+
+    /// The names of the outputs.
+    pub(super) fn outputs(&self) -> Vec<&str> {
+        self.outputs.iter().map(|output| output.name.as_str()).collect()
+    }
+}
+
+impl Named {
+    /// Numbers of one value, where the first length counts values.
+    fn width(&self) -> Option<usize> {
+        let lengths = &self.kind.as_ref()?.tensor.as_ref()?.shape.as_ref()?.lengths;
+        let rest = if let [_, rest @ ..] = lengths.as_slice()
+            && !rest.is_empty()
+        {
+            rest
+        } else {
+            lengths
+        };
+        rest.iter().try_fold(1, |n: usize, length| {
+            let length = usize::try_from(length.value).ok().filter(|length| *length > 0)?;
+            n.checked_mul(length)
+        })
     }
 }
 
 impl Node {
-    /// Name and tensor of a constant.
-    fn constant(&self) -> Option<(&str, &Tensor)> {
-        let name = self.outputs.first().filter(|_| self.operation == "Constant")?;
-        let tensor = self.attributes.iter().find_map(|attribute| attribute.tensor.as_ref())?;
-        Some((name, tensor))
-    }
-
-    /// The value that the operation gives.
+    /// The tensor of a constant.
     ///
     /// # Errors
-    /// A sentence if it gives none, or several.
-    pub(super) fn output(&self) -> Result<&str, String> {
-        match self.outputs.as_slice() {
-            [output] => Ok(output),
-            several => Err(format!("a `{}` with {} outputs", self.operation, several.len())),
+    /// A sentence about a constant of another form.
+    pub(super) fn constant(&self, cast: Cast) -> Result<Array, String> {
+        match self.attributes.first() {
+            Some(Attribute { tensor: Some(tensor), .. }) => tensor.array(cast),
+            Some(value) => match value.name.as_str() {
+                "value_float" => Ok(Array::number(value.float.into())),
+                "value_int" => Ok(Array::number(value.integer as f64)),
+                "value_floats" => Ok(Array::list(value.floats.iter().map(|&f| f.into()).collect())),
+                "value_ints" => Ok(Array::list(value.integers.iter().map(|&i| i as f64).collect())),
+                other => Err(format!("a constant with `{other}`, which is no number")),
+            },
+            None => Err("a constant without a value".to_owned()),
         }
     }
 
@@ -159,14 +125,25 @@ impl Node {
         self.domain.is_empty() || self.domain == "ai.onnx"
     }
 
-    /// The float attribute `name`, 1 if it is not given, as in `Gemm`.
-    pub(super) fn factor(&self, name: &str) -> f32 {
-        self.attribute(name).map_or(1.0, |attribute| attribute.float)
+    /// The float attribute `name`, if it is given.
+    pub(super) fn float(&self, name: &str) -> Option<f32> {
+        self.attribute(name).map(|attribute| attribute.float)
     }
 
-    /// The integer attribute `name`, 0 if it is not given.
-    pub(super) fn integer(&self, name: &str) -> i64 {
-        self.attribute(name).map_or(0, |attribute| attribute.integer)
+    /// The integer attribute `name`, if it is given.
+    pub(super) fn integer(&self, name: &str) -> Option<i64> {
+        self.attribute(name).map(|attribute| attribute.integer)
+    }
+
+    /// The list of integers `name`, if it is given.
+    pub(super) fn integers(&self, name: &str) -> Option<&[i64]> {
+        self.attribute(name).map(|attribute| attribute.integers.as_slice())
+    }
+
+    /// The text attribute `name`, empty if it is not given.
+    pub(super) fn text(&self, name: &str) -> &str {
+        let text = self.attribute(name).map(|attribute| attribute.text.as_slice());
+        text.and_then(|text| std::str::from_utf8(text).ok()).unwrap_or_default()
     }
 
     fn attribute(&self, name: &str) -> Option<&Attribute> {
@@ -175,29 +152,55 @@ impl Node {
 }
 
 impl Tensor {
-    /// The numbers in their shape.
+    /// Whether its numbers are floats.
+    pub(super) fn is_float(&self) -> bool {
+        Kind::of_onnx(self.data_type).is_float()
+    }
+
+    /// The numbers in their shape; integers as they are.
     ///
     /// # Errors
     /// A sentence about numbers that are elsewhere, do not fill the shape, or are no f32 if `cast`
     /// does not allow it.
-    pub(super) fn numbers(&self, cast: Cast) -> Result<Shaped, String> {
+    pub(super) fn array(&self, cast: Cast) -> Result<Array, String> {
         if self.location != 0 {
             return Err(
                 "its numbers are in another file; export with external_data=False".to_owned()
             );
         }
-        let kind = Kind::of_onnx(self.data_type);
-        let FloatReader { size, number } = kind.reader(cast)?;
-        let numbers: Vec<f32> = match kind {
-            Kind::F32 if self.raw.is_empty() => self.floats.clone(),
-            _ => self.raw.chunks_exact(size).map(number).collect(),
-        };
+        let numbers = if self.is_float() { self.reals(cast)? } else { self.wholes()? };
         let shape: Option<Vec<usize>> =
             self.lengths.iter().map(|&length| usize::try_from(length).ok()).collect();
-        let count = |shape: &Vec<usize>| shape.iter().try_fold(1, |n: usize, &l| n.checked_mul(l));
-        match shape {
-            Some(shape) if count(&shape) == Some(numbers.len()) => Ok(Shaped { shape, numbers }),
-            _ => Err(format!("{} numbers do not fill the shape {:?}", numbers.len(), self.lengths)),
-        }
+        let array = shape.and_then(|shape| Array::new(shape, &numbers));
+        array.ok_or_else(|| {
+            format!("{} numbers do not fill the shape {:?}", numbers.len(), self.lengths)
+        })
+    }
+
+    fn reals(&self, cast: Cast) -> Result<Vec<f64>, String> {
+        let kind = Kind::of_onnx(self.data_type);
+        let FloatReader { size, number } = kind.reader(cast)?;
+        Ok(match kind {
+            Kind::F32 if self.raw.is_empty() => self.floats.iter().map(|&f| f.into()).collect(),
+            Kind::F64 if self.raw.is_empty() => self.doubles.clone(),
+            _ => self.raw.chunks_exact(size).map(number).collect(),
+        })
+    }
+
+    /// Integers of 32 or 64 bits, and truth values.
+    fn wholes(&self) -> Result<Vec<f64>, String> {
+        let (words, rest) = self.raw.as_chunks::<8>();
+        Ok(match self.data_type {
+            INT64 if self.raw.is_empty() => self.integers.iter().map(|&i| i as f64).collect(),
+            INT64 if rest.is_empty() => {
+                words.iter().map(|&word| i64::from_le_bytes(word) as f64).collect()
+            }
+            INT32 if self.raw.is_empty() => self.small.iter().map(|&i| i.into()).collect(),
+            INT32 => {
+                let (words, _) = self.raw.as_chunks::<4>();
+                words.iter().map(|&word| i32::from_le_bytes(word).into()).collect()
+            }
+            _ => return Err("its numbers are no floats".to_owned()),
+        })
     }
 }

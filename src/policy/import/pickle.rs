@@ -1,49 +1,54 @@
 //! The part of Python's pickle format that describes tensors; nothing in a file is ever executed.
 //!
-//! A pickle is a program for a stack machine that names Python functions and calls them. This one
-//! knows the names in [`Global`], calls none of them, and refuses every other name.
+//! A pickle is a program for a stack machine that names Python functions and calls them. This one calls
+//! none: it knows what a few of them would give (`calls.rs`), keeps every other call as an object that
+//! nobody made, and refuses names that no policy has a use for.
 
 use std::collections::HashMap;
 
-use super::value::{Global, Pickle, Storage, Value, View};
+use super::calls;
+use super::kind::Kind;
+use super::value::{Name, Pickle, Place, Storage, Value};
 
-/// Longest pickle, bytes: some 100,000 tensors.
-const LONGEST: usize = 1 << 24;
+/// Most instructions: some 100,000 tensors.
+const LONGEST: usize = 1 << 22;
 /// Most values on the stack; Python's own writer puts 2,000 there at most.
 const DEEPEST: usize = 1 << 16;
 /// Longest name of a storage, bytes; PyTorch numbers them.
 const LONGEST_KEY: usize = 32;
-/// Most dimensions of a tensor, PyTorch's limit.
-const MOST_DIMENSIONS: usize = 64;
+/// The newest protocol.
+const NEWEST: u8 = 5;
 /// What is wrong where an instruction finds too little on the stack.
 const EMPTY: &str = "a value is needed where there is none";
 
 /// A pickle that was read.
+#[derive(Debug)]
 pub(super) struct Unpickled<'a> {
     /// Its containers.
     pub(super) pickle: Pickle<'a>,
     /// The value that it stands for.
     pub(super) root: Value<'a>,
+    /// Bytes that it takes; more may follow.
+    pub(super) length: usize,
 }
 
-/// Reads a pickle.
+/// Reads the pickle that `bytes` begin with.
 ///
 /// # Errors
 /// A sentence with the byte at which the pickle is damaged, or asks for what is not allowed.
 pub(super) fn read(bytes: &[u8]) -> Result<Unpickled<'_>, String> {
-    if bytes.len() > LONGEST {
-        let length = bytes.len();
-        return Err(format!("{length} bytes of pickle; no state dict has more than {LONGEST}"));
-    }
     let mut machine = Machine { bytes, ..Machine::default() };
-    loop {
+    for _ in 0..LONGEST {
         let at = machine.at;
         match machine.step() {
             Ok(None) => {}
-            Ok(Some(root)) => return Ok(Unpickled { pickle: machine.pickle, root }),
+            Ok(Some(root)) => {
+                return Ok(Unpickled { pickle: machine.pickle, root, length: machine.at });
+            }
             Err(problem) => return Err(format!("pickle, byte {at}: {problem}")),
         }
     }
+    Err(format!("a pickle of more than {LONGEST} instructions; no policy needs as many"))
 }
 
 /// The stack machine.
@@ -64,66 +69,35 @@ impl<'a> Machine<'a> {
         let [code] = self.array()?;
         match code {
             0x80 => self.protocol()?,
-            b'}' => self.push_dict()?,
-            b']' | b'N' | 0x88 | 0x89 => self.push(Value::Other)?,
+            // A frame says how many bytes are to be read at once.
+            0x95 => _ = self.take(8)?,
+            b'N' => self.push(Value::Other)?,
             b'G' => {
                 self.take(8)?;
                 self.push(Value::Other)?;
             }
-            b'K' => self.number::<1>()?,
-            b'M' => self.number::<2>()?,
-            b'J' => {
-                let number = i32::from_le_bytes(self.array()?);
-                self.push(Value::Int(number.into()))?;
-            }
-            0x8a => self.long()?,
-            b'X' => {
-                let length = u32::from_le_bytes(self.array()?);
-                let text = std::str::from_utf8(self.take(length as usize)?);
-                self.push(Value::Text(text.map_err(|_| "a text that is not UTF-8")?))?;
-            }
-            b'c' => {
-                let (module, name) = (self.line()?, self.line()?);
-                self.push(Value::Global(Global::find(module, name)?))?;
-            }
-            b'q' => self.remember::<1>()?,
-            b'r' => self.remember::<4>()?,
+            0x88 | 0x89 => self.push(Value::Truth(code == 0x88))?,
+            b'K' | b'M' | b'J' | 0x8a => self.number(code)?,
+            b'X' | 0x8c | 0x8d | b'U' | b'T' => self.text(code)?,
+            b'B' | b'C' | 0x8e | 0x96 => self.run_of_bytes(code)?,
+            b'c' | 0x93 => self.name(code)?,
+            b'q' | b'r' | 0x94 => self.remember(code)?,
             b'h' => self.recall::<1>()?,
             b'j' => self.recall::<4>()?,
+            b'0' => _ = self.pop()?,
+            b'1' => _ = self.marked()?,
+            b'2' => {
+                let top = *self.stack.last().ok_or(EMPTY)?;
+                self.push(top)?;
+            }
             b'(' => self.mark()?,
-            b')' => self.push_tuple(Vec::new())?,
-            0x85..=0x87 => {
-                let count = usize::from(code - 0x84);
-                let first = self.stack.len().checked_sub(count).ok_or(EMPTY)?;
-                let items = self.above(first)?;
-                self.push_tuple(items)?;
-            }
-            b't' => {
-                let items = self.marked()?;
-                self.push_tuple(items)?;
-            }
+            b'}' | b']' | 0x8f | b')' | 0x85..=0x87 | b't' | 0x91 => self.container(code)?,
             b'Q' => self.persistent()?,
-            b'R' => self.call()?,
-            b's' => {
-                let first = self.stack.len().checked_sub(2).ok_or(EMPTY)?;
-                let items = self.above(first)?;
-                self.set_items(&items)?;
-            }
-            b'u' => {
-                let items = self.marked()?;
-                self.set_items(&items)?;
-            }
-            b'a' => {
-                self.pop()?;
-                self.list()?;
-            }
-            b'e' => {
-                self.marked()?;
-                self.list()?;
-            }
+            b'R' | 0x81 | 0x92 => self.call(code)?,
+            b's' | b'u' | b'a' | b'e' | 0x90 => self.fill(code)?,
             b'b' => self.build()?,
             b'.' => return self.pop().map(Some),
-            _ => return Err(format!("instruction {code:#04x} is none that a state dict needs")),
+            _ => return Err(format!("instruction {code:#04x} is none that a policy needs")),
         }
         Ok(None)
     }
@@ -159,12 +133,20 @@ impl<'a> Machine<'a> {
         Ok(u32::from_le_bytes(word))
     }
 
+    /// What follows its length, of 1, 4 or 8 bytes.
+    fn counted(&mut self, size: usize) -> Result<&'a [u8], String> {
+        let mut word = [0; 8];
+        word[..size].copy_from_slice(self.take(size)?);
+        let length = usize::try_from(u64::from_le_bytes(word));
+        self.take(length.unwrap_or(usize::MAX))
+    }
+
     fn protocol(&mut self) -> Result<(), String> {
         match self.array()? {
-            [2] => Ok(()),
+            [2..=NEWEST] => Ok(()),
             [other] => Err(format!(
-                "protocol {other}; torch.save writes 2 unless it is told otherwise: save the \
-                 checkpoint again without pickle_protocol"
+                "protocol {other}; from 2 to {NEWEST} are read: save the file again without \
+                 pickle_protocol"
             )),
         }
     }
@@ -207,39 +189,70 @@ impl<'a> Machine<'a> {
         self.above(mark)
     }
 
-    fn push_tuple(&mut self, items: Vec<Value<'a>>) -> Result<(), String> {
-        self.pickle.tuples.push(items);
-        self.push(Value::Tuple(self.pickle.tuples.len() - 1))
+    /// Removes the topmost `count` values.
+    fn topmost(&mut self, count: usize) -> Result<Vec<Value<'a>>, String> {
+        let first = self.stack.len().checked_sub(count).ok_or(EMPTY)?;
+        self.above(first)
     }
 
-    fn push_dict(&mut self) -> Result<(), String> {
-        self.pickle.dicts.push(Vec::new());
-        self.push(Value::Dict(self.pickle.dicts.len() - 1))
-    }
-
-    fn number<const N: usize>(&mut self) -> Result<(), String> {
-        let number = self.unsigned::<N>()?;
-        self.push(Value::Int(number.into()))
-    }
-
-    /// An integer of any length, least byte first, in two's complement.
-    fn long(&mut self) -> Result<(), String> {
-        let [length] = self.array()?;
-        let bytes = self.take(length.into())?;
-        let negative = bytes.last().is_some_and(|&byte| byte >= 0x80);
-        let mut word = [if negative { 0xff } else { 0 }; 8];
-        let value = match word.get_mut(..bytes.len()) {
-            Some(low) => {
-                low.copy_from_slice(bytes);
-                Value::Int(i64::from_le_bytes(word))
-            }
-            None => Value::Other,
+    /// An integer of 1, 2 or 4 bytes, or of any length in two's complement.
+    fn number(&mut self, code: u8) -> Result<(), String> {
+        let value = match code {
+            b'K' => Value::Int(self.unsigned::<1>()?.into()),
+            b'M' => Value::Int(self.unsigned::<2>()?.into()),
+            b'J' => Value::Int(i32::from_le_bytes(self.array()?).into()),
+            _ => long(self.counted(1)?),
         };
         self.push(value)
     }
 
-    fn remember<const N: usize>(&mut self) -> Result<(), String> {
-        let number = self.unsigned::<N>()?;
+    /// A text, or what Python 2 called one.
+    fn text(&mut self, code: u8) -> Result<(), String> {
+        let size = match code {
+            0x8c | b'U' => 1,
+            0x8d => 8,
+            _ => 4,
+        };
+        let bytes = self.counted(size)?;
+        let value = match std::str::from_utf8(bytes) {
+            Ok(text) => Value::Text(text),
+            Err(_) if matches!(code, b'U' | b'T') => calls::bytes(&mut self.pickle, bytes.to_vec()),
+            Err(_) => return Err("a text that is not UTF-8".to_owned()),
+        };
+        self.push(value)
+    }
+
+    fn run_of_bytes(&mut self, code: u8) -> Result<(), String> {
+        let size = match code {
+            b'C' => 1,
+            b'B' => 4,
+            _ => 8,
+        };
+        let bytes = self.counted(size)?.to_vec();
+        let value = calls::bytes(&mut self.pickle, bytes);
+        self.push(value)
+    }
+
+    /// A name: two lines, or two texts on the stack.
+    fn name(&mut self, code: u8) -> Result<(), String> {
+        let (module, name) = match code {
+            b'c' => (self.line()?, self.line()?),
+            _ => match self.topmost(2)?.as_slice() {
+                &[Value::Text(module), Value::Text(name)] => (module, name),
+                _ => return Err("a name that is no text".to_owned()),
+            },
+        };
+        let name = Name { module, name };
+        calls::is_harmless(name)?;
+        self.push(Value::Name(name))
+    }
+
+    fn remember(&mut self, code: u8) -> Result<(), String> {
+        let number = match code {
+            b'q' => self.unsigned::<1>()?,
+            b'r' => self.unsigned::<4>()?,
+            _ => self.memo.len() as u32,
+        };
         let top = *self.stack.last().ok_or(EMPTY)?;
         self.memo.insert(number, top);
         Ok(())
@@ -248,6 +261,29 @@ impl<'a> Machine<'a> {
     fn recall<const N: usize>(&mut self) -> Result<(), String> {
         let number = self.unsigned::<N>()?;
         let value = *self.memo.get(&number).ok_or("a value that was never remembered")?;
+        self.push(value)
+    }
+
+    /// A dictionary, a list, a set or a tuple.
+    fn container(&mut self, code: u8) -> Result<(), String> {
+        let pickle = &mut self.pickle;
+        let value = match code {
+            b'}' => calls::dict(pickle),
+            b']' | 0x8f => calls::list(pickle, Vec::new()),
+            0x91 => {
+                let items = self.marked()?;
+                calls::list(&mut self.pickle, items)
+            }
+            _ => {
+                let items = match code {
+                    b')' => Vec::new(),
+                    b't' => self.marked()?,
+                    _ => self.topmost(usize::from(code - 0x84))?,
+                };
+                self.pickle.tuples.push(items);
+                Value::Tuple(self.pickle.tuples.len() - 1)
+            }
+        };
         self.push(value)
     }
 
@@ -261,87 +297,100 @@ impl<'a> Machine<'a> {
 
     /// A reference to what lies outside of the pickle: a storage.
     fn persistent(&mut self) -> Result<(), String> {
-        let number = self.pop_tuple()?;
-        let &[Value::Text("storage"), Value::Global(Global::Storage(kind)), Value::Text(key), ..] =
-            self.pickle.tuples[number].as_slice()
-        else {
-            return Err("a reference to something else than a storage".to_owned());
+        let tuple = self.pop_tuple()?;
+        let (kind, key) = match calls::head(&self.pickle, tuple).as_slice() {
+            &[Value::Text("storage"), Value::Name(kind), Value::Text(key), ..] => (kind, key),
+            _ => return Err("a reference to something else than a storage".to_owned()),
         };
+        let known = Kind::of_storage(kind.name).filter(|_| kind.module == "torch");
+        let kind = known.ok_or_else(|| format!("`{kind}` is no storage of PyTorch"))?;
         if key.len() > LONGEST_KEY {
             return Err(format!("a storage with a name of {} bytes", key.len()));
         }
-        self.push(Value::Storage(Storage { kind, key }))
+        self.pickle.storages.insert(key, kind);
+        self.push(Value::Storage(Storage { kind, place: Place::Entry(key) }))
     }
 
     /// What a call of the name below the arguments would give, without a call.
-    fn call(&mut self) -> Result<(), String> {
+    fn call(&mut self, code: u8) -> Result<(), String> {
+        if code == 0x92 {
+            // Arguments with names.
+            self.pop()?;
+        }
         let arguments = self.pop_tuple()?;
-        let Value::Global(function) = self.pop()? else {
-            return Err("a call of something that has no name".to_owned());
+        let value = match self.pop()? {
+            Value::Name(function) => calls::result(&mut self.pickle, function, arguments)?,
+            // A bound method, or what else an object of an unknown class gives.
+            unknown @ Value::Object(_) => unknown,
+            _ => return Err("a call of something that has no name".to_owned()),
         };
-        match (function, self.pickle.tuples[arguments].as_slice()) {
-            (Global::OrderedDict, []) => self.push_dict(),
-            (Global::Parameter, &[tensor @ Value::Tensor(_), ..]) => self.push(tensor),
-            (
-                Global::Tensor,
-                &[
-                    Value::Storage(storage),
-                    Value::Int(offset),
-                    Value::Tuple(shape),
-                    Value::Tuple(strides),
-                    ..,
-                ],
-            ) => {
-                let offset = usize::try_from(offset).map_err(|_| "a tensor with an offset < 0")?;
-                let (shape, strides) = (self.lengths(shape)?, self.lengths(strides)?);
-                self.pickle.tensors.push(View { storage, offset, shape, strides });
-                self.push(Value::Tensor(self.pickle.tensors.len() - 1))
-            }
-            _ => Err(format!("{function:?} with arguments that are not its own")),
-        }
+        self.push(value)
     }
 
-    /// The tuple `number` as lengths.
-    fn lengths(&self, number: usize) -> Result<Vec<usize>, String> {
-        let items = &self.pickle.tuples[number];
-        if items.len() > MOST_DIMENSIONS {
-            return Err(format!("a tensor of {} dimensions", items.len()));
-        }
-        let length = |item: &Value| match item {
-            Value::Int(length) => usize::try_from(*length).ok(),
-            _ => None,
+    /// Puts items into the container below them.
+    fn fill(&mut self, code: u8) -> Result<(), String> {
+        let items = match code {
+            b's' => self.topmost(2)?,
+            b'a' => self.topmost(1)?,
+            _ => self.marked()?,
         };
-        let lengths = items.iter().map(length).collect::<Option<_>>();
-        lengths.ok_or_else(|| "a shape or stride that is no whole number from 0 on".to_owned())
-    }
-
-    /// Puts keys and values, one after the other, into the dictionary on top of the stack.
-    fn set_items(&mut self, items: &[Value<'a>]) -> Result<(), String> {
-        let (pairs, rest) = items.as_chunks::<2>();
-        match self.stack.last() {
-            Some(&Value::Dict(number)) if rest.is_empty() => {
-                let pairs = pairs.iter().map(|&[key, value]| (key, value));
-                self.pickle.dicts[number].extend(pairs);
+        let into = *self.stack.last().ok_or(EMPTY)?;
+        let pairs = matches!(code, b's' | b'u');
+        match into {
+            Value::Dict(number) if pairs => self.set_items(number, &items),
+            Value::List(number) if !pairs => {
+                self.pickle.lists[number].extend(items);
                 Ok(())
             }
-            _ => Err("keys and values without a dictionary".to_owned()),
-        }
-    }
-
-    /// Lists are of no use to a network: their items are gone, the list itself stays.
-    fn list(&self) -> Result<(), String> {
-        match self.stack.last() {
-            Some(Value::Other) => Ok(()),
+            // A dictionary or a list of a class of its own.
+            Value::Object(number) => {
+                let part = if pairs { calls::dict(&mut self.pickle) } else { Value::Other };
+                self.pickle.objects[number].parts.push(part);
+                if let Value::Dict(dict) = part { self.set_items(dict, &items) } else { Ok(()) }
+            }
+            _ if pairs => Err("keys and values without a dictionary".to_owned()),
             _ => Err("items without a list".to_owned()),
         }
     }
 
+    /// Puts keys and values, one after the other, into a dictionary.
+    fn set_items(&mut self, dict: usize, items: &[Value<'a>]) -> Result<(), String> {
+        let (pairs, rest) = items.as_chunks::<2>();
+        if !rest.is_empty() {
+            return Err("a key without a value".to_owned());
+        }
+        self.pickle.dicts[dict].extend(pairs.iter().map(|&[key, value]| (key, value)));
+        Ok(())
+    }
+
     /// Attributes of an object. Those of a state dict hold versions of modules and no weights.
     fn build(&mut self) -> Result<(), String> {
-        self.pop()?;
-        match self.stack.last() {
-            Some(Value::Dict(_)) => Ok(()),
-            _ => Err("attributes of something else than a dictionary".to_owned()),
+        let state = self.pop()?;
+        let top = self.stack.last_mut().ok_or(EMPTY)?;
+        match *top {
+            Value::Dict(_) | Value::Tensor(_) | Value::List(_) => Ok(()),
+            Value::Type(_) => calls::order(&self.pickle, top, state),
+            Value::Object(number) => {
+                match calls::filled(&mut self.pickle, number, state)? {
+                    Some(array) => *top = array,
+                    None => self.pickle.objects[number].parts.push(state),
+                }
+                Ok(())
+            }
+            _ => Err("attributes of something that has none".to_owned()),
         }
+    }
+}
+
+/// An integer, least byte first, in two's complement.
+fn long<'a>(bytes: &[u8]) -> Value<'a> {
+    let negative = bytes.last().is_some_and(|&byte| byte >= 0x80);
+    let mut word = [if negative { 0xff } else { 0 }; 8];
+    match word.get_mut(..bytes.len()) {
+        Some(low) => {
+            low.copy_from_slice(bytes);
+            Value::Int(i64::from_le_bytes(word))
+        }
+        None => Value::Other,
     }
 }

@@ -1,4 +1,6 @@
-//! What a pickle of tensors is made of: values, the names that it may use, and its containers.
+//! What a pickle of tensors is made of: values, and the containers that hold them.
+
+use std::collections::HashMap;
 
 use super::kind::Kind;
 
@@ -9,52 +11,42 @@ pub(super) enum Value<'a> {
     Text(&'a str),
     /// An integer of at most 64 bits.
     Int(i64),
-    /// A name that may be used.
-    Global(Global),
+    /// A truth value.
+    Truth(bool),
+    /// The name of a class or a function.
+    Name(Name<'a>),
     /// Number of a tuple.
     Tuple(usize),
+    /// Number of a list or a set.
+    List(usize),
     /// Number of a dictionary.
     Dict(usize),
-    /// Numbers in an entry of their own.
+    /// Number of a run of bytes.
+    Bytes(usize),
+    /// Numbers outside of the pickle.
     Storage(Storage<'a>),
-    /// Number of a tensor.
+    /// A kind of numbers of NumPy.
+    Type(Kind),
+    /// Number of a tensor or an array.
     Tensor(usize),
-    /// What no network is made of: None, a truth value, a float, a list, a long integer.
+    /// Number of an object of a class that is not known.
+    Object(usize),
+    /// What no network is made of: None, a float, a long integer.
     Other,
 }
 
-/// The names that a state dict may use.
+/// A name that Python would look up, and nobody here does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Global {
-    /// `collections.OrderedDict`: a dictionary.
-    OrderedDict,
-    /// `torch._utils._rebuild_tensor_v2`: a tensor as a view of a storage.
-    Tensor,
-    /// `torch._utils._rebuild_parameter`: the tensor that is its first argument.
-    Parameter,
-    /// `torch.FloatStorage` and the like.
-    Storage(Kind),
+pub(super) struct Name<'a> {
+    /// The module.
+    pub(super) module: &'a str,
+    /// The name in it.
+    pub(super) name: &'a str,
 }
 
-impl Global {
-    /// The name `module.name`, if it may be used.
-    ///
-    /// # Errors
-    /// The refusal of any other name.
-    pub(super) fn find(module: &str, name: &str) -> Result<Self, String> {
-        let storage = Kind::of_storage(name).filter(|_| module == "torch").map(Self::Storage);
-        let known = match (module, name) {
-            ("collections", "OrderedDict") => Some(Self::OrderedDict),
-            ("torch._utils", "_rebuild_tensor_v2") => Some(Self::Tensor),
-            ("torch._utils", "_rebuild_parameter") => Some(Self::Parameter),
-            _ => storage,
-        };
-        known.ok_or_else(|| {
-            format!(
-                "names `{module}.{name}`, which no state dict needs; nothing was executed. Save \
-                 tensors alone: torch.save(module.state_dict(), FILE)"
-            )
-        })
+impl std::fmt::Display for Name<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}", self.module, self.name)
     }
 }
 
@@ -63,8 +55,17 @@ impl Global {
 pub(super) struct Storage<'a> {
     /// What the numbers are.
     pub(super) kind: Kind,
-    /// Name of the entry that holds them.
-    pub(super) key: &'a str,
+    /// Where they are.
+    pub(super) place: Place<'a>,
+}
+
+/// Where the numbers of a tensor are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Place<'a> {
+    /// In the entry of this name.
+    Entry(&'a str),
+    /// In the run of bytes of this number.
+    Bytes(usize),
 }
 
 /// A tensor as a view of a storage.
@@ -80,13 +81,32 @@ pub(super) struct View<'a> {
     pub(super) strides: Vec<usize>,
 }
 
+/// An object that was not made: what it would have been made of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Object<'a> {
+    /// The class or function that would have made it.
+    pub(super) maker: Name<'a>,
+    /// Its arguments, its attributes and what was put into it.
+    pub(super) parts: Vec<Value<'a>>,
+}
+
 /// A pickle that has been read.
 #[derive(Debug, Default)]
 pub(super) struct Pickle<'a> {
     /// Entries of each dictionary, in the order in which they were put in.
     pub(super) dicts: Vec<Vec<(Value<'a>, Value<'a>)>>,
-    /// Tensors.
+    /// Tensors and arrays.
     pub(super) tensors: Vec<View<'a>>,
     /// Items of each tuple.
     pub(super) tuples: Vec<Vec<Value<'a>>>,
+    /// Items of each list and set.
+    pub(super) lists: Vec<Vec<Value<'a>>>,
+    /// Runs of bytes.
+    pub(super) bytes: Vec<Vec<u8>>,
+    /// Runs of bytes that were written as a text, by the place of the text in memory.
+    pub(super) encoded: HashMap<usize, usize>,
+    /// Kinds of the storages that it refers to.
+    pub(super) storages: HashMap<&'a str, Kind>,
+    /// Objects that nobody made.
+    pub(super) objects: Vec<Object<'a>>,
 }

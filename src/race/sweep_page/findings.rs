@@ -286,6 +286,7 @@ fn certificate_limits(all: &[Certified<'_, '_>]) -> Vec<String> {
          better certificate by itself."
             .to_owned(),
         "Nothing is certified for one given state: each claim is about a measure.".to_owned(),
-        "Each point takes the policy that its configuration names; none is trained anew.".to_owned(),
+        "Each point takes the policy that its configuration names; none is trained anew."
+            .to_owned(),
     ]
 }

@@ -1,0 +1,256 @@
+//! Which tensors of a file are the policy, in which order, and with what around them.
+
+use std::collections::HashSet;
+
+use super::draft::{Draft, Step};
+use super::kind::Cast;
+use super::layers::{self, Dense, Order};
+use super::layouts::{self, Layout, Recognised};
+use super::linear::Linear;
+use super::lost;
+use super::map::Map;
+use super::names::under;
+use super::request::{Hints, Imported, Origin, Request};
+use super::source::{Source, Tensor};
+use super::statistics;
+use crate::policy::Activation;
+
+/// A layer that was chosen, apart from the file.
+#[derive(Debug)]
+struct Chosen {
+    name: String,
+    weight: Tensor,
+    order: Order,
+    bias: Option<Tensor>,
+}
+
+impl Chosen {
+    fn of(layer: &Dense<'_>) -> Self {
+        let Dense { name, weight, order, bias } = *layer;
+        Self { name: name.to_owned(), weight: weight.clone(), order, bias: bias.cloned() }
+    }
+}
+
+/// The layers of a policy, and the layout that they are of.
+#[derive(Debug)]
+struct Choice {
+    layers: Vec<Chosen>,
+    layout: Option<&'static Layout>,
+    /// What stands before all names of the layout.
+    outer: String,
+    /// Numbers that the first layer takes.
+    inputs: usize,
+    /// Whether the layers were asked for by name, and nothing but them.
+    by_name: bool,
+}
+
+/// A network with what it was made of.
+#[derive(Default)]
+struct Made {
+    draft: Draft,
+    /// Names of its tensors.
+    used: HashSet<String>,
+    /// What is to be said about it.
+    notes: Vec<String>,
+}
+
+/// The policy of a file of named tensors.
+///
+/// # Errors
+/// A sentence about a choice that is not clear, parts that would be lost, or numbers that are damaged.
+pub(super) fn policy(
+    mut source: Source<'_>,
+    request: &Request,
+    hints: &Hints,
+) -> Result<Imported, String> {
+    let choice = Choice::of(&source, request)?;
+    let dicts = choice.layers.iter().map(|layer| layer.weight.dict).collect();
+    lost::refuse_unmade(&source, &dicts)?;
+    let mut made = Made::default();
+    choice.add_statistics(&mut source, &mut made)?;
+    choice.add_layers(&mut source, &mut made, request, hints)?;
+    if !choice.by_name {
+        hints.refusal.clone().map_or(Ok(()), Err)?;
+        choice.add_ends(&mut source, &mut made, hints)?;
+        let first = choice.layers.first().map_or("", |layer| &layer.name);
+        let beside = choice.layout.map_or(&[][..], |layout| layout.beside);
+        lost::refuse(&source, &made.used, beside, layers::module(first))?;
+    }
+    let origin = |stated: bool, hinted: bool| match (stated, hinted, choice.layout) {
+        (true, ..) => Origin::Stated,
+        (_, true, _) => Origin::File,
+        (_, _, Some(_)) => Origin::Layout,
+        _ => Origin::Default,
+    };
+    Ok(Imported {
+        network: made.draft.network()?,
+        left_out: lost::left_out(&source, &made.used),
+        layers: choice.layers.into_iter().map(|layer| layer.name).collect(),
+        layout: choice.layout.map(|layout| layout.name.to_owned()),
+        notes: made.notes,
+        activation_from: origin(request.activation.is_some(), hints.activation.is_some()),
+        output_from: origin(request.output.is_some(), hints.output.is_some()),
+    })
+}
+
+impl Choice {
+    /// The layers that are asked for; those of the layout, or of the only network, if none is.
+    fn of(source: &Source<'_>, request: &Request) -> Result<Self, String> {
+        let dense = layers::dense(source);
+        if dense.is_empty() {
+            return Err(none(source));
+        }
+        let recognised = layouts::recognise(source, &dense);
+        let by_name = !request.networks.is_empty();
+        let layers = match &recognised {
+            _ if by_name => layers::named(source, &dense, &request.networks)?,
+            Some(recognised) => recognised.layers.clone(),
+            None => layers::only(source, &dense)?,
+        };
+        layers::check(&layers)?;
+        let same = |found: &&Recognised<'_>| names(&found.layers) == names(&layers);
+        let found = recognised.as_ref().filter(same);
+        Ok(Self {
+            layout: found.map(|found| found.layout),
+            outer: found.map_or(String::new(), |found| found.outer.clone()),
+            inputs: layers[0].inputs(),
+            layers: layers.iter().map(Chosen::of).collect(),
+            by_name,
+        })
+    }
+
+    /// Adds the map that normalises what the network is given, where the file has its statistics.
+    fn add_statistics(&self, source: &mut Source<'_>, made: &mut Made) -> Result<(), String> {
+        if self.by_name {
+            return Ok(());
+        }
+        if let Some(normaliser) = statistics::find(source, self.inputs)? {
+            made.draft.push(Step::Map(normaliser.map))?;
+            made.notes.push(format!("the inputs are normalised by `{}` first", normaliser.module));
+            made.used.extend(normaliser.names);
+        }
+        Ok(())
+    }
+
+    /// Adds the layers and what follows each of them.
+    fn add_layers(
+        &self,
+        source: &mut Source<'_>,
+        made: &mut Made,
+        request: &Request,
+        hints: &Hints,
+    ) -> Result<(), String> {
+        let usual = self.layout.map_or(Activation::Relu, |layout| layout.hidden);
+        let hidden = request.activation.or(hints.activation).unwrap_or(usual);
+        let usual = self.layout.map_or_else(|| self.usual_output(), |layout| layout.last);
+        let behind = request.output.or(hints.output).unwrap_or(usual);
+        for (i, layer) in self.layers.iter().enumerate() {
+            let is_last = i + 1 == self.layers.len();
+            let mut linear = linear(source, layer, request.cast)?;
+            if is_last && !self.by_name && self.layout.is_some_and(|layout| layout.doubled) {
+                made.notes.push(halve(&mut linear, &layer.name)?);
+            }
+            made.draft.push(Step::Linear(linear))?;
+            made.draft.push(Step::Activation(if is_last { behind } else { hidden }))?;
+            let bias = layer.bias.iter().map(|bias| bias.name.clone());
+            made.used.extend(bias.chain([layer.weight.name.clone()]));
+        }
+        Ok(())
+    }
+
+    /// What is behind the last layer where nobody says it.
+    fn usual_output(&self) -> Activation {
+        let critic = |key: &str| key.starts_with("critic");
+        match self.layers.iter().any(|layer| layer.name.split('.').any(critic)) {
+            true => Activation::Identity,
+            false => Activation::Tanh,
+        }
+    }
+
+    /// Adds what the output goes through.
+    fn add_ends(
+        &self,
+        source: &mut Source<'_>,
+        made: &mut Made,
+        hints: &Hints,
+    ) -> Result<(), String> {
+        let width = made.draft.width().unwrap_or_default();
+        if let Some(names) = self.layout.and_then(|layout| layout.scaled) {
+            let names = names.map(|name| under(&self.outer, name));
+            let [scale, shift] =
+                [numbers(source, &names[0], width)?, numbers(source, &names[1], width)?];
+            made.draft.push(Step::Map(Map::affine(scale, shift)))?;
+            made.notes.push(format!(
+                "the output is multiplied by `{}`, and `{}` is added",
+                names[0], names[1]
+            ));
+            made.used.extend(names);
+        }
+        if let Some(map) = &hints.output_map {
+            made.draft.push(Step::Map(map.widened(width)))?;
+        }
+        made.notes.extend(hints.notes.iter().cloned());
+        let beyond = self.layout.and_then(|layout| layout.beyond);
+        made.notes.extend(beyond.map(|beyond| format!("not in it: {beyond}")));
+        Ok(())
+    }
+}
+
+/// The refusal of a file without a dense layer.
+fn none(source: &Source<'_>) -> String {
+    let unmade = source.unmade.iter().take(3);
+    let unmade: String = unmade
+        .map(|object| {
+            format!("; `{}` is an object of `{}`, which was not made", object.name, object.maker)
+        })
+        .collect();
+    format!(
+        "no dense layer among its {} tensors: none is called `.weight` and has the shape [out, in]{unmade}",
+        source.tensors.len()
+    )
+}
+
+/// Names of layers.
+fn names<'a>(layers: &[Dense<'a>]) -> Vec<&'a str> {
+    layers.iter().map(|layer| layer.name).collect()
+}
+
+/// The layer with its numbers.
+fn linear(source: &mut Source<'_>, layer: &Chosen, cast: Cast) -> Result<Linear, String> {
+    let numbers = source.numbers(&layer.weight, cast)?;
+    let [rows, columns] = [layer.weight.shape[0], layer.weight.shape[1]];
+    let linear = match layer.order {
+        Order::OutIn => Linear::new(numbers, columns),
+        Order::InOut => Linear::transposed(&numbers, [rows, columns]),
+    };
+    match &layer.bias {
+        Some(bias) => Ok(Linear { bias: source.numbers(bias, cast)?, ..linear }),
+        None => Ok(linear),
+    }
+}
+
+/// Leaves the means of a layer that gives means and deviations; what is to be said about it.
+fn halve(linear: &mut Linear, name: &str) -> Result<String, String> {
+    let (half, rest) = (linear.outputs() / 2, linear.outputs() % 2);
+    if rest != 0 {
+        let width = linear.outputs();
+        return Err(format!(
+            "`{name}` gives {width} numbers, which are no means and as many deviations"
+        ));
+    }
+    *linear = linear.selected(&(0..half).collect::<Vec<_>>());
+    Ok(format!(
+        "`{name}` gives {half} means and {half} deviations of a Gaussian; the means are taken"
+    ))
+}
+
+/// The `width` numbers of the tensor `name`, or its one number as many times.
+fn numbers(source: &mut Source<'_>, name: &str, width: usize) -> Result<Vec<f64>, String> {
+    let tensor = source.tensor(name).cloned().ok_or_else(|| format!("no tensor `{name}`"))?;
+    let numbers = source.numbers(&tensor, Cast::ToF32)?;
+    match numbers.len() {
+        1 => Ok(vec![numbers[0]; width]),
+        have if have == width => Ok(numbers),
+        have => Err(format!("`{name}` has {have} numbers, the network gives {width}")),
+    }
+}

@@ -1,0 +1,163 @@
+//! From a pickle to named tensors: its dictionaries walked through, with the keys on the way.
+
+use std::collections::HashSet;
+
+use super::pickle::Unpickled;
+use super::source::{Place, Source, Tensor, Unmade};
+use super::value::{self, Object, Pickle, Value, View};
+
+/// How deep dictionaries may lie in one another.
+const DEEPEST: usize = 16;
+/// Most entries of all dictionaries, counted as often as they are reached.
+const MOST_ENTRIES: usize = 1 << 17;
+/// Longest key of a dictionary, bytes.
+const LONGEST_KEY: usize = 256;
+/// Classes whose attributes are tensors, or hold them.
+const HOLDERS: [&str; 3] = ["RunningStatisticsState", "NestedMeanStd", "FrozenDict"];
+
+/// The tensors of a pickle, and the objects that it would have had made.
+///
+/// # Errors
+/// A sentence about a pickle that is one object, holds two tensors of one name, or is without end.
+pub(super) fn source<'a>(unpickled: Unpickled<'_>) -> Result<Source<'a>, String> {
+    let Unpickled { pickle, root, .. } = unpickled;
+    refuse_object(&pickle, root)?;
+    let mut walk = Walk { pickle: &pickle, seen: 0, dict: 0, found: Source::default() };
+    walk.value(root, &mut Vec::new())?;
+    let mut found = walk.found;
+    let mut names = HashSet::new();
+    if let Some(twice) = found.tensors.iter().find(|tensor| !names.insert(tensor.name.clone())) {
+        return Err(format!("two tensors are called `{}`", twice.name));
+    }
+    found.runs = pickle.bytes;
+    Ok(found)
+}
+
+/// Refuses a pickle that is a single thing, and no container of tensors.
+fn refuse_object(pickle: &Pickle<'_>, root: Value<'_>) -> Result<(), String> {
+    let maker = match root {
+        Value::Dict(_) | Value::Tuple(_) | Value::List(_) => return Ok(()),
+        Value::Object(number) if holds(&pickle.objects[number]) => return Ok(()),
+        Value::Object(number) => pickle.objects[number].maker,
+        Value::Name(name) => name,
+        _ => {
+            return Err(
+                "no dictionary of tensors; save one: torch.save(module.state_dict(), FILE)"
+                    .to_owned(),
+            );
+        }
+    };
+    if maker.name == "VecNormalize" {
+        return Err(format!(
+            "an object of `{maker}`: the statistics of observations, and no network; nothing was executed. Import \
+             the model's own archive, and normalise what it is given"
+        ));
+    }
+    Err(format!(
+        "an object of `{maker}`, which a program would have to make; nothing was executed. Save tensors \
+         alone: torch.save(module.state_dict(), FILE)"
+    ))
+}
+
+/// Whether the attributes of an object are looked at.
+fn holds(object: &Object<'_>) -> bool {
+    // Modules of TorchScript, whose classes are all compiled.
+    object.maker.module.starts_with("__torch__") || HOLDERS.contains(&object.maker.name)
+}
+
+/// A walk through the containers of a pickle.
+struct Walk<'p, 'b, 'a> {
+    pickle: &'p Pickle<'b>,
+    /// Entries seen.
+    seen: usize,
+    /// The dictionary that is walked through.
+    dict: usize,
+    found: Source<'a>,
+}
+
+impl<'b> Walk<'_, 'b, '_> {
+    /// Adds what is in `value`, which lies at `path`.
+    fn value(&mut self, value: Value<'b>, path: &mut Vec<String>) -> Result<(), String> {
+        let pickle = self.pickle;
+        match value {
+            Value::Tensor(number) => {
+                let tensor = tensor(path.join("."), self.dict, &pickle.tensors[number]);
+                self.found.tensors.push(tensor);
+                Ok(())
+            }
+            Value::Dict(number) => self.entries(number, path),
+            Value::List(number) => self.items(&pickle.lists[number], path),
+            Value::Tuple(number) => self.items(&pickle.tuples[number], path),
+            Value::Object(number) if holds(&pickle.objects[number]) => {
+                let parts = pickle.objects[number].parts.iter();
+                let dicts = parts.filter(|part| matches!(part, Value::Dict(_)));
+                dicts.copied().try_for_each(|part| self.value(part, path))
+            }
+            Value::Object(number) => {
+                let (name, maker) = (path.join("."), pickle.objects[number].maker.to_string());
+                self.found.unmade.push(Unmade { name, dict: self.dict, maker });
+                Ok(())
+            }
+            Value::Name(name) => {
+                let (path, maker) = (path.join("."), name.to_string());
+                self.found.unmade.push(Unmade { name: path, dict: self.dict, maker });
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds what is in a dictionary.
+    fn entries(&mut self, dict: usize, path: &mut Vec<String>) -> Result<(), String> {
+        let outer = std::mem::replace(&mut self.dict, dict);
+        for &(key, value) in &self.pickle.dicts[dict] {
+            let key = match key {
+                Value::Text(text) if text.len() > LONGEST_KEY => {
+                    return Err(format!("a key of {} bytes", text.len()));
+                }
+                Value::Text(text) => text.to_owned(),
+                Value::Int(number) => number.to_string(),
+                _ => "?".to_owned(),
+            };
+            self.within(key, value, path)?;
+        }
+        self.dict = outer;
+        Ok(())
+    }
+
+    /// Adds what is in a list or a tuple.
+    fn items(&mut self, items: &[Value<'b>], path: &mut Vec<String>) -> Result<(), String> {
+        let numbered = items.iter().enumerate();
+        numbered.map(|(i, item)| self.within(i.to_string(), *item, path)).collect()
+    }
+
+    /// Adds what lies under `key`.
+    fn within(
+        &mut self,
+        key: String,
+        value: Value<'b>,
+        path: &mut Vec<String>,
+    ) -> Result<(), String> {
+        self.seen += 1;
+        if self.seen > MOST_ENTRIES {
+            return Err(format!("more than {MOST_ENTRIES} entries in its dictionaries"));
+        }
+        if path.len() == DEEPEST {
+            return Err(format!("dictionaries within one another, {DEEPEST} deep and more"));
+        }
+        path.push(key);
+        self.value(value, path)?;
+        path.pop();
+        Ok(())
+    }
+}
+
+/// The tensor `name`.
+fn tensor(name: String, dict: usize, view: &View<'_>) -> Tensor {
+    let View { storage, offset, shape, strides } = view.clone();
+    let place = match storage.place {
+        value::Place::Entry(key) => Place::Entry(key.to_owned()),
+        value::Place::Bytes(number) => Place::Run(number),
+    };
+    Tensor { name, dict, shape, strides, offset, kind: storage.kind, place }
+}

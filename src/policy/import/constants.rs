@@ -1,0 +1,81 @@
+//! What operations of a graph make of constants, before anything runs.
+
+use super::array::Array;
+use super::kind::Cast;
+use crate::policy::onnx::Node;
+
+/// What the operation `node` gives for constants; `None` for an input that is left out.
+///
+/// # Errors
+/// A sentence about an operation that is not known, or shapes that do not go together.
+pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Result<Array, String> {
+    if node.operation == "Constant" {
+        return node.constant(cast).map_err(|problem| format!("`{}`: {problem}", name(node)));
+    }
+    let input = |i: usize| inputs.get(i).copied().flatten();
+    let first = input(0).ok_or("an input is missing")?;
+    let found = match (node.operation.as_str(), input(1)) {
+        ("Identity" | "Cast" | "Dropout", _) => Some(first.clone()),
+        ("Add", Some(other)) => first.with(other, |a, b| a + b),
+        ("Sub", Some(other)) => first.with(other, |a, b| a - b),
+        ("Mul", Some(other)) => first.with(other, |a, b| a * b),
+        ("Div", Some(other)) => first.with(other, |a, b| a / b),
+        ("Pow", Some(other)) => first.with(other, f64::powf),
+        ("Max", Some(other)) => first.with(other, f64::max),
+        ("Min", Some(other)) => first.with(other, f64::min),
+        ("Neg", None) => Some(first.each(|x| -x)),
+        ("Sqrt", None) => Some(first.each(f64::sqrt)),
+        ("Exp", None) => Some(first.each(f64::exp)),
+        ("Reciprocal", None) => Some(first.each(|x| 1.0 / x)),
+        ("Reshape", Some(shape)) => first.reshaped(&shape.wholes()),
+        ("Transpose", None) => first.transposed(node.integers("perm")),
+        ("Flatten", None) => flat(first, node.integer("axis").unwrap_or(1)),
+        ("Unsqueeze" | "Squeeze", axes) => {
+            let axes = axes.map(Array::wholes).or(node.integers("axes").map(<[i64]>::to_vec));
+            ones(first, axes.as_deref(), node.operation == "Unsqueeze")
+        }
+        ("Concat", _) if first.shape.len() == 1 => {
+            let lists: Option<Vec<&Array>> = inputs.iter().copied().collect();
+            let joint =
+                lists.map(|lists| lists.iter().flat_map(|list| list.numbers.clone()).collect());
+            joint.map(Array::list)
+        }
+        _ => return Err("of constants, which is not followed".to_owned()),
+    };
+    found.ok_or_else(|| format!("the shapes of `{}` do not go together", node.inputs.join("`, `")))
+}
+
+/// The name of what a node gives.
+fn name(node: &Node) -> &str {
+    node.outputs.first().map_or("", String::as_str)
+}
+
+/// Two dimensions: those before `axis`, and the others.
+fn flat(array: &Array, axis: i64) -> Option<Array> {
+    let rank = array.shape.len() as i64;
+    let axis = usize::try_from(if axis < 0 { axis + rank } else { axis }).ok()?;
+    let rows: usize = array.shape.get(..axis)?.iter().product();
+    let columns: usize = array.shape.get(axis..)?.iter().product();
+    Array::new(vec![rows, columns], &array.numbers)
+}
+
+/// Dimensions of length 1 put in or taken out.
+fn ones(array: &Array, axes: Option<&[i64]>, insert: bool) -> Option<Array> {
+    let mut shape = array.shape.clone();
+    let Some(axes) = axes else {
+        shape.retain(|&length| length != 1 || insert);
+        return Array::new(shape, &array.numbers);
+    };
+    let rank = (shape.len() + if insert { axes.len() } else { 0 }) as i64;
+    let place = |&axis: &i64| usize::try_from(if axis < 0 { axis + rank } else { axis }).ok();
+    let mut places = axes.iter().map(place).collect::<Option<Vec<usize>>>()?;
+    places.sort_unstable();
+    for place in if insert { places } else { places.into_iter().rev().collect() } {
+        match insert {
+            true if place <= shape.len() => shape.insert(place, 1),
+            false if shape.get(place) == Some(&1) => _ = shape.remove(place),
+            _ => return None,
+        }
+    }
+    Array::new(shape, &array.numbers)
+}

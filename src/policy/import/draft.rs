@@ -1,0 +1,269 @@
+//! A network as a list of steps in f64, and the one place where it becomes a policy.
+
+use super::linear::Linear;
+use super::map::Map;
+use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
+
+/// Most layers of a network: layers may share their numbers, memory does not.
+pub(super) const MOST_LAYERS: usize = 64;
+/// Most numbers between two layers that a layer of its own is made for.
+const WIDEST: usize = 4096;
+
+/// A step from the input to the output.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Step {
+    /// A linear layer.
+    Linear(Linear),
+    /// A map of each number.
+    Map(Map),
+    /// Normalised to mean 0 and deviation 1, then a map.
+    Norm { scale: Vec<f64>, shift: Vec<f64>, epsilon: f32 },
+    /// An activation.
+    Activation(Activation),
+}
+
+/// A network on the way to a policy.
+#[derive(Debug, Default)]
+pub(super) struct Draft {
+    /// Numbers that it takes, if there is no layer before one has to know.
+    inputs: Option<usize>,
+    /// The steps; linear ones in a row are one.
+    steps: Vec<Step>,
+    /// Whether they are a policy's own, and stay as many.
+    as_is: bool,
+    /// The activation of the hidden layers of a policy that has none.
+    hidden: Option<Activation>,
+}
+
+/// A layer in f64 with what follows it.
+struct Stage {
+    linear: Linear,
+    norm: Option<Norm>,
+    activation: Activation,
+}
+
+impl Draft {
+    /// A network of `inputs` numbers, where that is known before its layers are.
+    pub(super) fn of(inputs: Option<usize>) -> Self {
+        Self { inputs, steps: Vec::new(), as_is: false, hidden: None }
+    }
+
+    /// The same of a policy that was written out, whose layers and maps stay what they are.
+    pub(super) fn as_is(inputs: Option<usize>, hidden: Option<Activation>) -> Self {
+        Self { as_is: true, hidden, ..Self::of(inputs) }
+    }
+
+    /// Adds a step at the end.
+    ///
+    /// # Errors
+    /// A sentence about widths that do not fit.
+    pub(super) fn push(&mut self, step: Step) -> Result<(), String> {
+        self.fits(&step)?;
+        let first = self.steps.len() == 1;
+        match (self.steps.last_mut(), step) {
+            (_, Step::Map(map)) if map.is_identity() => {}
+            (_, Step::Activation(Activation::Identity)) => {}
+            (Some(Step::Map(last)), Step::Map(map)) => *last = last.then(&map),
+            (_, step) if self.as_is => self.steps.push(step),
+            (Some(Step::Linear(last)), Step::Linear(next)) => *last = last.then(&next)?,
+            (Some(Step::Linear(last)), Step::Map(map)) if map.is_affine() => last.scaled(&map)?,
+            // A map before the first layer is the policy's own, unless nothing is rounded.
+            (Some(Step::Map(map)), Step::Linear(mut next))
+                if map.is_affine() && (!first || next.is_exact_after(map)) =>
+            {
+                next.after(map)?;
+                self.steps.pop();
+                return self.push(Step::Linear(next));
+            }
+            (_, step) => self.steps.push(step),
+        }
+        match self.steps.len() > 4 * MOST_LAYERS {
+            true => Err(format!("more than {MOST_LAYERS} layers")),
+            false => Ok(()),
+        }
+    }
+
+    /// Numbers that come out of the last step, where that is known.
+    pub(super) fn width(&self) -> Option<usize> {
+        let of = |step: &Step| match step {
+            Step::Linear(linear) => Some(linear.outputs()),
+            Step::Map(map) => Some(map.width()),
+            Step::Norm { scale, .. } => Some(scale.len()),
+            Step::Activation(_) => None,
+        };
+        self.steps.iter().rev().find_map(of).or(self.inputs)
+    }
+
+    /// Leaves these of the numbers that come out, in this order.
+    ///
+    /// # Errors
+    /// A sentence about numbers that there are not, or that others have gone into.
+    pub(super) fn select(&mut self, rows: &[usize]) -> Result<(), String> {
+        let width = self.width().ok_or("a part of an input of unknown width")?;
+        if let Some(row) = rows.iter().find(|row| **row >= width) {
+            return Err(format!("number {row} (from 0) of {width}"));
+        }
+        for step in self.steps.iter_mut().rev() {
+            match step {
+                Step::Linear(linear) => {
+                    *linear = linear.selected(rows);
+                    return Ok(());
+                }
+                Step::Map(map) => *map = map.selected(rows),
+                Step::Activation(_) => {}
+                Step::Norm { .. } => {
+                    return Err("a part of what is normalised as a whole".to_owned());
+                }
+            }
+        }
+        Err("a part of the input alone".to_owned())
+    }
+
+    /// Refuses a step of another width than what comes before it.
+    fn fits(&mut self, step: &Step) -> Result<(), String> {
+        let takes = match step {
+            Step::Linear(linear) => linear.inputs,
+            Step::Map(map) => map.width(),
+            Step::Norm { scale, .. } => scale.len(),
+            Step::Activation(_) => return Ok(()),
+        };
+        match self.width() {
+            Some(have) if have != takes => {
+                Err(format!("{have} numbers where the next operation takes {takes}"))
+            }
+            _ => {
+                self.inputs.get_or_insert(takes);
+                Ok(())
+            }
+        }
+    }
+
+    /// Makes a clip behind the last activation a map of the output: it needs no layer of its own.
+    fn end_clip(&mut self) {
+        let limits = match self.steps.as_slice() {
+            [.., Step::Activation(_), Step::Activation(Activation::Hardtanh { low, high })] => {
+                [*low, *high]
+            }
+            [.., Step::Activation(_), Step::Activation(Activation::Relu6)] => [0.0, 6.0],
+            _ => return,
+        };
+        if let Some(width) = self.width() {
+            let [low, high] = limits.map(|limit| vec![f64::from(limit); width]);
+            self.steps.pop();
+            self.steps.push(Step::Map(Map::clamp(low, high)));
+        }
+    }
+
+    /// The policy.
+    ///
+    /// # Errors
+    /// A sentence about what no policy file can say.
+    pub(super) fn network(mut self) -> Result<Mlp, String> {
+        self.end_clip();
+        let input = match self.steps.first() {
+            Some(Step::Map(_)) if self.steps.len() > 1 => Some(self.steps.remove(0)),
+            _ => None,
+        };
+        let output = match self.steps.last() {
+            Some(Step::Map(_)) if self.steps.len() > 1 => self.steps.pop(),
+            _ => None,
+        };
+        let mut stages: Vec<Stage> = Vec::new();
+        for step in std::mem::take(&mut self.steps) {
+            stage(&mut stages, step, self.inputs)?;
+        }
+        if stages.is_empty() {
+            return Err("no layer between input and output".to_owned());
+        }
+        if stages.len() > MOST_LAYERS {
+            return Err(format!("{} layers; a network has at most {MOST_LAYERS}", stages.len()));
+        }
+        let layers: Vec<Layer> = stages.into_iter().map(layer).collect();
+        let mut network = match (layers.as_slice(), self.hidden) {
+            ([only], Some(hidden)) => Mlp::new(vec![only.clone()], hidden, only.activation),
+            _ => Mlp::from_layers(layers),
+        };
+        for (at_input, map) in [(true, input), (false, output)] {
+            if let Some(Step::Map(map)) = map {
+                let map = rescale(&map);
+                network = network.and_then(|network| match at_input {
+                    true => network.with_input(map),
+                    false => network.with_output(map),
+                });
+            }
+        }
+        network.map_err(|error| error.to_string())
+    }
+}
+
+/// Adds a step to the layers so far.
+fn stage(stages: &mut Vec<Stage>, step: Step, inputs: Option<usize>) -> Result<(), String> {
+    match step {
+        Step::Linear(linear) => {
+            stages.push(Stage { linear, norm: None, activation: Activation::Identity });
+        }
+        Step::Norm { scale, shift, epsilon } => {
+            let narrow = |values: Vec<f64>| values.into_iter().map(|value| value as f32).collect();
+            let stage = open(stages, inputs, |stage| stage.norm.is_none())?;
+            stage.norm = Some(Norm { scale: narrow(scale), shift: narrow(shift), epsilon });
+        }
+        Step::Activation(activation) => open(stages, inputs, |_| true)?.activation = activation,
+        Step::Map(map) => {
+            let (affine, limits) = map.parts();
+            let limits =
+                limits.ok_or("limits between layers that are not the same for all neurons")?;
+            let stage = open(stages, Some(map.width()), |stage| stage.norm.is_none())?;
+            stage.linear.scaled(&affine)?;
+            stage.activation = clip(limits)?;
+        }
+    }
+    Ok(())
+}
+
+/// The last layer if nothing closes it, or a new one that changes nothing.
+fn open(
+    stages: &mut Vec<Stage>,
+    inputs: Option<usize>,
+    is_open: fn(&Stage) -> bool,
+) -> Result<&mut Stage, String> {
+    let last = stages.last();
+    let takes_more =
+        last.is_some_and(|last| last.activation == Activation::Identity && is_open(last));
+    if !takes_more {
+        let width = last.map(|last| last.linear.outputs()).or(inputs);
+        let width = width.filter(|width| *width <= WIDEST);
+        let width = width.ok_or(
+            "an operation before the first layer, of which nobody says how many numbers it takes",
+        )?;
+        let linear = Linear::diagonal(&Map::affine(vec![1.0; width], vec![0.0; width]))?;
+        stages.push(Stage { linear, norm: None, activation: Activation::Identity });
+    }
+    stages.last_mut().ok_or_else(|| "no layer".to_owned())
+}
+
+/// The activation that cuts off at these limits.
+fn clip([low, high]: [f64; 2]) -> Result<Activation, String> {
+    match (low, high) {
+        (f64::NEG_INFINITY, f64::INFINITY) => Ok(Activation::Identity),
+        (0.0, f64::INFINITY) => Ok(Activation::Relu),
+        (0.0, 6.0) => Ok(Activation::Relu6),
+        _ if low.is_finite() && high.is_finite() && low < high => {
+            Ok(Activation::Hardtanh { low: low as f32, high: high as f32 })
+        }
+        _ => Err(format!("a clip from {low} to {high} between layers")),
+    }
+}
+
+/// The layer in f32, each number rounded once.
+fn layer(stage: Stage) -> Layer {
+    let Stage { linear: Linear { weight, bias, .. }, norm, activation } = stage;
+    let narrow = |values: Vec<f64>| values.into_iter().map(|value| value as f32).collect();
+    Layer { norm, activation, ..Layer::dense(narrow(weight), narrow(bias)) }
+}
+
+/// The map in f32.
+fn rescale(map: &Map) -> Rescale {
+    let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect();
+    let Map { scale, shift, low, high } = map;
+    Rescale { scale: narrow(scale), shift: narrow(shift), low: narrow(low), high: narrow(high) }
+}

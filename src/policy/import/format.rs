@@ -1,0 +1,97 @@
+//! What a file is, told by its first bytes, and what to do with one that holds no policy that is read.
+
+use std::path::Path;
+
+use super::text;
+
+/// A format that is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    /// A zip archive: a checkpoint of PyTorch, or of stable-baselines3.
+    Archive,
+    /// A pickle: of JAX, or of PyTorch before 1.6.
+    Pickle,
+    /// A safetensors file.
+    Safetensors,
+    /// An ONNX graph.
+    Graph,
+    /// The text of ACAS networks.
+    Nnet,
+    /// The text of Sherlock and POLAR.
+    Polar,
+}
+
+/// First bytes of other files, what they are, and what to do.
+const OTHERS: [(&[u8], &str, &str); 12] = [
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file, as Keras writes it (or MATLAB 7.3)", KERAS),
+    (b"MATLAB 5.0", "a MATLAB file", MATLAB),
+    (b"\x1f\x8b", "compressed with gzip", "unpack it first: gunzip -k FILE"),
+    (
+        b"version https://git-lfs",
+        "a pointer of Git LFS, and not the file itself",
+        "fetch it first: git lfs pull",
+    ),
+    (b"\x93NUMPY", "one NumPy array (.npy)", NUMPY),
+    (b"<!DOCTYPE", "an HTML page, and not the file itself", HTML),
+    (b"<!doctype", "an HTML page, and not the file itself", HTML),
+    (b"<html", "an HTML page, and not the file itself", HTML),
+    (b"BZh", "compressed with bzip2", "unpack it first: bunzip2 -k FILE"),
+    (b"\xfd7zXZ\0", "compressed with xz", "unpack it first: xz -dk FILE"),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "compressed with zstd",
+        "unpack it first: zstd -d FILE; of Orbax, save the parameters alone",
+    ),
+    (b"Rar!", "a RAR archive", "unpack it first"),
+];
+const KERAS: &str =
+    "convert it to ONNX: python -m tf2onnx.convert --keras FILE --output policy.onnx";
+const MATLAB: &str = "export the network to ONNX: exportONNXNetwork(net, 'policy.onnx'), or save its weights as \
+                      safetensors: safetensors.numpy.save_file(scipy.io.loadmat(FILE))";
+const NUMPY: &str = "save all arrays of the network as safetensors: safetensors.numpy.save_file({'0.weight': w0, \
+                     '0.bias': b0}, 'policy.safetensors')";
+const HTML: &str = "download it again, from the address of the raw file";
+const FLAX: &str = "write its parameters as safetensors: p = flax.serialization.msgpack_restore(open(FILE, 'rb').read()); \
+                    safetensors.flax.save_file(flax.traverse_util.flatten_dict(p, sep='.'), 'policy.safetensors')";
+
+impl Format {
+    /// The format of the file `path` with this content.
+    ///
+    /// # Errors
+    /// What it is instead, and what to do.
+    pub(super) fn of(path: &Path, bytes: &[u8]) -> Result<Self, String> {
+        let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+        let ending = ending.as_deref().and_then(|ending| ending.to_str()).unwrap_or_default();
+        if let Some((_, what, remedy)) = OTHERS.iter().find(|(first, ..)| bytes.starts_with(first))
+        {
+            return Err(format!("{what}; {remedy}"));
+        }
+        Ok(match bytes {
+            [b'P', b'K', 3, 4, ..] if ending == "npz" => {
+                return Err(format!("NumPy arrays (.npz); {NUMPY}"));
+            }
+            [b'P', b'K', 3, 4, ..] => Self::Archive,
+            _ if ending == "onnx" => Self::Graph,
+            [0x80, 2..=5, ..] => Self::Pickle,
+            [_, _, _, _, _, _, 0, 0, b'{', ..] => Self::Safetensors,
+            _ if ending == "nnet" => Self::Nnet,
+            _ if text::is_numbers(bytes) => Self::Polar,
+            // A map of up to 15 entries whose first key is a text: what flax writes.
+            [0x80..=0x8f, 0xa0..=0xbf | 0xd9, ..] => {
+                return Err(format!("MessagePack, as flax writes it; {FLAX}"));
+            }
+            [] => return Err("an empty file".to_owned()),
+            _ => return Err(unknown(bytes)),
+        })
+    }
+}
+
+/// The refusal of a file that nothing is known of.
+fn unknown(bytes: &[u8]) -> String {
+    let text = std::str::from_utf8(bytes.get(..64).unwrap_or(bytes)).is_ok();
+    let what = if text { "a text" } else { "a file" };
+    format!(
+        "{what} of a format that is not known: neither a checkpoint of PyTorch (a zip archive), a pickle, safetensors, \
+         .nnet, nor called .onnx"
+    )
+}

@@ -1,0 +1,95 @@
+//! Parts of what a network gives: `Split`, `Slice` and `Gather`.
+
+use super::graph::{Number, Problem, Value, Walk};
+use super::operations::constant;
+use crate::policy::onnx::Node;
+
+/// Most numbers of a part.
+const MOST: usize = 1 << 12;
+
+/// What these operations give.
+///
+/// # Errors
+/// A part of something else than the last dimension, or one that is not there.
+pub(super) fn apply(
+    walk: &Walk<'_>,
+    node: &Node,
+    number: Number,
+    rest: &[Option<Value>],
+) -> Result<Vec<Value>, Problem> {
+    let all = match &number.rows {
+        Some(rows) => rows.clone(),
+        None => {
+            let width = walk.draft.width().filter(|width| *width <= MOST);
+            (0..width.ok_or("of an input of unknown width")?).collect()
+        }
+    };
+    let wholes = |i: usize, name: &str| match rest.get(i) {
+        Some(Some(Value::Constant(array))) => Some(array.wholes()),
+        _ => node.integers(name).map(<[i64]>::to_vec),
+    };
+    let parts = match node.operation.as_str() {
+        "Split" => {
+            last(node.integer("axis").unwrap_or(0))?;
+            split(&all, wholes(0, "split"), node.outputs.len())
+        }
+        "Slice" => {
+            let axes = wholes(2, "axes").ok_or("without an axis")?;
+            axes.iter().try_for_each(|&axis| last(axis))?;
+            let steps = wholes(3, "steps").unwrap_or_default();
+            let one = |all: Option<Vec<i64>>| all.filter(|all| all.len() == 1).map(|all| all[0]);
+            let ends = one(wholes(0, "starts")).zip(one(wholes(1, "ends")));
+            let ends = ends.filter(|_| steps.iter().all(|&step| step == 1) && axes.len() == 1);
+            ends.map(|(start, end)| vec![slice(&all, start, end)])
+        }
+        _ => {
+            last(node.integer("axis").unwrap_or(0))?;
+            let picks = constant(rest, 0)?.wholes();
+            let pick = |&i: &i64| all.get(place(i, all.len())?).copied();
+            let picked = picks.iter().map(pick).collect::<Option<Vec<usize>>>();
+            picked.filter(|rows| rows.len() <= MOST).map(|rows| vec![rows])
+        }
+    };
+    let parts = parts.filter(|parts| parts.iter().all(|rows| !rows.is_empty()));
+    let parts = parts.ok_or("a part that is not there")?;
+    Ok(parts
+        .into_iter()
+        .map(|rows| Value::Number(Number { rows: Some(rows), ..number.clone() }))
+        .collect())
+}
+
+/// Refuses another dimension than the last: the first counts inputs.
+fn last(axis: i64) -> Result<(), Problem> {
+    match axis {
+        0 => Err("of the dimension that counts inputs".into()),
+        -1 | 1.. => Ok(()),
+        _ => Err("of another dimension than the last".into()),
+    }
+}
+
+/// The index that `i` stands for, which counts from the end if it is negative.
+fn place(i: i64, width: usize) -> Option<usize> {
+    usize::try_from(if i < 0 { i + width as i64 } else { i }).ok()
+}
+
+/// So many parts: of these lengths, or as long as each other.
+fn split(all: &[usize], lengths: Option<Vec<i64>>, count: usize) -> Option<Vec<Vec<usize>>> {
+    let each = all.len().div_ceil(count.max(1));
+    let lengths = lengths.unwrap_or_else(|| vec![each as i64; count]);
+    let mut rest = all;
+    let part = |length: i64| {
+        let length = usize::try_from(length).ok()?.min(rest.len());
+        let (part, after) = rest.split_at(length);
+        rest = after;
+        Some(part.to_vec())
+    };
+    let parts = lengths.into_iter().map(part).collect::<Option<Vec<_>>>();
+    parts.filter(|_| rest.is_empty())
+}
+
+/// From `start` up to `end`, as far as there is something.
+fn slice(all: &[usize], start: i64, end: i64) -> Vec<usize> {
+    let width = all.len() as i64;
+    let within = |i: i64| if i < 0 { i.saturating_add(width) } else { i }.clamp(0, width) as usize;
+    all.get(within(start)..within(end)).map_or(Vec::new(), <[usize]>::to_vec)
+}

@@ -1,0 +1,69 @@
+//! What an import is asked for, and what it finds.
+
+use serde::Serialize;
+
+use super::kind::Cast;
+use super::map::Map;
+use crate::policy::{Activation, Mlp};
+
+/// Which network is wanted, and what its file does not say.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// Prefixes of the names of its layers, one after the other; none if there is one network.
+    pub networks: Vec<String>,
+    /// Activation of the hidden layers.
+    pub activation: Option<Activation>,
+    /// Activation of the last layer.
+    pub output: Option<Activation>,
+    /// What is done with floats of another width.
+    pub cast: Cast,
+}
+
+/// Where a property of the network comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// The file.
+    File,
+    /// The request.
+    Stated,
+    /// What the library that wrote the file does by default.
+    Layout,
+    /// Nobody.
+    Default,
+}
+
+/// A network that was found.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// The network.
+    pub network: Mlp,
+    /// Names of its layers in the file.
+    pub layers: Vec<String>,
+    /// Names of the tensors that are no part of it, those of no dense layer first; objects that were not
+    /// made have their class behind their names.
+    pub left_out: Vec<String>,
+    /// The library or format whose layout the file has, where it is known.
+    pub layout: Option<String>,
+    /// What else was made of the file, and what the library does that is not in it.
+    pub notes: Vec<String>,
+    /// Who said what the hidden activation is.
+    pub activation_from: Origin,
+    /// Who said what the last activation is.
+    pub output_from: Origin,
+}
+
+/// What stands beside the tensors of a file.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Hints {
+    /// Activation of the hidden layers.
+    pub(super) activation: Option<Activation>,
+    /// Activation of the last layer.
+    pub(super) output: Option<Activation>,
+    /// What the output goes through then; of one number if it is the same for all.
+    pub(super) output_map: Option<Map>,
+    /// Why the layers are no policy, unless they are asked for by name.
+    pub(super) refusal: Option<String>,
+    /// What to say about it.
+    pub(super) notes: Vec<String>,
+}
