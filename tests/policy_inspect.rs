@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::policy::inspect::{Inspection, output_intervals, output_ranges};
-use reachcast::policy::{Activation, Layer, Mlp};
-use reachcast::real::bound::Interval;
+use reachcast::policy::{Activation, Layer, Mlp, Norm, Rescale};
+use reachcast::real::bound::{Domain, Interval, lipschitz};
 use reachcast::rollout::{Purpose, Region, Stream};
 
 /// A network with weights drawn uniformly, of about unit gain per layer.
@@ -210,4 +210,50 @@ fn numbers_of_the_layers() {
     assert!((4.0..4.001).contains(&layers[0].spectral_norm), "{}", layers[0].spectral_norm);
     assert!((4.0 - 1e-6..4.001).contains(&lipschitz_bound), "{lipschitz_bound}");
     assert_eq!(parameter_count, 9);
+}
+
+/// A network with everything: a norm, a map at each end, an activation of its own in each layer.
+fn whole(activation: Activation, seed: u64) -> Mlp {
+    let mut layers = network(&[3, 12, 9, 2], activation, Activation::Gelu, seed).layers().to_vec();
+    layers[1].activation = Activation::Softsign;
+    let row = |from: f32, count: usize| (0..count).map(|k| from + 0.1 * (k % 4) as f32).collect();
+    layers[0].norm = Some(Norm { scale: row(0.6, 12), shift: row(-0.2, 12), epsilon: 0.01 });
+    let input = Rescale { low: vec![-0.8; 3], ..Rescale::affine(row(0.7, 3), row(-0.1, 3)) };
+    let output = Rescale { high: vec![0.1, 3.0], ..Rescale::affine(row(-1.3, 2), row(0.2, 2)) };
+    let mlp = Mlp::from_layers(layers).and_then(|mlp| mlp.with_input(input));
+    mlp.and_then(|mlp| mlp.with_output(output)).unwrap()
+}
+
+#[test]
+fn bounds_hold_networks_with_norms_and_maps() {
+    let mut draw = StdRng::seed_from_u64(21);
+    for (seed, activation) in (30..).zip(activations()) {
+        let mlp = whole(activation, seed);
+        let global = Inspection::of(&mlp).lipschitz_bound;
+        for size in [0.01, 0.3, 2.0] {
+            let centre: Vec<f64> = (0..3).map(|_| draw.random_range(-0.6..0.6)).collect();
+            let [low, high] =
+                [-size, size].map(|side| centre.iter().map(|c| c + side).collect::<Vec<_>>());
+            let domain = Domain { low: &low, high: &high, varies: &[true; 3] };
+            let local = lipschitz(domain, |x| mlp.forward(x)[0]).constant;
+            let sides = low.iter().zip(&high).map(|(&low, &high)| Interval::new(low, high));
+            let intervals = output_intervals(&mlp, &sides.collect::<Vec<_>>()).unwrap();
+            let mut point = || -> Vec<f64> {
+                centre.iter().map(|c| c + size * draw.random_range(-1.0..1.0)).collect()
+            };
+            for _ in 0..400 {
+                let (a, b) = (point(), point());
+                let b: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a + 1e-3 * (b - a)).collect();
+                let [at, next] = [&a, &b].map(|x| mlp.forward(x));
+                let apart = distance(&at, &next) - 1e-13;
+                assert!(apart <= global * distance(&a, &b), "{activation}: {global}");
+                let apart = (at[0] - next[0]).abs() - 1e-13;
+                assert!(apart <= local * distance(&a, &b), "{activation}: {local}");
+                for (value, interval) in at.iter().zip(&intervals) {
+                    let held = interval.low - 1e-13 <= *value && *value <= interval.high + 1e-13;
+                    assert!(held, "{activation}: {value} outside {interval:?}");
+                }
+            }
+        }
+    }
 }

@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use burn_tensor::{Tensor, activation};
+use common::activations::{activations, exact};
 use common::{ClosedForm, cpu};
 use reachcast::backend::Backend;
 use reachcast::bench;
@@ -25,6 +26,7 @@ use reachcast::scenario::{Unwatched, Watch};
 use reachcast::system::{BangBang, DoubleIntegrator, System};
 use reachcast::train::analytic::{Analytic, LAST, Task};
 use reachcast::train::checkpoint::Checkpoint;
+use reachcast::train::chosen::chosen_first;
 use reachcast::train::device::{Device, floats};
 use reachcast::train::layer::layer;
 use reachcast::train::network::{Architecture, Network};
@@ -372,7 +374,8 @@ fn samples_are_measures_in_f64() {
         reach_avoid(margins, f64::from(source.spec.gamma))
     };
     let values = source.values(purpose::START, 300).unwrap();
-    let actions = source.action_values(purpose::START, 300).unwrap();
+    let chosen = backend.prepare(&chosen_first(&plant)).unwrap();
+    let actions = source.action_values(&chosen, purpose::START, 300).unwrap();
     assert_eq!((values.len(), values.columns, actions.len(), actions.columns), (300, 2, 300, 3));
     let mut outside = 0;
     for i in 0..300 {
@@ -593,6 +596,27 @@ fn a_layer_is_burns_own_operations() {
         for (found, expected) in run(true).into_iter().zip(run(false)) {
             let error = (found - expected).abs();
             assert!(error <= 3e-6 * (1.0 + expected.abs()), "{curve:?}: {found} {expected}");
+        }
+    }
+}
+
+/// Values and slopes of a layer with each activation, against definitions in f64 and their central differences.
+#[test]
+fn layers_of_every_activation_have_their_slopes() {
+    let sums: Vec<f32> = (-40..40).map(|i| 0.173 * i as f32 + 0.0117).collect();
+    for activation in activations() {
+        let one = |value: f32| Device::cpu().tensor(vec![value], [1, 1]);
+        let x = Device::cpu().tensor(sums.clone(), [sums.len(), 1]).require_grad();
+        let outputs = layer(x.clone(), one(1.0), one(0.0), activation);
+        let grads = outputs.clone().sum().backward();
+        let (values, slopes) = (floats(outputs), floats(x.grad(&grads).unwrap()));
+        for ((x, value), slope) in sums.iter().zip(values).zip(slopes) {
+            let at = |step: f64| exact(activation, f64::from(*x) + step);
+            let expected = (at(1e-6) - at(-1e-6)) / 2e-6;
+            let error = (f64::from(value) - at(0.0)).abs();
+            assert!(error < 3e-6, "{activation} at {x}: {value}");
+            let error = (f64::from(slope) - expected).abs();
+            assert!(error < 5e-6, "{activation} at {x}: {slope}, {expected}");
         }
     }
 }

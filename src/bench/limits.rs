@@ -121,7 +121,7 @@ fn each<T: Send>(work: &mut [T], job: impl Fn(&mut T) + Sync) {
     });
 }
 
-/// `y = w x` by the `gemm` crate on this thread: w `[outputs, inputs]`, x `[inputs, lanes]`, y
+/// `y = w x` by the crate `gemm-f32` on this thread: w `[outputs, inputs]`, x `[inputs, lanes]`, y
 /// `[outputs, lanes]`, each row by row.
 ///
 /// # Panics
@@ -131,28 +131,30 @@ pub fn multiply(y: &mut [f32], w: &[f32], x: &[f32], [outputs, inputs, lanes]: [
     assert!(y.len() >= outputs * lanes, "y [outputs, lanes]");
     assert!(w.len() >= outputs * inputs, "w [outputs, inputs]");
     assert!(x.len() >= inputs * lanes, "x [inputs, lanes]");
+    // Its kernels take columns: rows of y, x and w are those of their transposes, whose product is in turn.
+    let product = gemm_f32::gemm::f32::get_gemm_fn();
     // SAFETY: the strides are those of the shapes asserted above.
     unsafe {
-        gemm::gemm(
-            outputs,
+        product(
             lanes,
+            outputs,
             inputs,
             y.as_mut_ptr(),
-            1,
             lanes as isize,
+            1,
             false,
-            w.as_ptr(),
-            1,
-            inputs as isize,
             x.as_ptr(),
-            1,
             lanes as isize,
+            1,
+            w.as_ptr(),
+            inputs as isize,
+            1,
             0.0,
             1.0,
             false,
             false,
             false,
-            gemm::Parallelism::None,
+            gemm_common::Parallelism::None,
         );
     }
 }

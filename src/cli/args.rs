@@ -411,11 +411,11 @@ pub(super) struct ImportArguments {
     /// commas, are joined; of a graph with several outputs, the name of one
     #[arg(long, value_name = "PREFIX", value_delimiter = ',')]
     pub(super) network: Vec<String>,
-    /// Activation of the hidden layers of a checkpoint [default: that of the library, else relu]
-    #[arg(long, value_enum)]
+    /// Activation of the hidden layers, `elu` or `leaky_relu(0.2)` [default: that of the library, else relu]
+    #[arg(long, value_name = "WORD")]
     pub(super) activation: Option<Activation>,
     /// Activation of its last layer [default: that of the library, else tanh; identity for a critic]
-    #[arg(long, value_enum)]
+    #[arg(long, value_name = "WORD")]
     pub(super) output: Option<Activation>,
     /// Names of the inputs, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "config")]

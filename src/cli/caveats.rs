@@ -37,8 +37,13 @@ fn unscaled(plant: &Plant) -> Option<String> {
     bounded.then(|| {
         format!(
             "the network says numbers from -1 to 1, and `{}` goes from {} to {}: `act` below `[policy]` scales \
-             them, `{} = \"{} * out[0]\"` for one; without it the rest is never used",
-            beyond.name, beyond.low, beyond.high, beyond.name, beyond.high
+             them, `{} = \"{} + {} * out[0]\"` for one; without it the rest is never used",
+            beyond.name,
+            beyond.low,
+            beyond.high,
+            beyond.name,
+            0.5 * (beyond.low + beyond.high),
+            0.5 * (beyond.high - beyond.low)
         )
     })
 }

@@ -159,6 +159,7 @@ impl<'a> Asked<'a> {
         let judged: Vec<Judged> = flown.runs.iter().map(judge).collect();
         let setting = Setting {
             backend,
+            model: &self.model,
             costs: &self.costs,
             settings,
             spec: self.spec,

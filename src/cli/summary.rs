@@ -13,7 +13,7 @@ epsilon: the risk asked for; beta: chance that the sample misleads; simple, exac
 bound asks for; risk: the one obtained, which N and the failures certify";
 /// What the words below the table mean.
 const WORDS: &str = "\
-tier 0: in the target, 1: certified, 2: in the set that growth verified, 3: none of these; V_check: the measure
+tier 0: in the target, 1: certified, 2: in the set that growth verified, 3: none of these; V_check: the
 measure with its margins tightened, certified where positive; a pair: a start with a perturbed one beside
 it, fresh where it is drawn anew; fixed shape: one number scales bounds that a pilot sample fixed";
 
@@ -73,7 +73,8 @@ fn headline(record: &Record) -> String {
     let (system, policy) = (&record.system.name, &record.provenance.policy);
     let whole = record.whole_box.as_ref().map(|found| format!("; {}", found.verdict));
     let whole = whole.unwrap_or_default();
-    format!("{system} under {policy}, T = {}: {verdict}{whole}", record.horizon)
+    let sought = record.looked_for().map_or_else(String::new, |found| format!("; {found}"));
+    format!("{system} under {policy}, T = {}: {verdict}{sought}{whole}", record.horizon)
 }
 
 /// The counts behind each claim, a row each.

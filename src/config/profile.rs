@@ -46,7 +46,7 @@ pub(crate) fn double_integrator(profile: Profile) -> Config {
 }
 
 /// A plant of the user's own with these states. Its state is the middle of the box, its slice that of
-/// the first two states over their box in twenty steps; perturbations have a fiftieth of the
+/// the first two states over their box in twenty cells; perturbations have a fiftieth of the
 /// narrowest side of the box as their radius, growth begins with a quarter of it.
 pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     let middle = |axis: &Axis| 0.5 * (decimal(axis.low) + decimal(axis.high));
@@ -58,7 +58,9 @@ pub(super) fn described(profile: Profile, states: &[Axis]) -> Config {
     };
     let cut = |axis: &Axis| {
         let (from, to) = side(axis);
-        SliceAxisSection { state: axis.name.clone(), from, to, step: (to - from) / SLICE_STEPS }
+        let step = (to - from) / SLICE_STEPS;
+        // The middles of the cells, so that these cover the box.
+        SliceAxisSection { state: axis.name.clone(), from: from + 0.5 * step, to, step }
     };
     let [x, y] = [0, states.len().min(2) - 1].map(|i| cut(&states[i]));
     let widths = states.iter().map(|axis| decimal(axis.high) - decimal(axis.low));

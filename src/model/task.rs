@@ -122,6 +122,15 @@ impl Task {
         *self == Self::default()
     }
 
+    /// Whether what a state is worth is the same at every step of an endless rollout: no window, no deadline.
+    pub fn is_timeless(&self) -> bool {
+        match self {
+            Self::ReachAvoid(window) | Self::Reach(window) => *window == Window::default(),
+            Self::Avoid => true,
+            Self::ReachStay { .. } | Self::AtEnd => false,
+        }
+    }
+
     /// Whether it has a target.
     pub fn has_target(&self) -> bool {
         *self != Self::Avoid

@@ -30,6 +30,13 @@ pub(super) fn notes(
              `--set plan.runs=1` has that of one plan"
         )
     });
+    let failed = runs - record.success.successes;
+    let failed = (failed > 0).then(|| {
+        format!(
+            "{failed} of {runs} runs fail the task: plans keep the costs small and know nothing of it; a term that \
+             grows where a margin of the task falls below 0 ties both"
+        )
+    });
     let lost = (non_finite > 0).then(|| {
         format!(
             "{non_finite} samples had a cost that is not finite, or 1e30 and more; they weigh nothing"
@@ -57,6 +64,7 @@ pub(super) fn notes(
         .chain([looked])
         .chain(held(costs, record))
         .chain(batch)
+        .chain(failed)
         .chain(weights(record))
         .chain(lost)
         .chain(stopped)
@@ -85,7 +93,8 @@ fn weights(record: &PlanRecord) -> Option<String> {
     if samples > 1 && median > ALL * f64::from(samples) {
         return Some(format!(
             "{} of {samples} samples are effective, so all weigh about the same and a plan is their mean: \
-             the temperature {temperature} is large beside the differences of their costs; lower it",
+             the temperature {temperature} is large beside the differences of their costs: lower it, unless \
+             the costs hardly depend on the controls",
             lower(median)
         ));
     }

@@ -10,7 +10,7 @@ use super::record::{
 };
 use super::settings::PlanSettings;
 use crate::backend::Backend;
-use crate::model::Costs;
+use crate::model::{Costs, Model};
 use crate::rollout::RolloutSpec;
 use crate::scenario::system_record;
 
@@ -19,6 +19,8 @@ use crate::scenario::system_record;
 pub struct Setting<'a> {
     /// Who ran it.
     pub backend: &'a Backend,
+    /// The model as the task looks at it, its points with it.
+    pub model: &'a Model,
     /// The costs.
     pub costs: &'a Costs,
     /// How plans are made.
@@ -42,7 +44,7 @@ impl Setting<'_> {
         judged: &[Judged],
     ) -> PlanRecord {
         let (planning, costs) = (closed_loop.planning(), self.costs);
-        let model = &*planning.model;
+        let model = self.model;
         let each = flown.runs.iter().zip(judged);
         let runs: Vec<_> = each.map(|(run, judged)| RunRecord::new(costs, run, judged)).collect();
         let effective = flown.runs.iter().flat_map(|run| &run.effective).copied();

@@ -10,9 +10,10 @@ use std::str::FromStr;
 use crate::real::Real;
 use crate::real::bound::Interval;
 
-/// Below it the functions that fall to 0 are 0 to f64: their formulas stop there, so that minus infinity has
-/// its limit.
+/// Below it SiLU is 0 to f64: the formula stops there, so that minus infinity has its limit.
 const LOWEST: f32 = -40.0;
+/// The same of GELU.
+const LOWEST_NORMAL: f32 = -9.0;
 /// The same where a factor is a bare exponential, which f32 still has at -103.
 const LOWEST_EXPONENT: f32 = -105.0;
 /// Above it an exponential makes no difference to 1 in f64.
@@ -223,12 +224,12 @@ impl Activation {
                 x.if_lt(zero, alpha * (x / alpha).exp_m1_negative(), x)
             }
             Self::Gelu => {
-                let x = floored(x, LOWEST);
+                let x = floored(x, LOWEST_NORMAL);
                 let half = R::lit(0.5) * x;
                 half + half * x.normal_share()
             }
             Self::GeluTanh => {
-                let x = floored(x, LOWEST);
+                let x = floored(x, LOWEST_NORMAL);
                 let [first, third] = Self::GELU_TANH.map(R::lit);
                 let half = R::lit(0.5) * x;
                 half + half * (x * (first + third * (x * x))).tanh()

@@ -264,10 +264,17 @@ impl Mlp {
         }
     }
 
-    /// Its kind and widths: `mlp 12-64-64-3`.
+    /// Its kind and widths, `mlp 12-64-64-3`, and what else it has: norms, which adapters run in layers, and maps.
     pub fn in_words(&self) -> String {
         let widths: Vec<String> = self.widths().iter().map(ToString::to_string).collect();
-        format!("mlp {}", widths.join("-"))
+        let norms = if self.has_norm() { ", norms in layers" } else { "" };
+        let maps = match (&self.input, &self.output) {
+            (None, None) => "",
+            (Some(_), None) => ", map of inputs",
+            (None, Some(_)) => ", map of outputs",
+            (Some(_), Some(_)) => ", maps of inputs and outputs",
+        };
+        format!("mlp {}{norms}{maps}", widths.join("-"))
     }
 
     /// Refuses a network without layers, with shapes that do not fit, or a number not finite.

@@ -46,6 +46,10 @@ pub(super) fn caption(record: &Record) -> String {
         );
     };
     let outcome = match growth.outcome {
+        GrowthOutcome::Verified if growth.rounds.len() == upward.radii.len() => format!(
+            "All radii were accepted: verified is the {set} of the last, {}, and larger ones were not tried.",
+            lower(growth.radius)
+        ),
         GrowthOutcome::Verified => {
             format!(
                 "The largest {set} before a refusal is verified: radius {}.",

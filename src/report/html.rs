@@ -51,11 +51,13 @@ fn header(record: &Record) -> String {
         .as_ref()
         .map(|found| escape(&format!(" What is said of the box: {}.", found.verdict)));
     let whole = whole.unwrap_or_default();
+    let sought = record.looked_for().map(|found| escape(&format!(" Beside them, {found}.")));
+    let sought = sought.unwrap_or_default();
     let cards: String = verdicts.iter().map(card).collect();
     format!(
         "<header>\n<p class=\"brand\">Reachcast certificate</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">Policy: {}</p>\n\
-         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}{whole}</p>\n\
+         <p class=\"verdict {class}\"><span aria-hidden=\"true\">{mark}</span> {verdict}{sought}{whole}</p>\n\
          <div class=\"cards\">\n{cards}</div>\n</header>\n",
         escape(&record.system.name),
         escape(&record.provenance.policy),

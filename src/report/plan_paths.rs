@@ -27,8 +27,8 @@ pub(super) fn figure(page: &PlanPage<'_>) -> Option<Figure> {
         drawing: drawing(page, plane),
         legend,
         caption: format!(
-            "{} Target and constraint are those of step 0 with the other states as at the first start; a \
-             run that did what the task asks ends in a dot, another in a cross.",
+            "{} Target and constraint are those of step 0 with the other states as at the first start, and \
+             none was computed where it is grey; a run that did what the task asks ends in a dot, another in a cross.",
             shown(page.record)
         ),
     })
@@ -43,6 +43,7 @@ fn drawing(page: &PlanPage<'_>, plane: &Plane) -> Result<String, String> {
         false => Proportions::Free(330.0),
     };
     let mut plot = Plot::new("paths-plane", span(0)?, span(1)?, shape);
+    plot.beyond([span(0)?, span(1)?]);
     margins(&mut plot, page, plane);
     for (run, judged) in drawn(page) {
         let line = plot.line(points(run, plane.states));

@@ -164,6 +164,13 @@ impl Plot {
         self.polygon([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     }
 
+    /// Covers what lies beyond these spans, of which nothing is known.
+    pub(crate) fn beyond(&mut self, [x, y]: [Span; 2]) {
+        let all = self.rectangle([self.x.low, self.y.low, self.x.high, self.y.high]);
+        let known = self.rectangle([x.low, y.low, x.high, y.high]);
+        self.path("beyond", &(all + &known));
+    }
+
     /// Draws path data inside the axes.
     pub(crate) fn path(&mut self, class: &str, data: &str) {
         if !data.is_empty() {

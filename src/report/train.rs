@@ -21,11 +21,12 @@ pub fn train_html(record: &TrainRecord) -> String {
         "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{header}<main>\n\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Learning curves</h2>\n\
          <div class=\"gallery\">\n{figures}</div></section>\n\
-         {policy}<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
+         {notes}{policy}<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <div class=\"tables\">\n{numbers}</div>\n{configuration}</section>\n\
          {adapter}</main>\n{footer}</body>\n</html>\n",
         head = shell::head("training", "", Scripts::None),
         header = header(record),
+        notes = shell::notes(&record.notes),
         policy = policy(record),
         numbers = numbers(record),
         configuration = shell::configuration(provenance),
@@ -175,8 +176,8 @@ fn numbers(record: &TrainRecord) -> String {
         ("schema", record.schema.to_string()),
         ("seed", provenance.seed.to_string()),
         ("generator", provenance.generator.clone()),
-        ("policy", provenance.policy.clone()),
-        ("SHA-256 of the policy", provenance.policy_sha256.clone()),
+        ("policy it began with", provenance.policy.clone()),
+        ("SHA-256 of that policy", provenance.policy_sha256.clone()),
         ("SHA-256 of the physics", provenance.physics_sha256.clone()),
         ("backend", provenance.backend.clone()),
         ("device", provenance.device.clone()),

@@ -241,8 +241,13 @@ impl Planning {
         Err(Error::invalid("disturbance network", text))
     }
 
-    /// Refuses a network that does not map the states to `outputs` numbers.
+    /// Refuses a network that does not map the states to `outputs` numbers by layers alone.
     fn fits(&self, name: &str, network: &Mlp, outputs: usize) -> Result<()> {
+        if network.is_mapped() {
+            let text = "has a map of its inputs or outputs, which samples of plans do not run; a network \
+                        without one is needed";
+            return Err(Error::invalid(name, text));
+        }
         let (widths, states) = (network.widths(), self.model.states.len());
         let (inputs, has) = (widths[0], widths[widths.len() - 1]);
         if (inputs, has) == (states, outputs) {

@@ -118,6 +118,11 @@ impl SequenceRecord {
     pub fn level(&self) -> Option<f64> {
         self.levels.get(self.chosen).map(|level| level.level)
     }
+
+    /// The risk of the certified set that was asked or looked for, where it was not obtained.
+    pub fn missed(&self) -> Option<f64> {
+        self.risk.filter(|_| self.outcome != SequenceOutcome::Accepted)
+    }
 }
 
 /// What came of the sequence.

@@ -19,6 +19,7 @@ use crate::backend::Event;
 use crate::model::Task;
 use crate::rollout::PairControl;
 pub(crate) use crate::rounding::as_written as decimal;
+use crate::rounding::upper;
 use crate::system::{Axis, Body};
 
 /// Version of the layout of [`Record`].
@@ -111,6 +112,17 @@ pub struct Record {
 }
 
 impl Record {
+    /// That the risk which was looked for in the certified set was not obtained, as the headlines add it; none
+    /// where it was, or where it was asked for and is among the claims.
+    pub fn looked_for(&self) -> Option<String> {
+        let missed = self.sequence.as_ref().and_then(SequenceRecord::missed)?;
+        if !self.holds || self.global.accepted == 0 {
+            return None;
+        }
+        let (missed, risk) = (upper(missed), upper(self.global.claim.certified_risk));
+        Some(format!("a risk of {missed} was looked for in the certified set: obtained is {risk}"))
+    }
+
     /// The claims, in the order of the method.
     pub fn claims(&self) -> Vec<&Claim> {
         let drops = self.drops.iter().map(|drops| &drops.claim);

@@ -26,6 +26,9 @@ use crate::rounding::number;
 /// Weights of the last layer at first, as a share of the others': no output is near saturation.
 pub const LAST: f32 = 0.1;
 
+/// Most numbers that the way back may keep, 4 GiB: beyond that a machine swaps or the training is killed.
+const MOST_KEPT: u64 = 1 << 30;
+
 /// What is trained, on what.
 #[derive(Clone, Debug)]
 pub struct Task<'a> {
@@ -94,6 +97,24 @@ impl Task<'_> {
         let problem = "`observe` or `act` reads the time; train with `analytic` or `ppo`, which know at \
                        which step a state is met";
         Err(Error::invalid("policy", problem))
+    }
+
+    /// Refuses a `batch` of rollouts that keep more for the way back than there is room for.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the numbers kept, of the states and of a network with these `hidden` layers.
+    pub fn check_room(&self, hidden: &[usize], batch: usize) -> Result<()> {
+        let looks = self.model.looks(self.spec.horizon) as u64;
+        let row = hidden.iter().sum::<usize>() + self.interface.outputs + self.model.states.len();
+        let kept = looks.saturating_mul(row as u64).saturating_mul(batch as u64);
+        if kept <= MOST_KEPT {
+            return Ok(());
+        }
+        let problem = format!(
+            "{batch} rollouts of {looks} states keep {kept} numbers for the way back, at most {MOST_KEPT}; take \
+             a smaller batch or a shorter `horizon`"
+        );
+        Err(Error::invalid("train.analytic.batch", problem))
     }
 
     /// Whether each of `starts` succeeds under `network`.

@@ -1,6 +1,6 @@
-//! The backup of reach-avoid learning: what a state is worth, given what the next one is.
+//! The backup of tasks without a time: what a state is worth, given what the next one is.
 
-use crate::model::Model;
+use crate::model::{Model, Task};
 use crate::real::Real;
 
 /// Both margins of a state.
@@ -16,6 +16,17 @@ impl<R: Real> Margins<R> {
     /// The margins of `x` at a step.
     pub fn of(model: &Model, x: &[R], step: u32) -> Self {
         Self { target: model.target_at(x, step), constraint: model.constraint_at(x, step) }
+    }
+
+    /// What of them counts to `task`, one without a time: a target that it does not have is never met, a
+    /// constraint always kept. Their backups are then `min(c, gamma next)` and `max(r, gamma next)`.
+    #[must_use]
+    pub fn counted(self, task: &Task) -> Self {
+        match task {
+            Task::Avoid => Self { target: R::lit(f32::MIN), ..self },
+            Task::Reach(_) => Self { constraint: R::lit(f32::MAX), ..self },
+            _ => self,
+        }
     }
 
     /// What the state is worth where the next one is worth `next`: `min(c, max(r, gamma next))`,
@@ -34,6 +45,7 @@ impl<R: Real> Margins<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Window;
     use crate::rollout::reach_avoid;
 
     /// Folded from the end, backups are the measure of the rollout.
@@ -49,6 +61,25 @@ mod tests {
                 margins[..11].iter().rev().fold(last, |next, pair| of(pair).backup(0.95, next));
             assert!((folded - reach_avoid(margins, 0.95)).abs() < 1e-12, "{shift}");
         }
+    }
+
+    /// The same of the tasks that see one margin alone, the worth after the last state being that of nothing
+    /// lost, and of nothing reached.
+    #[test]
+    fn backups_of_one_margin_unroll_to_its_extreme() {
+        let margins = |t: usize| Margins {
+            target: (0.7 * t as f64).sin(),
+            constraint: 0.4 + (1.3 * t as f64).cos(),
+        };
+        let folded = |task: Task, last: f64| {
+            (0..12).rev().fold(last, |next, t| margins(t).counted(&task).backup(0.95, next))
+        };
+        let discounted =
+            |of: fn(Margins<f64>) -> f64| move |t: usize| 0.95_f64.powi(t as i32) * of(margins(t));
+        let least = (0..12).map(discounted(|at| at.constraint)).fold(f64::INFINITY, f64::min);
+        let most = (0..12).map(discounted(|at| at.target)).fold(f64::NEG_INFINITY, f64::max);
+        assert!((folded(Task::Avoid, f64::INFINITY) - least).abs() < 1e-12);
+        assert!((folded(Task::Reach(Window::default()), f64::NEG_INFINITY) - most).abs() < 1e-12);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Min-max DDPG: a critic of the reach-avoid backup, a control that ascends it, and a disturbance
+//! Min-max DDPG: a critic of the task's backup, a control that ascends it, and a disturbance
 //! that descends it.
 
 use std::sync::Arc;
@@ -7,6 +7,7 @@ use burn_tensor::Tensor;
 
 use super::agent::Agent;
 use super::analytic::{LAST, Task};
+use super::backup::Margins;
 use super::contest::Contest;
 use super::device::{floats, number};
 use super::environments::Environments;
@@ -107,6 +108,12 @@ impl<'a> Ddpg<'a> {
         rows.disturbed(&self.contest.step, &rows.controls(&self.task.interface, &out), &d)
     }
 
+    /// The margins of each state, as far as the task knows them.
+    fn margins(&self, rows: &Rows<'_>) -> Vec<Margins<f32>> {
+        let task = &self.task.model.task;
+        rows.margins().into_iter().map(|margins| margins.counted(task)).collect()
+    }
+
     /// One step of every plant, remembered.
     fn explore(&mut self, iteration: u64) {
         let count = self.environments.len();
@@ -119,7 +126,7 @@ impl<'a> Ddpg<'a> {
         }
         let next = self.next(states, &acts);
         let rows = Rows::new(&self.task.model, &next);
-        let margins = rows.margins();
+        let margins = self.margins(&rows);
         // Where an episode ends says what is seen, not what it is worth: no state is terminal.
         self.environments.advance(iteration, rows.states, |i| margins[i].constraint <= 0.0);
     }
@@ -175,7 +182,9 @@ impl<'a> Ddpg<'a> {
         let next = Rows::new(model, &next);
         let slow = [&self.control.slow, &self.disturbance.slow, &self.critic.slow];
         let mut wanted = self.told(slow, next.states);
-        for ((value, next), now) in wanted.iter_mut().zip(next.margins()).zip(now.margins()) {
+        for ((value, next), now) in
+            wanted.iter_mut().zip(self.margins(&next)).zip(self.margins(&now))
+        {
             *value = now.backup(gamma, next.hold(*value));
         }
         wanted

@@ -7,6 +7,7 @@ pub mod agent;
 pub mod analytic;
 pub mod backup;
 pub mod checkpoint;
+pub mod chosen;
 pub mod contest;
 #[cfg(feature = "train")]
 pub mod ddpg;

@@ -139,10 +139,19 @@ impl Run<'_> {
     fn advance(&self, learner: &mut dyn Learner, standing: &mut Checkpoint) -> Result<()> {
         let loss = learner.update(standing.progress.iteration)?;
         if !loss.is_finite() {
-            let problem = format!(
-                "the loss is {loss} at iteration {}; lower the optimiser's `rate`",
-                standing.progress.iteration
-            );
+            let problem = match standing.progress.iteration {
+                // Nothing has moved the parameters yet.
+                0 => format!(
+                    "the loss is {loss} at the first iteration: a state or a margin of some rollout under the \
+                     untrained policy is not finite; starts (`train.starts`) or formulas that keep to where they \
+                     are defined do not do that"
+                ),
+                iteration => {
+                    format!(
+                        "the loss is {loss} at iteration {iteration}; lower the optimiser's `rate`"
+                    )
+                }
+            };
             return Err(Error::invalid(format!("train.{}", self.origin.method.name()), problem));
         }
         standing.progress.iteration += 1;
@@ -193,7 +202,7 @@ impl Run<'_> {
             });
             files.push((file, bytes));
         }
-        let record = TrainRecord {
+        let mut record = TrainRecord {
             schema: TRAIN_SCHEMA,
             origin: self.origin.clone(),
             total: self.total,
@@ -203,8 +212,10 @@ impl Run<'_> {
             curve: progress.curve,
             networks,
             policy: None,
+            notes: Vec::new(),
             events: Vec::new(),
         };
+        record.notes = record.idle().into_iter().collect();
         Ok(Trained { record, files })
     }
 }

@@ -1,8 +1,8 @@
 //! What value networks learn from: states, or states with a control, and the measures there.
 
 use super::purpose;
-use super::rows::{Rows, WIDTH, columns};
-use super::starts::{Mixture, check_stationary};
+use super::rows::{WIDTH, columns};
+use super::starts::Mixture;
 use crate::backend::Program;
 use crate::error::{Error, Result};
 use crate::model::Model;
@@ -47,31 +47,26 @@ impl Source<'_> {
         Ok(Samples::new(states.view().size(), states.view().numbers().to_vec(), measures))
     }
 
-    /// `count` states and random controls with `Q(x, u)`, the measure after one step under u and
-    /// the others under the policy: `min(c, max(r, gamma V(f(x, u))))`, V over one step less.
+    /// `count` states and random controls with `Q(x, u)`, the measure of the rollout from x whose first control
+    /// is u and whose others are the policy's; `chosen` is [`chosen_first`](super::chosen::chosen_first) of the
+    /// plant, prepared.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for a horizon of one step and for a model whose formulas read the time,
-    /// since V starts at the first step; and those of the device.
-    pub fn action_values(&self, purpose: Purpose, count: usize) -> Result<Samples> {
-        let model = &*self.program.plant().model;
-        check_stationary(model)?;
+    /// [`Error::Invalid`] for controls without bounds, and those of the device.
+    pub fn action_values(
+        &self,
+        chosen: &Program<'_>,
+        purpose: Purpose,
+        count: usize,
+    ) -> Result<Samples> {
+        let model = &self.program.plant().model;
         check_bounded(model)?;
-        let states = self.states(purpose, count);
-        let (controls, states) = (self.controls(purpose, count), states.view());
-        let rows = Rows { model, states, steps: &[] };
-        let next = rows.next(&controls);
-        let spec = RolloutSpec::new(self.spec.horizon - 1, self.spec.gamma)?;
-        let mut measures = self.program.measures(States::of(&next, states.size()), &spec)?;
-        for (measure, margins) in measures.iter_mut().zip(rows.margins()) {
-            // A state that is not finite stays marked as such.
-            if *measure > NON_FINITE {
-                *measure = margins.backup(spec.gamma, *measure);
-            }
-        }
+        let (states, controls) = (self.states(purpose, count), self.controls(purpose, count));
         let acts = controls.chunks_exact(model.controls.len());
-        let inputs = states.iter().zip(acts).flat_map(|(x, u)| x.iter().chain(u).copied());
-        Ok(Samples::new(states.size() + model.controls.len(), inputs.collect(), measures))
+        let rows = states.view().iter().zip(acts).flat_map(|(x, u)| x.iter().chain(u).copied());
+        let (rows, columns): (Vec<f32>, _) = (rows.collect(), chosen.plant().model.states.len());
+        let measures = chosen.measures(States::of(&rows, columns), &self.spec)?;
+        Ok(Samples::new(columns, rows, measures))
     }
 
     /// Controls anywhere between their bounds, `[count, controls]`.

@@ -10,10 +10,10 @@ use crate::error::{Error, Result};
 use crate::model::Task;
 
 /// Most rows of a batch, neurons of a layer and layers: more is a slip, and a software adapter cuts
-/// Most weights between hidden layers.
-const MOST_WEIGHTS: u64 = 1 << 26;
 /// sums over twice as many short, without a word.
 const MOST: u64 = 1 << 15;
+/// Most weights between hidden layers.
+const MOST_WEIGHTS: u64 = 1 << 26;
 /// Most steps that are remembered: every checkpoint holds them all.
 const MOST_REMEMBERED: u64 = 1 << 22;
 
@@ -71,18 +71,17 @@ impl Method {
         }
     }
 
-    /// Refuses a method that knows the backup of reach-avoid alone for another task.
+    /// Refuses a method whose critic knows no time for a task in which steps differ.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the method, the task, and the methods that know every task.
     pub fn check_task(self, task: &Task) -> Result<()> {
-        if task.is_plain() || matches!(self, Self::Analytic | Self::Value | Self::Ppo) {
+        if self != Self::Ddpg || task.is_timeless() {
             return Ok(());
         }
-        let (name, kinds) = (self.name(), "`analytic`, `ppo` and `value`");
         let problem = format!(
-            "`{name}` learns the task `reach-avoid` without a window alone, this one is `{task}`; \
-             {kinds} learn any"
+            "the critic of `ddpg` knows no time: it learns `reach-avoid` and `reach` without a window, and \
+             `avoid`; this task is `{task}`, and `analytic`, `ppo`, `value` and `action-value` learn any"
         );
         Err(Error::invalid("train.method", problem))
     }
@@ -92,10 +91,10 @@ impl Method {
     /// # Errors
     /// [`Error::Invalid`] naming the method and those that look at the points.
     pub fn check_points(self, points: u32) -> Result<()> {
-        if points == 1 || matches!(self, Self::Analytic | Self::Value) {
+        if points == 1 || matches!(self, Self::Analytic | Self::Value | Self::ActionValue) {
             return Ok(());
         }
-        let (name, kinds) = (self.name(), "`analytic` and `value`");
+        let (name, kinds) = (self.name(), "`analytic`, `value` and `action-value`");
         let problem = format!(
             "`{name}` looks at samples alone, this task at {} points inside each period (`between`); \
              {kinds} look at them too",

@@ -176,3 +176,83 @@ fn mapped(map: &Rescale, x: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
     });
     each.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::policy::Layer;
+
+    /// Networks of two inputs and outputs: every activation hidden and last, with a norm, with maps.
+    fn networks() -> Vec<Mlp> {
+        let mut random = 0.41_f64;
+        let mut numbers = |count: usize, size: f64| -> Vec<f32> {
+            let mut next = || {
+                random = (random * 997.0 + 0.123).fract();
+                (size * (2.0 * random - 1.0)) as f32
+            };
+            (0..count).map(|_| next()).collect()
+        };
+        let mut all = Vec::new();
+        let other = [Activation::LeakyRelu { slope: 0.2 }, Activation::Elu { alpha: 0.5 }];
+        for activation in Activation::ALL.into_iter().chain(other) {
+            for normed in [false, true] {
+                let mut dense = |inputs: usize, outputs: usize| {
+                    Layer::dense(numbers(inputs * outputs, 2.0), numbers(outputs, 0.5))
+                        .activated(activation)
+                };
+                let mut layers = vec![dense(2, 5), dense(5, 4), dense(4, 2)];
+                layers[0].norm = normed.then(|| Norm {
+                    scale: numbers(5, 1.5),
+                    shift: numbers(5, 0.3),
+                    epsilon: 1e-3,
+                });
+                let mlp = Mlp::from_layers(layers).expect("a network");
+                let input = Rescale {
+                    high: vec![0.9; 2],
+                    ..Rescale::affine(vec![1.2, 0.8], vec![0.1, -0.1])
+                };
+                let output = Rescale {
+                    low: vec![-0.4; 2],
+                    ..Rescale::affine(vec![-1.5, 2.0], vec![0.2, 0.0])
+                };
+                let mapped = mlp.clone().with_input(input).and_then(|mlp| mlp.with_output(output));
+                all.extend([mlp, mapped.expect("maps")]);
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn forms_hold_what_networks_say() {
+        for mlp in networks() {
+            for (width, centers) in [(1e-3, [0.3, -0.7]), (0.1, [-0.2, 0.05]), (1.5, [0.6, 0.4])] {
+                let form = |i: usize| {
+                    let mut ball = vec![0.0; 2];
+                    ball[i] = width;
+                    Affine::new(centers[i], ball, Vec::new(), 0.0)
+                };
+                let forms = network(&mlp, vec![form(0), form(1)], &mut Symbols::default());
+                for k in 0..60 {
+                    let (sin, cos) = (0.7 * f64::from(k)).sin_cos();
+                    let length = f64::from(k % 4) / 3.0;
+                    let d = [length * cos, length * sin];
+                    let x = [centers[0] + width * d[0], centers[1] + width * d[1]];
+                    for (form, truth) in forms.iter().zip(mlp.forward(&x)) {
+                        assert!(form.known(), "{mlp:?}");
+                        let at =
+                            form.center + form.ball.iter().zip(d).map(|(a, d)| a * d).sum::<f64>();
+                        let open = form.spread.iter().map(|s| s.abs()).sum::<f64>() + form.rest;
+                        assert!(
+                            (at - truth).abs() <= open + 1e-12,
+                            "{at} and {truth}, {open}: {mlp:?}"
+                        );
+                        let Interval { low, high } = form.range;
+                        assert!(low - 1e-12 <= truth && truth <= high + 1e-12, "{mlp:?}");
+                    }
+                }
+                let narrow = |form: &Affine| form.range.high - form.range.low < 100.0 * width;
+                assert!(width > 1e-2 || forms.iter().all(narrow), "{forms:?}: {mlp:?}");
+            }
+        }
+    }
+}

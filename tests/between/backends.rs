@@ -6,11 +6,13 @@ use reachcast::model::{Plant, Task};
 use reachcast::rollout::{
     DeviationTask, Keep, PairControl, Pairs, Query, ReachAvoidTask, Tightening,
 };
+use reachcast::train::chosen::chosen_first;
 
 use crate::common::{adapter, backends};
 use crate::mathematics::{
     BAND, BETWEEN, CONSTRAINT, Case, ELLIPSE, HORIZON, POLICY, STARTS, SUBSTEPS, TARGET, cases,
-    fine, fine_pair, is_edge, looked, losses, pairs, plant, spec, starts, starts_within,
+    fine, fine_after, fine_pair, is_edge, looked, losses, pairs, plant, spec, starts,
+    starts_within,
 };
 
 /// Requires `found` to be `wanted` up to f32.
@@ -155,6 +157,35 @@ fn signs_of_plants_that_change_with_the_time_are_those_of_measures() {
         let signs: Vec<bool> = of(Query::Sign).iter().map(|sign| *sign > 0.0).collect();
         let measures: Vec<bool> = of(Query::Measure).iter().map(|measure| *measure > 0.0).collect();
         assert_eq!(signs, measures, "{}", backend.name());
+    }
+}
+
+/// Of every kind, what Q(x, u) learns: the measure of the rollout whose first control is given.
+#[test]
+fn a_first_control_that_is_given_is_the_first_of_its_rollout_alone() {
+    for backend in backends() {
+        let mut apart = 0;
+        for case in cases() {
+            let plant = chosen_first(&case.plant());
+            let program = backend.prepare(&plant).expect("prepared");
+            let push = |i: u64| 0.19 * (2.4 * i as f32).sin();
+            let rows: Vec<[f32; 3]> =
+                (0..200).map(|i| [starts().start(i)[0], starts().start(i)[1], push(i)]).collect();
+            let found = program.measures(&rows, &spec()).expect("run");
+            let none = Tightening::none(&spec());
+            for (row, found) in rows.iter().zip(found) {
+                let states = fine_after(&row[..2], row[2]);
+                if is_edge(&states) {
+                    continue;
+                }
+                let wanted = case.wanted(&states, &none);
+                let about = format!("{}, {row:?}, {}", case.name(), backend.name());
+                close(found, wanted, &about).unwrap_or_else(|problem| panic!("{problem}"));
+                let driven = case.wanted(&fine(&row[..2]), &none);
+                apart += u64::from((driven - wanted).abs() > BAND);
+            }
+        }
+        assert!(apart > 500, "{apart} measures differ from those of the policy alone");
     }
 }
 

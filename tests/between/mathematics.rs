@@ -156,6 +156,11 @@ pub(crate) fn fine(start: &[f32]) -> Vec<[f64; 2]> {
     driven(start, control)
 }
 
+/// Those of a start whose first control is given.
+pub(crate) fn fine_after(start: &[f32], push: f32) -> Vec<[f64; 2]> {
+    driven(start, |x, t| if t == 0 { lit(push) } else { control(x, t) })
+}
+
 /// Those of both rollouts of a pair.
 pub(crate) fn fine_pair(
     [nominal, perturbed]: &[Vec<f32>; 2],

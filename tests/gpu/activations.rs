@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use reachcast::backend::Backend;
+use reachcast::backend::gpu::NetworkKernels;
 use reachcast::formula::{Expr, Scalar, record};
 use reachcast::model::{Controller, Law, Model, Plant};
 use reachcast::policy::{Activation, Layer, Mlp, Norm, Rescale};
@@ -195,44 +196,89 @@ fn overflowing(hidden: Activation, last: Layer) -> Mlp {
     Mlp::from_layers(vec![first, second, last]).expect("a network")
 }
 
-#[test]
-fn a_nan_in_any_neuron_fails_the_rollout() {
+/// Networks that come to a NaN for a first state of 4 and to a number for 0, by where that happens.
+fn failing() -> Vec<(String, Mlp)> {
     let last = |activation| Layer::dense(vec![1.0], vec![0.0]).activated(activation);
     let mut cases: Vec<(String, Mlp)> = Vec::new();
     for activation in activations() {
-        cases.push((format!("{activation}"), overflowing(activation, last(Activation::Identity))));
+        cases.push((
+            format!("hidden {activation}"),
+            overflowing(activation, last(Activation::Identity)),
+        ));
         cases.push((
             format!("output {activation}"),
             overflowing(Activation::Relu, last(activation)),
         ));
     }
+    let network = |layers| Mlp::from_layers(layers).expect("a network");
     let norm =
         |count: usize| Norm { scale: vec![1.0; count], shift: vec![0.0; count], epsilon: 1e-5 };
     let normed = |layer: Layer| Layer { norm: Some(norm(layer.outputs)), ..layer };
+    let sum = || Layer::dense(vec![1.0, 1.0], vec![0.0]);
     let pair = normed(Layer::dense(vec![1.0, 0.0], vec![0.0; 2]));
-    let sum = Layer::dense(vec![1.0, 1.0], vec![0.0]);
-    let mut layers = overflowing(Activation::Identity, pair).layers().to_vec();
-    layers.push(sum);
-    cases.push(("norm".to_owned(), Mlp::from_layers(layers).expect("a network")));
+    let nan = overflowing(Activation::Identity, pair);
+    cases.push(("norm".to_owned(), network([nan.layers(), &[sum()]].concat())));
     // The squares of these leave f32, and nothing of the network itself does.
     let large = normed(Layer::dense(vec![1e25, 0.0, -1e25, 0.0], vec![0.0; 2]));
-    let layers = vec![large, Layer::dense(vec![1.0, 1.0], vec![0.0])];
-    cases.push(("norm of large numbers".to_owned(), Mlp::from_layers(layers).expect("a network")));
-    let clip = |count: usize| Rescale {
-        low: vec![-1.0; count],
-        high: vec![1.0; count],
-        ..Rescale::affine(vec![1.0; count], vec![0.0; count])
+    cases.push(("norm of large numbers".to_owned(), network(vec![large, sum()])));
+    let clip = |low, high| Rescale {
+        low: vec![low],
+        high: vec![high],
+        ..Rescale::affine(vec![1.0], vec![0.0])
     };
-    let nan = overflowing(Activation::Identity, last(Activation::Identity));
-    cases.push(("clip".to_owned(), nan.with_output(clip(1)).expect("a map")));
+    for (low, high) in [(-1.0, 1.0), (-1.0, f32::INFINITY), (f32::NEG_INFINITY, 1.0)] {
+        let nan = overflowing(Activation::Identity, last(Activation::Identity));
+        cases
+            .push((format!("clip {low} {high}"), nan.with_output(clip(low, high)).expect("a map")));
+    }
+    cases
+}
+
+/// What `mlp` makes of the two states.
+fn outcome(backend: &Backend, mlp: &Mlp) -> Vec<f32> {
+    shown(backend, mlp.clone(), &[[4.0, -5.0], [0.0, -5.0]])
+}
+
+#[test]
+fn a_nan_in_any_neuron_fails_the_rollout() {
     let backends =
         [Some(cpu(1)), gpu().map(Backend::Gpu), crate::networks::fusing().map(Backend::Gpu)];
     for (way, backend) in backends.iter().enumerate() {
         let Some(backend) = backend else { continue };
-        for (name, mlp) in cases.iter().filter(|(_, mlp)| way < 2 || !mlp.has_norm()) {
-            let found = shown(backend, mlp.clone(), &[[4.0, -5.0], [0.0, -5.0]]);
+        for (name, mlp) in failing().iter().filter(|(_, mlp)| way < 2 || !mlp.has_norm()) {
+            let found = outcome(backend, mlp);
             assert_eq!(found[0], NON_FINITE, "{name} on {}", backend.device());
             assert!(found[1].is_finite() && found[1] > -5.0, "{name}: {found:?}");
+        }
+    }
+}
+
+/// The text of a kernel in which activations, norms and clips take NaN for 0.
+fn dropping(text: &str) -> String {
+    let taken = "select(taken, 0.0, size_of(taken) > INFINITE)";
+    let mut text = text.to_owned();
+    for name in ["activation", "hidden_activation", "output_activation"] {
+        let from = format!("fn {name}(x: f32) -> f32 {{");
+        text =
+            text.replace(&from, &format!("fn {name}(taken: f32) -> f32 {{\n    let x = {taken};"));
+    }
+    let from = "fn normaliser(variance: f32, epsilon: f32) -> f32 {";
+    let finite = "fn normaliser(taken: f32, epsilon: f32) -> f32 {\n    \
+                  let variance = select(taken, 1.0, size_of(taken) >= INFINITE);";
+    text = text.replace(from, finite);
+    let from = "fn act(said: f32) -> f32 {";
+    text.replace(from, &format!("fn act(taken: f32) -> f32 {{\n    let said = {taken};"))
+}
+
+/// The check above is one that each activation, norm and clip could fail.
+#[test]
+fn kernels_that_drop_a_nan_are_seen() {
+    for networks in [NetworkKernels::Layered, NetworkKernels::Fused] {
+        let Some(gpu) = gpu() else { return };
+        let backend = Backend::Gpu(gpu.with_networks(networks).with_shader_edit(dropping));
+        let fused = networks == NetworkKernels::Fused;
+        for (name, mlp) in failing().iter().filter(|(_, mlp)| !fused || !mlp.has_norm()) {
+            assert_ne!(outcome(&backend, mlp)[0], NON_FINITE, "{name}");
         }
     }
 }

@@ -65,6 +65,8 @@ fn what_is_refused() {
         assert!(folder.entries().is_empty(), "{more:?}");
     };
     run(&["--set", "train.analytic.batch=0"], &["train.analytic.batch", "1..="]);
+    let long = ["--set", "train.analytic.batch=30000", "--set", "rollout.horizon=9000"];
+    run(&long, &["train.analytic.batch", "30000 rollouts of 9001 states", "smaller batch"]);
     run(&["--set", "train.analytic.bacth=9"], &["unknown key", "`train.analytic.batch`"]);
     run(&["--set", "train.method=guess"], &["guess", "analytic"]);
     run(&["--set", "train.starts=[{ share = 1, boks = {} }]"], &["boks"]);

@@ -40,6 +40,7 @@ fn record() -> TrainRecord {
             widths: vec![2, 32, 1],
         }],
         policy: None,
+        notes: vec![words("nothing <learned>")],
         events: vec![],
     }
 }
@@ -68,6 +69,7 @@ fn every_number_is_there_and_text_is_escaped() {
         "share &lt;right&gt;",
         "It ended early, after 2,000",
         "&lt;value&gt;",
+        "nothing &lt;learned&gt;",
     ] {
         assert!(page.contains(text), "{text}");
     }

@@ -307,6 +307,23 @@ fn certificates_are_what_certify_makes() {
     assert!(all.iter().any(|point| point.growth == GrowthOutcome::Verified));
 }
 
+/// An axis that nothing reads is said to be one, beside another that counts.
+#[test]
+fn an_axis_that_changes_nothing_is_named() {
+    let folder = Folder::new();
+    let grid = ["--of", "certificate", "--radius", "0.02,0.03", "--vary", "race.steps=5,6"];
+    let short = ["--set", "global.draws=500"];
+    let of = |out: &str, grid: &[&str]| {
+        done("configs/smoke.toml", &folder.path(out), &[grid, &short[..]].concat()).notes
+    };
+    let notes = of("two", &grid);
+    assert!(
+        matches!(&notes[..], [note] if note.contains("changes with `race.steps`")),
+        "{notes:?}"
+    );
+    assert_eq!(of("one", &grid[..4]), Vec::<String>::new());
+}
+
 #[test]
 fn bounds_of_certificates_are_told_apart() {
     let folder = Folder::new();

@@ -48,7 +48,11 @@ impl Packed {
     }
 
     /// Packs `network` for panels of `rows` neurons.
+    ///
+    /// # Panics
+    /// If it has a map at an end.
     pub(super) fn new(network: &Mlp, rows: usize) -> Self {
+        assert!(!network.is_mapped(), "maps are formulas around a network");
         Self {
             layers: network.layers().iter().map(|layer| PackedLayer::new(layer, rows)).collect(),
             widest: network.widths().into_iter().max().unwrap_or(0),

@@ -24,6 +24,7 @@ use crate::scenario::settings::Settings;
 use crate::scenario::{Context, provenance, tightened};
 use crate::system::Axis;
 use crate::train::analytic::{Analytic, LAST, Task};
+use crate::train::chosen::chosen_first;
 use crate::train::device::Device;
 use crate::train::network::{Architecture, Network};
 use crate::train::purpose;
@@ -139,6 +140,7 @@ impl Training<'_> {
     fn analytic(self, model: &Arc<Model>) -> Result<Trained> {
         let Self { config, settings, backend, watch, .. } = self;
         let task = self.task(model)?;
+        task.check_room(&settings.hidden, settings.analytic.batch)?;
         let interface = task.interface.clone();
         let inputs = interface.intervals(&self.intervals(model)?);
         let network = self.network(inputs, interface.outputs, Activation::Tanh, LAST);
@@ -181,9 +183,11 @@ impl Training<'_> {
             inputs.extend(model.controls.iter().map(|axis| [axis.low, axis.high]));
             order.extend(names(&model.controls));
         }
-        let samples = |purpose: Purpose, count: u64| match acts {
-            true => source.action_values(purpose, count as usize),
-            false => source.values(purpose, count as usize),
+        let chosen = acts.then(|| chosen_first(plant));
+        let chosen = chosen.as_ref().map(|chosen| backend.prepare(chosen)).transpose()?;
+        let samples = |purpose: Purpose, count: u64| match &chosen {
+            Some(chosen) => source.action_values(chosen, purpose, count as usize),
+            None => source.values(purpose, count as usize),
         };
         let lesson = Lesson {
             name: if acts { "action_value" } else { "value" },
@@ -233,6 +237,9 @@ fn text(record: &TrainRecord, files: &[PathBuf], seconds: f64) -> String {
         line(format_args!("{} {}", network.file, network.sha256));
     }
     line(format_args!("{} s", number(seconds)));
+    for note in &record.notes {
+        line(format_args!("note: {note}"));
+    }
     for file in files {
         line(format_args!("{}", file.display()));
     }

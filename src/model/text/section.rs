@@ -67,8 +67,19 @@ impl<'a> Section<'a> {
             Value::Table(table) => {
                 Ok(Some(Self { origin: self.origin, path: self.at(key), table }))
             }
-            other => Err(self.wrong(key, "a section", other)),
+            other => Err(self.wrong(key, &self.expected_section(key, other), other)),
         }
+    }
+
+    /// What a section `key` would be that says `value`.
+    fn expected_section(&self, key: &str, value: &Value) -> String {
+        let inner = match (self.path.rsplit('.').next(), value) {
+            (Some("parameters"), Value::Integer(_) | Value::Float(_)) => "value",
+            (Some("states"), Value::Array(ends)) if ends.len() == 2 => "box",
+            (Some("controls"), Value::Array(ends)) if ends.len() == 2 => "bounds",
+            _ => return "a section".to_owned(),
+        };
+        format!("a section, `{key} = {{ {inner} = {value} }}`")
     }
 
     /// The section `key`, which `why` is needed.

@@ -46,8 +46,8 @@ impl Activation {
                 let [first, third] = Self::GELU_TANH;
                 let tanh = Real::tanh(x * (first + third * x * x));
                 // Where the tangent is flat, its factor may be infinite.
-                let inner = x.clamp(-6.0, 6.0)
-                    * (first + 3.0 * third * x.clamp(-6.0, 6.0) * x.clamp(-6.0, 6.0));
+                let inner = x.clamp(-5.0, 5.0)
+                    * (first + 3.0 * third * x.clamp(-5.0, 5.0) * x.clamp(-5.0, 5.0));
                 0.5 * (1.0 + tanh) + 0.5 * inner * (1.0 - tanh * tanh)
             }
             Self::Silu => {

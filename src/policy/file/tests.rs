@@ -84,7 +84,7 @@ fn old_networks_have_their_digests_and_bytes() {
     assert_eq!(mlp.digest(), "50990e1cf2256fa2378d45fed7d9f7682635c27d9626211e7f60612924d716eb");
     assert_eq!(
         digest::sha256([mlp.to_bytes().as_slice()]),
-        "ae0ca5c36af6cd82db1e6addb8f790c3cde21db9e82f4928ec8a6eaff9bbf0ea"
+        "3c4a2c9f474eccbf68f13477b05a4e53969360cfabc6018600d62657e86b5c5f"
     );
     let single = Mlp::new(layers()[1..].to_vec(), Activation::Tanh, Activation::Identity)
         .expect("a network");

@@ -180,9 +180,7 @@ struct Certified<'p, 'a> {
 /// The findings of a sweep of certificates.
 pub(super) fn certificates(grid: &Grid<'_>) -> Findings {
     let all: Vec<Certified<'_, '_>> = grid.points.iter().filter_map(certified).collect();
-    let best = grid.best.and_then(|best| certified(&grid.points[best]));
-    let parts =
-        [best.map(|best| largest_share(grid, &best, &all)), largest_ball(grid, &all), held(&all)];
+    let parts = [largest_share(grid, &all), largest_ball(grid, &all), held(&all)];
     let (headlines, found) = parts.into_iter().flatten().unzip();
     Findings { headlines, found, limits: certificate_limits(&all) }
 }
@@ -191,33 +189,52 @@ fn certified<'p, 'a>(point: &'p Point<'a>) -> Option<Certified<'p, 'a>> {
     Some(Certified { point, certificate: certificate(point.record)? })
 }
 
-fn largest_share(
-    grid: &Grid<'_>,
-    best: &Certified<'_, '_>,
-    all: &[Certified<'_, '_>],
-) -> (Headline, String) {
-    let (name, value) = (grid.name(best.point), percent(share(best.certificate)));
+/// The point with the largest share of those whose certificates hold, of all where none does.
+fn largest_share(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
+    let some_hold = all.iter().any(|one| one.certificate.holds);
+    let eligible = || all.iter().filter(|one| one.certificate.holds || !some_hold);
+    let of = |one: &Certified<'_, '_>| share(one.certificate);
+    // Of equal points the first.
+    let best = eligible().reduce(|best, next| if of(next) > of(best) { next } else { best })?;
+    let (name, value) = (grid.name(best.point), percent(of(best)));
     let interval = percents(best.certificate.share_interval);
-    let found =
-        format!("The largest share of the box is certified at {name}: {value} ({interval}).");
-    let mut details = vec![format!("At {name}."), format!("Interval: {interval}.")];
+    let risk = upper(best.certificate.conditional_risk);
+    let mut found = format!(
+        "The largest share of the box is certified at {name}: {value} ({interval}), with a failure risk of at \
+         most {risk}."
+    );
+    let mut details = vec![
+        format!("At {name}."),
+        format!("Interval: {interval}."),
+        format!("Failure risk in the set: at most {risk}."),
+    ];
+    let equal = eligible().filter(|one| of(one) == of(best)).count();
+    details.extend((equal > 1).then(|| format!("The same at {} more points.", equal - 1)));
+    if !some_hold {
+        details.push("No certificate of the sweep holds.".to_owned());
+    } else if all.iter().any(|one| of(one) > of(best)) {
+        found += " Larger ones belong to certificates that do not hold.";
+    }
     details.extend(picked(all));
-    (Headline { title: "Largest certified share".to_owned(), value, details }, found)
+    Some((Headline { title: "Largest certified share".to_owned(), value, details }, found))
 }
 
 fn largest_ball(grid: &Grid<'_>, all: &[Certified<'_, '_>]) -> Option<(Headline, String)> {
     let balls = all.iter().filter(|one| one.certificate.radius > 0.0);
     let radius = |one: &Certified<'_, '_>| one.certificate.radius;
-    let largest = balls.max_by(|a, b| radius(a).total_cmp(&radius(b)));
+    // Of equal sets the first.
+    let largest = balls.reduce(|best, next| if radius(next) > radius(best) { next } else { best });
     let title = "Largest verified set".to_owned();
     let Some(largest) = largest else {
         let found = "Local growth verified no set at any point.".to_owned();
         let headline = Headline { title, value: "none".to_owned(), details: Vec::new() };
         return (!all.is_empty()).then_some((headline, found));
     };
+    let equal = all.iter().filter(|one| radius(one) == radius(largest)).count() - 1;
     let (name, radius) = (grid.name(largest.point), lower(radius(largest)));
-    let found = format!("The largest verified set has radius {radius}, at {name}.");
-    let mut details = vec![format!("At {name}.")];
+    let also = if equal > 0 { format!(" and {equal} more") } else { String::new() };
+    let found = format!("The largest verified set has radius {radius}, at {name}{also}.");
+    let mut details = vec![format!("At {name}{also}.")];
     details.extend(picked(all));
     Some((Headline { title, value: format!("radius {radius}"), details }, found))
 }
@@ -269,5 +286,7 @@ fn certificate_limits(all: &[Certified<'_, '_>]) -> Vec<String> {
          better certificate by itself."
             .to_owned(),
         "Nothing is certified for one given state: each claim is about a measure.".to_owned(),
+        "Each point takes the policy that its configuration names; none is trained anew."
+            .to_owned(),
     ]
 }

@@ -114,8 +114,7 @@ pub(super) const DEVIATION: Measure = Measure {
     label: "largest deviation bound",
     range: Range::FromZero,
     bands: &[],
-    caption: "Largest bound over the steps on how far a perturbed rollout strays: what the margins \
-              lose, before the constants.",
+    caption: "Largest bound over the steps on how far a perturbed rollout strays.",
     read: |_, point| reading(certificate(point)?.deviation_bound, &[]),
 };
 

@@ -138,7 +138,7 @@ fn caption(record: &Record, tracks: &[Track], ground: Option<&GroundOf<'_>>) -> 
         } else if record.system.states.len() > 2 {
             caption += ", with the other coordinates as in the state";
         }
-        caption += ".";
+        caption += "; none was computed where it is grey.";
     }
     caption
 }

@@ -108,6 +108,7 @@ impl<'a> GroundOf<'a> {
 
     /// Draws them.
     pub(super) fn draw(&self, plot: &mut Plot) {
+        plot.beyond(self.spans());
         match self {
             Self::Slice(grid) => {
                 target_area(plot, grid);

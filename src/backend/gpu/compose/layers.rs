@@ -43,7 +43,11 @@ pub(in super::super) struct LayerShape {
 
 impl LayerShape {
     /// The layers of `mlp`, one after the other.
+    ///
+    /// # Panics
+    /// If it has a map at an end.
     pub(in super::super) fn of(mlp: &Mlp) -> Vec<Self> {
+        assert!(!mlp.is_mapped(), "maps are formulas around a network");
         let kinds = Kinds::of(mlp);
         let mut offset = 0;
         let shape = |layer: &Layer| {

@@ -34,8 +34,8 @@ fn legend(record: &SweepRecord) -> &'static str {
         }
         None => {
             "N: pairs of the deviation bound; certified share: interval of the certified set's share of\n\
-             the box; growth, radius: what came of the ball around a boundary point; holds: whether every\n\
-             claim that was asked for was obtained\n"
+             the box; risk: most that a perturbed rollout from there fails with; growth, radius: what came\n\
+             of the ball around a boundary point; holds: whether every claim that was asked for was obtained\n"
         }
     }
 }
@@ -62,7 +62,7 @@ fn header(record: &SweepRecord) -> Vec<String> {
     let axes = record.axes.iter().map(|axis| axis.name.clone());
     let results: &[&str] = match record.starts {
         Some(_) => &["success", "effective", "best cost", "median", "p95", "p99"],
-        None => &["N", "certified share", "largest bound", "growth", "radius", "holds"],
+        None => &["N", "certified share", "risk", "largest bound", "growth", "radius", "holds"],
     };
     axes.chain(results.iter().map(|name| (*name).to_owned())).collect()
 }
@@ -96,6 +96,7 @@ fn certificate_cells(point: &CertificatePoint) -> Vec<String> {
     vec![
         point.deviation_scenarios.to_string(),
         interval(point.share_interval),
+        upper(point.conditional_risk),
         upper(point.deviation_bound),
         point.growth.name().to_owned(),
         lower(point.radius),

@@ -2,13 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-mod common;
-
 use std::path::Path;
 
-use command::{Folder, document, done, reachcast, refused};
-use common::{backends, cpu};
+use crate::command::{Folder, document, done, reachcast, refused};
+use crate::common::{backends, cpu};
 use reachcast::backend::Backend;
 use reachcast::model::{Plant, text};
 use reachcast::rollout::{PairControl, Region, RolloutSpec, Starts, StateList, States};

@@ -189,7 +189,7 @@ fn certificates_that_are_not_theirs_are_refused() {
     };
     let store = |record: &Value| std::fs::write(&path, record.to_string()).unwrap();
 
-    // Edited by hand: `tests/tamper.rs` goes through every field.
+    // Edited by hand: `tests/certificates/tamper.rs` goes through every field.
     let mut bold = record.clone();
     bold["global"]["accepted"] = (record["global"]["accepted"].as_u64().unwrap() + 500).into();
     store(&bold);

@@ -3,17 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-mod common;
-#[path = "oracle/costs.rs"]
-mod costs;
-#[path = "oracle/mppi.rs"]
-#[allow(dead_code, reason = "the tests of MPPI have more")]
-mod oracle;
-
+use crate::costs;
+use crate::oracle;
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{adapter, backends, cpu};
+use crate::common::{adapter, backends, cpu};
 use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::cost::Cost;

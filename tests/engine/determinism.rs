@@ -1,8 +1,6 @@
 //! The same seed gives the same certificate, and a stored certificate is checked and queried.
 
-mod common;
-
-use common::{cpu, race_policy, race_settings, settings};
+use crate::common::{cpu, race_policy, race_settings, settings};
 use reachcast::Error;
 use reachcast::backend::{Backend, Program};
 use reachcast::model::Plant;

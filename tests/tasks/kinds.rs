@@ -1,11 +1,9 @@
 //! Tasks against brute force: each kind's measure from its definition over stored trajectories, on every
 //! backend, its signs with early exit, its pairs, its margin drops; and kernels that break a rule are caught.
 
-mod common;
-
 use std::path::Path;
 
-use common::{adapter, backends, cpu};
+use crate::common::{adapter, backends, cpu};
 use reachcast::Error;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::Gpu;
@@ -432,17 +430,20 @@ fn the_softened_measure_tends_to_that_of_the_task() {
     }
 }
 
-/// A method that knows the backup of reach-avoid alone refuses another task by name.
+/// A critic that knows no time refuses a task whose steps differ, by name.
 #[test]
-fn methods_that_know_reach_avoid_alone_refuse_other_tasks() {
-    for method in [Method::ActionValue, Method::Ddpg] {
-        method.check_task(&Task::default()).expect("reach-avoid");
-        let found = method.check_task(&Task::AtEnd).expect_err("refused").to_string();
-        let words = ["train.method", method.name(), "this one is `at-end`", "`analytic`"];
+fn a_critic_without_a_time_refuses_tasks_with_one() {
+    let window = Window { from: 2, to: None };
+    for task in [Task::AtEnd, Task::ReachStay { by: None }, Task::Reach(window)] {
+        let found = Method::Ddpg.check_task(&task).expect_err("refused").to_string();
+        let words = ["train.method", &format!("this task is `{task}`"), "`analytic`"];
         words.iter().for_each(|word| assert!(found.contains(word), "no `{word}` in: {found}"));
     }
-    for method in [Method::Analytic, Method::Value, Method::Ppo] {
-        method.check_task(&Task::Avoid).expect("any task");
+    for task in [Task::default(), Task::Avoid, Task::Reach(Window::default())] {
+        Method::Ddpg.check_task(&task).expect("timeless");
+    }
+    for method in [Method::Analytic, Method::Value, Method::ActionValue, Method::Ppo] {
+        method.check_task(&Task::AtEnd).expect("any task");
     }
 }
 

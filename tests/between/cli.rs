@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, done, reachcast};
+use crate::command::{Folder, done, reachcast};
 use serde_json::Value;
 
 /// A mass on a spring that turns half around in eight steps.

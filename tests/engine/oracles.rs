@@ -1,8 +1,6 @@
 //! Oracles: numbers that are known without the library, and scalar f64 loops beside every backend.
 
-mod common;
-
-use common::{
+use crate::common::{
     ClosedForm, FALSE_ALARM, backends, cpu, literal, race_policy, race_settings, settings, supremum,
 };
 use rand::rngs::StdRng;

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{backends, cpu};
+use crate::common::{backends, cpu};
 use reachcast::backend::Backend;
 use reachcast::formula::{Expr, record};
 use reachcast::model::{Controller, Law, Model, Plant};

@@ -1,13 +1,11 @@
 //! Networks that rollouts run themselves: every form gives the same bits, and a form that sums in another
 //! order, loses a neuron or lets a padded one through is noticed.
 
-mod common;
-mod models;
-
+use crate::models;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use common::adapter;
+use crate::common::adapter;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Form, Gpu, NetworkKernels};
 use reachcast::model::Plant;

@@ -1,8 +1,6 @@
 //! Margin drops and scores against a plain loop in f64, on every backend, and the certificate made of them.
 
-mod common;
-
-use common::{backends, cpu, race_policy, race_settings};
+use crate::common::{backends, cpu, race_policy, race_settings};
 use reachcast::backend::Backend;
 use reachcast::model::Plant;
 use reachcast::race::DroneRace;
@@ -285,10 +283,13 @@ fn a_risk_that_is_looked_for_is_no_claim() {
     asked.risk = Some(ConditionalRisk::LookedFor(0.03));
     let shown = record(&cpu(2), &plant, &settings);
     assert_eq!(shown.global.claim.epsilon, Some(0.03), "the draws show it");
+    assert_eq!(shown.looked_for(), None);
     settings.global.draws = 300;
     let few = record(&cpu(2), &plant, &settings);
     let claim = &few.global.claim;
     assert!(few.statements.join("\n").contains("was not tested"));
+    let words = few.looked_for().expect("not found");
+    assert!(words.starts_with("a risk of 0.03 was looked for"), "{words}");
     assert!(claim.epsilon == Some(settings.deviation.epsilon) && claim.is_obtained(), "{claim:?}");
 }
 

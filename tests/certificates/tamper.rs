@@ -3,13 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-mod common;
-
+use crate::command;
 use std::fs;
 
-use command::{Folder, reachcast};
-use common::cpu;
+use crate::command::{Folder, reachcast};
+use crate::common::cpu;
 use reachcast::Error;
 use reachcast::backend::Program;
 use reachcast::config::{Config, PolicySource};

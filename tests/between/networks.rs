@@ -1,13 +1,11 @@
 //! Points inside a period under networks, in layers and inside of rollouts, and for plans: against f64, whose
 //! rollouts `between` holds to the mathematics.
 
-mod common;
-mod models;
-
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{adapter, backends, cpu};
+use crate::common::{adapter, backends, cpu};
+use crate::models;
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::{Form, NetworkKernels};
 use reachcast::formula::{Expr, Scalar as _, record};

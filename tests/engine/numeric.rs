@@ -4,9 +4,7 @@
 //! Formulas here have + - * / sqrt and comparisons alone, so that host and adapter see the same
 //! numbers; expectations are computed in the test, in f32.
 
-mod common;
-
-use common::{adapter, backends, settings};
+use crate::common::{adapter, backends, settings};
 use reachcast::backend::Backend;
 use reachcast::backend::gpu::NetworkKernels;
 use reachcast::cost::Cost;

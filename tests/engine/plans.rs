@@ -3,13 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-mod common;
-
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{adapter, backends, cpu};
+use crate::common::{adapter, backends, cpu};
 use reachcast::backend::cpu::Cpu;
 use reachcast::backend::{Backend, PlanProgram};
 use reachcast::control::DriveBenchmark;

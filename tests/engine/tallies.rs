@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-mod common;
-
 use std::ops::Range;
 
-use common::{backends, cpu, race_policy};
+use crate::common::{backends, cpu, race_policy};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::Result;

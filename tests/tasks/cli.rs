@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-
-use command::{Folder, document, done, reachcast, refused};
+use crate::command::{Folder, document, done, reachcast, refused};
 use serde_json::Value;
 
 /// Two masses on springs, pulled to the middle; the task is put behind it.

@@ -2,15 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-mod common;
-#[path = "oracle/drive.rs"]
-mod drive;
-#[path = "oracle/mppi.rs"]
-mod oracle;
-
+use crate::drive;
 use std::f64::consts::{PI, TAU};
 
-use common::{backends, cpu, literal};
+use crate::common::{backends, cpu, literal};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use reachcast::control::DriveBenchmark;

@@ -3,14 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-mod common;
-#[path = "oracle/mppi.rs"]
-#[allow(dead_code, reason = "each test file uses a part of it")]
-mod oracle;
-
+use crate::oracle;
 use std::sync::Arc;
 
-use common::{backends, cpu};
+use crate::common::{backends, cpu};
 use nalgebra::{DMatrix, DVector};
 use reachcast::backend::Backend;
 use reachcast::cost::{Cost, Obstacle, Quadratic};

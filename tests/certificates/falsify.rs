@@ -2,14 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod command;
-mod common;
-
+use crate::common;
 use std::fs;
 use std::path::Path;
 
-use command::{Folder, document, done, reachcast, refused};
-use common::{backends, cpu};
+use crate::command::{Folder, document, done, reachcast, refused};
+use crate::common::{backends, cpu};
 use reachcast::backend::Backend;
 use reachcast::config::{Config, Overrides};
 use reachcast::model::Plant;

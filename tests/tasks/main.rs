@@ -1,0 +1,8 @@
+//! Tasks against brute force, and in the words of the commands.
+
+mod cli;
+#[path = "../command/mod.rs"]
+mod command;
+#[path = "../common/mod.rs"]
+mod common;
+mod kinds;
