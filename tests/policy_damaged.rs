@@ -265,7 +265,7 @@ fn graphs_that_are_no_plain_network() {
     };
     changed(b"\x0a\x01f\x12\x01g", b"\x0a\x01f\x12\x01f", &["`g` is given by nothing"]);
     changed(b"\x0a\x01f\x12\x01g", b"\x0a\x01g\x12\x01g", &["`g` is given by nothing"]);
-    changed(b"\x12\x01c", b"\x12\x01b", &["two operations give `b`"]);
+    changed(b"\x12\x01f", b"\x12\x01g", &["two operations give `g`"]);
     changed(b"\"\x04Relu", b"\"\x04Sign", &["operation `Sign`; what a dense network may have is"]);
     changed(b"\x08\x08\x08\x08\x10\x01", b"\x08\x04\x08\x10\x10\x01", &["8 numbers", "takes 4"]);
     changed(b"\x08\x08\x08\x03\x10\x01", b"\x08\x03\x08\x08\x10\x01", &["8 numbers", "takes 3"]);

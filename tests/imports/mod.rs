@@ -1,6 +1,7 @@
 //! Policies of the libraries of the field: what comes out of each file is what its library makes of it.
 
 mod forward;
+mod layouts;
 mod lost;
 mod written;
 

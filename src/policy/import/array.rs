@@ -10,6 +10,8 @@ pub(super) struct Array {
     pub(super) shape: Vec<usize>,
     /// As many as the product of the lengths.
     pub(super) numbers: Vec<f64>,
+    /// Whether they are integers, whose quotients are, too.
+    pub(super) whole: bool,
 }
 
 impl Array {
@@ -17,17 +19,22 @@ impl Array {
     pub(super) fn new(shape: Vec<usize>, numbers: &[f64]) -> Option<Self> {
         let fills = shape.iter().try_fold(1, |n: usize, &length| n.checked_mul(length))
             == Some(numbers.len());
-        fills.then(|| Self { shape, numbers: numbers.to_vec() })
+        fills.then(|| Self { shape, numbers: numbers.to_vec(), whole: false })
     }
 
     /// One number.
     pub(super) fn number(number: f64) -> Self {
-        Self { shape: Vec::new(), numbers: vec![number] }
+        Self { shape: Vec::new(), numbers: vec![number], whole: false }
     }
 
     /// A list of numbers.
     pub(super) fn list(numbers: Vec<f64>) -> Self {
-        Self { shape: vec![numbers.len()], numbers }
+        Self { shape: vec![numbers.len()], numbers, whole: false }
+    }
+
+    /// The same as integers.
+    pub(super) fn integers(self, whole: bool) -> Self {
+        Self { whole, ..self }
     }
 
     /// The number that all of its numbers are, if they are one.
@@ -43,7 +50,8 @@ impl Array {
 
     /// The same with each number changed.
     pub(super) fn each(&self, f: impl Fn(f64) -> f64) -> Self {
-        Self { shape: self.shape.clone(), numbers: self.numbers.iter().map(|&x| f(x)).collect() }
+        let numbers = self.numbers.iter().map(|&x| f(x)).collect();
+        Self { shape: self.shape.clone(), numbers, whole: self.whole }
     }
 
     /// `f` of its numbers and those of `other`, each as often as the shapes ask for.
@@ -75,7 +83,7 @@ impl Array {
             array.numbers[place]
         };
         let numbers = (0..count).map(|at| f(place(self, at), place(other, at))).collect();
-        Some(Self { shape, numbers })
+        Some(Self { shape, numbers, whole: self.whole && other.whole })
     }
 
     /// The same numbers in another shape, in which -1 is what is left and 0 what was there.
@@ -90,7 +98,7 @@ impl Array {
             let rest = shape.iter().try_fold(1, |n: usize, &length| n.checked_mul(length))?;
             shape[free] = self.numbers.len().checked_div(rest)?;
         }
-        Self::new(shape, &self.numbers)
+        Self::new(shape, &self.numbers).map(|array| array.integers(self.whole))
     }
 
     /// The same with its dimensions in another order; turned around if none is given.
@@ -112,6 +120,6 @@ impl Array {
             places.into_iter().flat_map(row).collect()
         });
         let numbers = places.into_iter().map(|place| self.numbers[place]).collect();
-        Some(Self { shape, numbers })
+        Some(Self { shape, numbers, whole: self.whole })
     }
 }

@@ -70,7 +70,8 @@ pub(super) fn policy(
     choice.add_statistics(&mut source, &mut made)?;
     choice.add_layers(&mut source, &mut made, request, hints)?;
     if !choice.by_name {
-        hints.refusal.clone().map_or(Ok(()), Err)?;
+        let of_layout = choice.layout.and_then(|layout| layout.refusal).map(str::to_owned);
+        hints.refusal.clone().or(of_layout).map_or(Ok(()), Err)?;
         choice.add_ends(&mut source, &mut made, hints)?;
         let first = choice.layers.first().map_or("", |layer| &layer.name);
         let beside = choice.layout.map_or(&[][..], |layout| layout.beside);
@@ -201,15 +202,17 @@ impl Choice {
 
 /// The refusal of a file without a dense layer.
 fn none(source: &Source<'_>) -> String {
-    let unmade = source.unmade.iter().take(3);
-    let unmade: String = unmade
-        .map(|object| {
-            format!("; `{}` is an object of `{}`, which was not made", object.name, object.maker)
-        })
-        .collect();
+    let count = source.tensors.len();
+    let unmade = source.unmade.first().map(|object| {
+        format!(
+            "; `{}` is an object of `{}`, which a program would have to make: nothing was executed. Save tensors \
+             alone: torch.save(module.state_dict(), FILE)",
+            object.name, object.maker
+        )
+    });
     format!(
-        "no dense layer among its {} tensors: none is called `.weight` and has the shape [out, in]{unmade}",
-        source.tensors.len()
+        "no dense layer among its {count} tensors: none is called `.weight` and has the shape [out, in]{}",
+        unmade.unwrap_or_default()
     )
 }
 

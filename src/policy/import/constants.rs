@@ -19,6 +19,9 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
         ("Add", Some(other)) => first.with(other, |a, b| a + b),
         ("Sub", Some(other)) => first.with(other, |a, b| a - b),
         ("Mul", Some(other)) => first.with(other, |a, b| a * b),
+        ("Div", Some(other)) if first.whole && other.whole => {
+            first.with(other, |a, b| (a / b).trunc())
+        }
         ("Div", Some(other)) => first.with(other, |a, b| a / b),
         ("Pow", Some(other)) => first.with(other, f64::powf),
         ("Max", Some(other)) => first.with(other, f64::max),
@@ -34,11 +37,12 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
             let axes = axes.map(Array::wholes).or(node.integers("axes").map(<[i64]>::to_vec));
             ones(first, axes.as_deref(), node.operation == "Unsqueeze")
         }
+        ("Gather", Some(places)) if first.shape.len() == 1 => picked(first, places),
         ("Concat", _) if first.shape.len() == 1 => {
             let lists: Option<Vec<&Array>> = inputs.iter().copied().collect();
             let joint =
                 lists.map(|lists| lists.iter().flat_map(|list| list.numbers.clone()).collect());
-            joint.map(Array::list)
+            joint.map(|joint| Array::list(joint).integers(first.whole))
         }
         _ => return Err("of constants, which is not followed".to_owned()),
     };
@@ -48,6 +52,15 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
 /// The name of what a node gives.
 fn name(node: &Node) -> &str {
     node.outputs.first().map_or("", String::as_str)
+}
+
+/// The numbers of a list at these places, in their shape.
+fn picked(list: &Array, places: &Array) -> Option<Array> {
+    let count = list.numbers.len() as i64;
+    let at = |place: i64| usize::try_from(if place < 0 { place + count } else { place }).ok();
+    let pick = |place: i64| list.numbers.get(at(place)?).copied();
+    let numbers = places.wholes().into_iter().map(pick).collect::<Option<Vec<f64>>>()?;
+    Array::new(places.shape.clone(), &numbers).map(|array| array.integers(list.whole))
 }
 
 /// Two dimensions: those before `axis`, and the others.

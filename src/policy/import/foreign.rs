@@ -5,12 +5,16 @@ use safetensors::SafeTensors;
 use super::kind::Kind;
 use super::names::compare;
 use super::source::{Source, Tensor};
+use crate::policy::Mlp;
 
 /// The tensors of a safetensors file.
 ///
 /// # Errors
-/// A sentence about damage.
+/// A sentence about damage, or a file that is a policy file.
 pub(super) fn open(bytes: &[u8]) -> Result<Source<'_>, String> {
+    if Mlp::from_bytes(bytes).is_ok() {
+        return Err("a policy file already, which needs no import".to_owned());
+    }
     let file = SafeTensors::deserialize(bytes);
     let file = file.map_err(|e| format!("not a whole safetensors file ({e})"))?;
     let mut source = Source::default();

@@ -73,8 +73,9 @@ impl Format {
             }
             [b'P', b'K', 3, 4, ..] => Self::Archive,
             _ if ending == "onnx" => Self::Graph,
+            // The length of its header may begin like a pickle.
+            _ if is_safetensors(bytes) => Self::Safetensors,
             [0x80, 2..=5, ..] => Self::Pickle,
-            [_, _, _, _, _, _, 0, 0, b'{', ..] => Self::Safetensors,
             _ if ending == "nnet" => Self::Nnet,
             _ if text::is_numbers(bytes) => Self::Polar,
             // A map of up to 15 entries whose first key is a text: what flax writes.
@@ -85,6 +86,13 @@ impl Format {
             _ => return Err(unknown(bytes)),
         })
     }
+}
+
+/// Whether `bytes` begin with the length of a header in JSON that may be in them.
+fn is_safetensors(bytes: &[u8]) -> bool {
+    let length = bytes.first_chunk().map(|length| u64::from_le_bytes(*length));
+    let fits = length.is_some_and(|length| length <= bytes.len() as u64);
+    bytes.get(8) == Some(&b'{') && (fits || bytes[6..8] == [0, 0])
 }
 
 /// The refusal of a file that nothing is known of.

@@ -41,23 +41,22 @@ pub(super) fn read(bytes: &[u8], asked: &[String], cast: Cast) -> Result<Importe
     let needed = needed(graph, output)?;
     let input = graph.input()?;
     let walk = Walk::of(draft(&written, input.width)?);
-    let values = HashMap::from([(input.name, walk.number())]);
+    let values = HashMap::from([(input.name, walk.number(input.is_flat))]);
     let mut run = Run { walk, values, made: 0, cast };
     for (name, tensor) in graph.tensors().filter(|(name, _)| needed.names.contains(name)) {
         let array = tensor.array(cast).map_err(|problem| format!("`{name}`: {problem}"))?;
         run.values.insert(name, Value::Constant(array));
     }
     for node in needed.nodes {
-        run.node(node).map_err(|problem| told(graph, node, problem))?;
+        run.node(node)
+            .map_err(|problem| told(graph, &format!("operation `{}`", node.operation), problem))?;
     }
-    let Some(Value::Number(last)) = run.values.remove(output) else {
+    let last = run.value(output).map_err(|problem| told(graph, "the output", problem))?;
+    let Some(Value::Number(last)) = last else {
         return Err(format!("the output `{output}` does not depend on the input"));
     };
     let Run { mut walk, .. } = run;
-    walk.close(last, None).map_err(|problem| match problem {
-        Problem::Words(words) => format!("the output `{output}`: {words}"),
-        _ => branches(graph, output),
-    })?;
+    walk.close(last, None).map_err(|problem| told(graph, "the output", problem))?;
     let floats =
         graph.tensors().filter(|(name, tensor)| !needed.names.contains(name) && tensor.is_float());
     let others = graph.outputs().into_iter().filter(|name| *name != output);
@@ -127,16 +126,14 @@ fn needed<'g>(graph: &'g Graph, output: &'g str) -> Result<Needed<'g>, String> {
     Ok(Needed { nodes, names })
 }
 
-/// A problem of an operation, with its name; of a value that was gone on from already, what goes on from it.
-fn told(graph: &Graph, node: &Node, problem: Problem) -> String {
+/// A problem at `place`; of a value that was gone on from already, what goes on from it.
+fn told(graph: &Graph, place: &str, problem: Problem) -> String {
     match problem {
         Problem::Stale(name) => branches(graph, &name),
-        Problem::Words(problem) => format!("operation `{}`: {problem}", node.operation),
-        Problem::Unknown => format!(
-            "operation `{}`; what a dense network may have is {}",
-            node.operation,
-            OPERATIONS.join(", ")
-        ),
+        Problem::Words(problem) => format!("{place}: {problem}"),
+        Problem::Unknown => {
+            format!("{place}; what a dense network may have is {}", OPERATIONS.join(", "))
+        }
     }
 }
 
@@ -181,6 +178,7 @@ impl<'g> Run<'g> {
     fn value(&self, name: &str) -> Result<Option<Value>, Problem> {
         match self.values.get(name) {
             _ if name.is_empty() => Ok(None),
+            Some(value) if self.walk.is_stale(value) => Err(Problem::Stale(name.to_owned())),
             Some(value) => Ok(Some(value.clone())),
             None => Err(Problem::Words(format!("`{name}` is given by nothing before it"))),
         }

@@ -24,6 +24,8 @@ pub(super) struct Layout {
     pub(super) scaled: Option<[&'static str; 2]>,
     /// Whether the last layer also gives deviations, in its second half.
     pub(super) doubled: bool,
+    /// Why the file does not say what the network gives, so that it has to be asked for by name.
+    pub(super) refusal: Option<&'static str>,
     /// What the library does with the output that no file of its says.
     pub(super) beyond: Option<&'static str>,
 }
@@ -38,6 +40,7 @@ const PLAIN: Layout = Layout {
     last: Activation::Tanh,
     scaled: None,
     doubled: false,
+    refusal: None,
     beyond: None,
 };
 const ELU: Activation = Activation::Elu { alpha: 1.0 };
@@ -49,7 +52,7 @@ const LIMITS: Option<&str> =
 const GAUSSIAN: (Activation, Activation) = (Activation::Tanh, Activation::Identity);
 
 /// The layouts, those with more parts first.
-const LAYOUTS: [Layout; 21] = [
+const LAYOUTS: [Layout; 22] = [
     Layout {
         name: "Brax",
         body: &["1.params.hidden_"],
@@ -141,6 +144,17 @@ const LAYOUTS: [Layout; 21] = [
         marks: &["pi.log_std"],
         hidden: GAUSSIAN.0,
         last: GAUSSIAN.1,
+        ..PLAIN
+    },
+    Layout {
+        name: "omnisafe (off-policy)",
+        body: &["pi.net"],
+        marks: &["obs_normalizer"],
+        refusal: Some(
+            "the SAC of omnisafe gives means and deviations side by side, its DDPG and TD3 controls alone, and the \
+             file does not say which it is; --network pi.net imports all of the outputs, without the statistics of \
+             the observations",
+        ),
         ..PLAIN
     },
     Layout {

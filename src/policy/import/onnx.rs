@@ -5,7 +5,7 @@ use prost::Message;
 use super::array::Array;
 use super::kind::{Cast, FloatReader, Kind};
 use crate::policy::export::PRODUCER;
-use crate::policy::onnx::{Attribute, Entry, Graph, Model, Named, Node, Tensor};
+use crate::policy::onnx::{Attribute, Entry, Graph, Length, Model, Named, Node, Tensor};
 
 /// The numbers of two kinds of integers.
 const INT32: i32 = 6;
@@ -17,6 +17,8 @@ pub(super) struct Input<'a> {
     pub(super) name: &'a str,
     /// Numbers of one input, where the graph says it.
     pub(super) width: Option<usize>,
+    /// Whether it has two dimensions: inputs, and their numbers.
+    pub(super) is_flat: bool,
 }
 
 /// A graph, and what its file says about it.
@@ -66,7 +68,10 @@ impl Graph {
             |input: &&Named| self.initializers.iter().any(|tensor| tensor.name == input.name);
         let inputs: Vec<&Named> = self.inputs.iter().filter(|input| !tensor(input)).collect();
         match inputs.as_slice() {
-            [input] => Ok(Input { name: &input.name, width: input.width() }),
+            [input] => {
+                let is_flat = input.lengths().is_some_and(|lengths| lengths.len() == 2);
+                Ok(Input { name: &input.name, width: input.width(), is_flat })
+            }
             several => {
                 let names: Vec<&str> = several.iter().map(|input| input.name.as_str()).collect();
                 Err(format!(
@@ -84,16 +89,27 @@ impl Graph {
 }
 
 impl Named {
+    /// Its lengths, where the graph says how many there are.
+    fn lengths(&self) -> Option<&[Length]> {
+        Some(&self.kind.as_ref()?.tensor.as_ref()?.shape.as_ref()?.lengths)
+    }
+
     /// Numbers of one value, where the first length counts values.
     fn width(&self) -> Option<usize> {
-        let lengths = &self.kind.as_ref()?.tensor.as_ref()?.shape.as_ref()?.lengths;
-        let rest = if let [_, rest @ ..] = lengths.as_slice()
+        let lengths = self.lengths()?;
+        let rest = if let [_, rest @ ..] = lengths
             && !rest.is_empty()
         {
             rest
         } else {
             lengths
         };
+        // One number after many inputs, or a column of numbers: what takes it says so.
+        if lengths.first().is_some_and(|first| first.value > 1)
+            && rest.iter().all(|length| length.value == 1)
+        {
+            return None;
+        }
         rest.iter().try_fold(1, |n: usize, length| {
             let length = usize::try_from(length.value).ok().filter(|length| *length > 0)?;
             n.checked_mul(length)
@@ -111,9 +127,12 @@ impl Node {
             Some(Attribute { tensor: Some(tensor), .. }) => tensor.array(cast),
             Some(value) => match value.name.as_str() {
                 "value_float" => Ok(Array::number(value.float.into())),
-                "value_int" => Ok(Array::number(value.integer as f64)),
+                "value_int" => Ok(Array::number(value.integer as f64).integers(true)),
                 "value_floats" => Ok(Array::list(value.floats.iter().map(|&f| f.into()).collect())),
-                "value_ints" => Ok(Array::list(value.integers.iter().map(|&i| i as f64).collect())),
+                "value_ints" => {
+                    Ok(Array::list(value.integers.iter().map(|&i| i as f64).collect())
+                        .integers(true))
+                }
                 other => Err(format!("a constant with `{other}`, which is no number")),
             },
             None => Err("a constant without a value".to_owned()),
@@ -172,6 +191,7 @@ impl Tensor {
         let shape: Option<Vec<usize>> =
             self.lengths.iter().map(|&length| usize::try_from(length).ok()).collect();
         let array = shape.and_then(|shape| Array::new(shape, &numbers));
+        let array = array.map(|array| array.integers(!self.is_float()));
         array.ok_or_else(|| {
             format!("{} numbers do not fill the shape {:?}", numbers.len(), self.lengths)
         })

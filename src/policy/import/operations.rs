@@ -78,7 +78,7 @@ pub(super) fn apply(
     let rest: Vec<Option<Value>> = inputs.collect();
     let known = OPERATIONS.iter().any(|name| name.split(' ').next() == Some(operation));
     let number = match first {
-        Value::Number(_) if operation == "Shape" => return Ok(vec![Value::Sizes]),
+        Value::Number(number) if operation == "Shape" => return Ok(vec![walk.sizes(&number)]),
         Value::Number(number) => number,
         Value::Sizes => return Ok(vec![Value::Sizes]),
         Value::Constant(constant) => return from_constant(walk, node, constant, rest),
@@ -88,8 +88,10 @@ pub(super) fn apply(
     }
     let one = |value: Result<Value, Problem>| value.map(|value| vec![value]);
     match operation {
-        "Identity" | "Dropout" | "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" => {
-            Ok(vec![Value::Number(number)])
+        "Identity" | "Dropout" => Ok(vec![Value::Number(number)]),
+        "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" => {
+            let is_flat = operation == "Flatten" && node.integer("axis").unwrap_or(1) == 1;
+            Ok(vec![Value::Number(Number { is_flat, ..number })])
         }
         "Cast" if FLOATS.contains(&node.integer("to").unwrap_or(1)) => {
             Ok(vec![Value::Number(number)])
@@ -219,9 +221,8 @@ fn binary(
 
 /// An operation of two expressions of the same number.
 fn both(node: &Node, number: Number, other: &Number) -> Result<Value, Problem> {
-    if number.at != other.at || number.rows != other.rows {
-        let old = if number.at < other.at { 0 } else { 1 };
-        return Err(Problem::Stale(node.inputs[old].clone()));
+    if number.rows != other.rows {
+        return Err("of two parts of the same value".into());
     }
     let f = match node.operation.as_str() {
         "Add" => |a, b| a + b,
@@ -317,7 +318,7 @@ fn leaky(number: Number, slope: &Array) -> Result<Value, Problem> {
 /// `Transpose`, which leaves a row or a column what it is.
 fn transposed(node: &Node, number: Number) -> Result<Value, Problem> {
     match node.integers("perm") {
-        None | Some([1, 0]) => Ok(Value::Number(number)),
+        None | Some([1, 0]) => Ok(Value::Number(Number { is_flat: false, ..number })),
         Some(order) if order.iter().copied().eq(0..order.len() as i64) => Ok(Value::Number(number)),
         Some(order) => Err(format!("of a value, with the order {order:?}").into()),
     }

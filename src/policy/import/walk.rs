@@ -24,6 +24,8 @@ pub(super) struct Number {
     pub(super) expression: Expression,
     /// Which of the numbers, where some are left out.
     pub(super) rows: Option<Vec<usize>>,
+    /// Whether it is known to have two dimensions: inputs, and their numbers.
+    pub(super) is_flat: bool,
 }
 
 /// A graph on the way to a network.
@@ -65,18 +67,31 @@ impl Walk {
     }
 
     /// What the network gives so far.
-    pub(super) fn number(&self) -> Value {
-        Value::Number(Number { at: self.at, expression: Expression::plain(), rows: None })
+    pub(super) fn number(&self, is_flat: bool) -> Value {
+        Value::Number(Number { at: self.at, expression: Expression::plain(), rows: None, is_flat })
+    }
+
+    /// The lengths of a value, that of the inputs not a number; where they are not known, that they are lengths.
+    pub(super) fn sizes(&self, number: &Number) -> Value {
+        let width = number.rows.as_ref().map_or(self.draft.width(), |rows| Some(rows.len()));
+        match width.filter(|_| number.is_flat) {
+            Some(width) => {
+                Value::Constant(Array::list(vec![f64::NAN, width as f64]).integers(true))
+            }
+            None => Value::Sizes,
+        }
+    }
+
+    /// Whether the network has gone on from something else since.
+    pub(super) fn is_stale(&self, value: &Value) -> bool {
+        matches!(value, Value::Number(number) if number.at != self.at)
     }
 
     /// Adds what was done with each number to the network, of `width` numbers where it does not know it.
     ///
     /// # Errors
-    /// A value that was gone on from already; an expression that is no activation.
+    /// A sentence about an expression that is no activation, or a part that is not there.
     pub(super) fn close(&mut self, number: Number, width: Option<usize>) -> Result<(), Problem> {
-        if number.at != self.at {
-            return Err(Problem::Stale(String::new()));
-        }
         if let Some(rows) = &number.rows {
             self.draft.select(rows)?;
         }
@@ -106,9 +121,10 @@ impl Walk {
         if width == 0 {
             return Err("with a constant that has no numbers".into());
         }
+        let is_flat = number.is_flat;
         self.close(number, Some(width))?;
         self.draft.push(step)?;
-        Ok(self.number())
+        Ok(self.number(is_flat))
     }
 }
 

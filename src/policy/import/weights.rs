@@ -52,7 +52,8 @@ pub(super) fn gemm(
         linear.bias = bias_of(&node.inputs[2], bias, linear.outputs())?;
         linear.bias.iter_mut().for_each(|bias| *bias *= beta);
     }
-    layer(walk, &node.inputs[1], number, linear)
+    // A `Gemm` is of matrices alone.
+    layer(walk, &node.inputs[1], Number { is_flat: true, ..number }, linear)
 }
 
 /// `Conv` whose kernel is as large as the input: each channel that comes out is one number.
