@@ -9,6 +9,7 @@ use reachcast::Error;
 use reachcast::config::{Config, PolicySource};
 use reachcast::files::StateReader;
 use reachcast::policy::Mlp;
+use reachcast::policy::import::{Request, from_bytes};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -34,6 +35,14 @@ pub fn archive(entries: &[(&str, &[u8])]) -> Vec<u8> {
         zip.write_all(bytes).expect("its bytes");
     }
     zip.finish().expect("an archive").into_inner()
+}
+
+/// Imports `bytes` as the file `name`: a network with a digest, or a refusal.
+pub fn import(name: &str, bytes: &[u8]) {
+    match from_bytes(Path::new(name), bytes, &Request::default()) {
+        Ok(found) => drop(found.network.digest()),
+        Err(error) => refused(&error),
+    }
 }
 
 /// Refusals are those of wrong input and say something.

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::effort::USUAL;
-use super::export::Target;
 use super::falsify::FalsifyArguments;
 use super::init::{self, InitArguments};
 use super::options::{Changes, Common, Global, Keys, Own, Replace};
+use super::values::Target;
 use crate::config::Registry;
 use crate::files::Existing;
 use crate::policy::Activation;

@@ -1,36 +1,16 @@
 //! The command `policy export`: a policy as a file for other programs.
 
-use clap::ValueEnum;
 use safetensors::SafeTensors;
 use serde::Serialize;
 use serde_json::json;
 
 use super::args::ExportArguments;
 use super::options::Global;
+use super::values::Target;
 use super::{Outcome, document, folder_of, report};
 use crate::error::{Error, Result};
 use crate::files::{Array, Data, Inputs, Staged, npz_bytes};
 use crate::policy::{Mlp, onnx_bytes};
-
-/// What a policy is written as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Target {
-    /// An ONNX graph, which imports as the same policy
-    Onnx,
-    /// NumPy arrays under the names of the policy file, its metadata as JSON in bytes
-    Npz,
-}
-
-impl Target {
-    /// Ending of its files.
-    fn ending(self) -> &'static str {
-        match self {
-            Self::Onnx => "onnx",
-            Self::Npz => "npz",
-        }
-    }
-}
 
 /// What `policy export --json` prints.
 #[derive(Serialize)]

@@ -2,9 +2,30 @@
 
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use serde::Serialize;
 
 use crate::config::Profile;
 use crate::train::settings::Method;
+
+/// What a policy is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Target {
+    /// An ONNX graph, which imports as the same policy
+    Onnx,
+    /// NumPy arrays under the names of the policy file, its metadata as JSON in bytes
+    Npz,
+}
+
+impl Target {
+    /// Ending of its files.
+    pub(super) fn ending(self) -> &'static str {
+        match self {
+            Self::Onnx => "onnx",
+            Self::Npz => "npz",
+        }
+    }
+}
 
 impl ValueEnum for Profile {
     fn value_variants<'a>() -> &'a [Self] {

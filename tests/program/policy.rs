@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 use crate::command::{Folder, document, done, reachcast, refused};
+use reachcast::files::{npy_bytes, read_npz};
 use reachcast::policy::Mlp;
 use reachcast::policy::import::{Request, read};
 use safetensors::SafeTensors;
@@ -51,12 +52,17 @@ fn words_say_what_the_file_does_not() {
     for word in ["18-8-8-8-8-1", "relu (the default", "--activation does", "identity", "not named"]
         .into_iter()
         // What stands beside it in the file is told.
-        .chain(["left out    ", "actor1.", "and 42 more", "no part of the policy"])
+        .chain([
+            "left out    ",
+            "actor1 (10 tensors)",
+            "critic_old (10 tensors)",
+            "no part of the policy",
+        ])
     {
         assert!(words.contains(word), "no `{word}` in: {words}");
     }
     let words = done(&["policy", "import", GRAPH, "--out", &out, "--overwrite"]);
-    assert!(words.contains("silu (as the graph has it)"), "{words}");
+    assert!(words.contains("silu (as the file has it)"), "{words}");
     assert_eq!(done(&["policy", "import", GRAPH, "--out", &out, "-q"]), "");
     let names = "a,b,c,d,e,f,g,h,i,j,k,l";
     done(&["policy", "import", GRAPH, "--out", &out, "--state-order", names, "--overwrite"]);
@@ -78,7 +84,9 @@ fn imports_that_are_refused_write_nothing() {
     import(TIANSHOU, &["--out", &folder.path("policy.pth")], &["--out", ".safetensors"]);
     import(TIANSHOU, &["--out", &out], &["tianshou.pth", "6 networks", "actor1_old"]);
     import(GRAPH, &["--out", &out, "--activation", "relu"], &["--activation", "silu"]);
-    import(GRAPH, &["--out", &out, "--activation", "gelu"], &["gelu", "relu"]);
+    import(GRAPH, &["--out", &out, "--activation", "gelu"], &["gelu", "silu"]);
+    import(GRAPH, &["--out", &out, "--activation", "wave"], &["wave", "leaky_relu", "softsign"]);
+    import(GRAPH, &["--out", &out, "--output", "elu(x)"], &["elu(x)"]);
     import(GRAPH, &["--out", &out, "--state-order", "x,y"], &["--state-order", "12 names"]);
     let twice = "a,b,c,d,e,f,g,h,i,j,k,a";
     import(GRAPH, &["--out", &out, "--state-order", twice], &["--state-order", "all different"]);
@@ -122,4 +130,77 @@ fn a_policy_is_inspected() {
     let value = "configs/policies/race_value.safetensors";
     refused(&["policy", "inspect", value, "--config", RACE], &["maps 12 inputs to 1 outputs"]);
     refused(&["policy"], &["import", "inspect"]);
+}
+
+#[test]
+fn a_policy_is_evaluated_as_its_reference() {
+    let folder = Folder::new();
+    let (inputs, outputs) = (folder.path("x.npy"), folder.path("u.npy"));
+    let network = Mlp::load(POLICY.as_ref()).unwrap();
+    let (takes, gives) = (network.widths()[0], *network.widths().last().unwrap());
+    let numbers: Vec<f32> = (0..7 * takes).map(|i| (i as f32 * 0.37).sin()).collect();
+    std::fs::write(&inputs, npy_bytes(&numbers, [7, takes])).unwrap();
+    let eval = ["policy", "eval", POLICY, "--inputs", &inputs, "--outputs", &outputs];
+    let report = document(&eval);
+    assert_eq!((&report["count"], &report["not_finite"]), (&7.into(), &0.into()));
+    let expected: Vec<f32> = numbers.chunks(takes).flat_map(|x| network.forward(x)).collect();
+    let read = |path: &str| {
+        let bytes = std::fs::read(path).unwrap();
+        let file = npyz::NpyFile::new(bytes.as_slice()).unwrap();
+        (file.shape().to_vec(), file.into_vec::<f32>().unwrap())
+    };
+    assert_eq!(read(&outputs), (vec![7, gives as u64], expected.clone()));
+    // One state of f64.
+    let mut one =
+        b"\x93NUMPY\x01\0\x76\0{'descr': '<f8', 'fortran_order': False, 'shape': (12,), }".to_vec();
+    one.resize(127, b' ');
+    one.push(b'\n');
+    one.extend(numbers[..takes].iter().flat_map(|&x| f64::from(x).to_le_bytes()));
+    std::fs::write(&inputs, &one).unwrap();
+    let words = done(&[&eval[..], &["--overwrite"]].concat());
+    assert!(words.contains("1 outputs"), "{words}");
+    assert_eq!(read(&outputs), (vec![gives as u64], expected[..gives].to_vec()));
+    std::fs::write(&inputs, npy_bytes(&[f32::NAN; 24], [2, 12])).unwrap();
+    let words = done(&[&eval[..], &["--overwrite"]].concat());
+    assert!(words.contains("2 of them have a number that is not finite"), "{words}");
+    std::fs::write(&inputs, npy_bytes(&[0.0; 22], [2, 11])).unwrap();
+    refused(&eval, &["x.npy", "[2, 11]", "[N, 12]"]);
+    std::fs::write(&inputs, &one[..200]).unwrap();
+    refused(&eval, &["x.npy"]);
+    refused(&["policy", "eval", POLICY, "--inputs", &inputs, "--outputs", &inputs], &["x.npy"]);
+    let text = folder.path("u.txt");
+    refused(
+        &["policy", "eval", POLICY, "--inputs", &inputs, "--outputs", &text],
+        &["--outputs", ".npy"],
+    );
+}
+
+#[test]
+fn a_policy_is_exported_and_comes_back() {
+    let folder = Folder::new();
+    let (graph, back) = (folder.path("p.onnx"), folder.path("p.safetensors"));
+    let report = document(&["policy", "export", POLICY, "--to", "onnx", "--out", &graph]);
+    let found = document(&["policy", "import", &graph, "--out", &back]);
+    assert_eq!(found["digest"], report["digest"]);
+    assert_eq!(std::fs::read(&back).unwrap(), std::fs::read(POLICY).unwrap());
+    let arrays = folder.path("p.npz");
+    done(&["policy", "export", POLICY, "--to", "npz", "--out", &arrays]);
+    let arrays = read_npz(arrays.as_ref()).unwrap();
+    let network = Mlp::load(POLICY.as_ref()).unwrap();
+    for (i, layer) in network.layers().iter().enumerate() {
+        let array = &arrays[&format!("layers.{i}.weight")];
+        assert_eq!(array.shape, [layer.outputs, layer.inputs]);
+        assert_eq!(array.data.as_f32().unwrap(), layer.weight);
+        assert_eq!(arrays[&format!("layers.{i}.bias")].data.as_f32().unwrap(), layer.bias);
+    }
+    let metadata: serde_json::Value =
+        serde_json::from_slice(arrays["metadata"].data.as_u8().unwrap()).unwrap();
+    assert_eq!(metadata["activation"], "relu");
+    assert_eq!(arrays.len(), 2 * network.layers().len() + 1);
+    refused(&["policy", "export", POLICY, "--to", "npz", "--out", &graph], &["--out", ".npz"]);
+    refused(&["policy", "export", POLICY, "--to", "onnx"], &["--out", "missing"]);
+    refused(
+        &["policy", "export", POLICY, "--to", "onnx", "--out", &graph],
+        &["p.onnx", "--overwrite"],
+    );
 }

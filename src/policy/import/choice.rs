@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::draft::{Draft, Step};
+use super::draft::{Draft, MOST_LAYERS, Step};
 use super::kind::Cast;
 use super::layers::{self, Dense, Order};
 use super::layouts::{self, Layout, Recognised};
@@ -108,6 +108,9 @@ impl Choice {
             None => layers::only(source, &dense)?,
         };
         layers::check(&layers)?;
+        if layers.len() > MOST_LAYERS {
+            return Err(format!("{} layers; a network has at most {MOST_LAYERS}", layers.len()));
+        }
         let same = |found: &&Recognised<'_>| names(&found.layers) == names(&layers);
         let found = recognised.as_ref().filter(same);
         Ok(Self {

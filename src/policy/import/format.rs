@@ -46,8 +46,9 @@ const OTHERS: [(&[u8], &str, &str); 12] = [
 ];
 const KERAS: &str =
     "convert it to ONNX: python -m tf2onnx.convert --keras FILE --output policy.onnx";
-const MATLAB: &str = "export the network to ONNX: exportONNXNetwork(net, 'policy.onnx'), or save its weights as \
-                      safetensors: safetensors.numpy.save_file(scipy.io.loadmat(FILE))";
+const MATLAB: &str = "export the network to ONNX in MATLAB: exportONNXNetwork(net, 'policy.onnx'); or save its weights as \
+                      safetensors in Python: safetensors.numpy.save_file({'0.weight': scipy.io.loadmat(FILE)['W1'], \
+                      '0.bias': scipy.io.loadmat(FILE)['b1'].ravel()}, 'policy.safetensors')";
 const NUMPY: &str = "save all arrays of the network as safetensors: safetensors.numpy.save_file({'0.weight': w0, \
                      '0.bias': b0}, 'policy.safetensors')";
 const HTML: &str = "download it again, from the address of the raw file";

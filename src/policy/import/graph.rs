@@ -2,14 +2,13 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::array::Array;
 use super::constants::folded;
-use super::draft::{Draft, Step};
-use super::elementwise::Expression;
+use super::draft::Draft;
 use super::kind::Cast;
 use super::onnx::{Written, decode};
 use super::operations::{self, OPERATIONS};
 use super::request::{Imported, Origin};
+use super::walk::{Problem, Value, Walk};
 use crate::policy::Activation;
 use crate::policy::export::{HIDDEN, STATE_ORDER};
 use crate::policy::onnx::{Graph, Node};
@@ -19,39 +18,13 @@ const MOST_NODES: usize = 4096;
 /// Most numbers of all constants that operations make of others.
 const MOST_MADE: usize = 1 << 24;
 
-/// A value of a graph.
-#[derive(Clone, Debug)]
-pub(super) enum Value {
-    /// Numbers that do not depend on the input.
-    Constant(Array),
-    /// Lengths of what depends on the input: they keep its numbers as they are.
-    Sizes,
-    /// What the network has made of the input so far.
-    Number(Number),
-}
-
-/// What the network has made of the input so far: an expression of what a step gave.
-#[derive(Clone, Debug)]
-pub(super) struct Number {
-    /// How many times steps were added to the network before.
-    pub(super) at: usize,
-    /// What is done with each number since.
-    pub(super) expression: Expression,
-    /// Which of the numbers, where some are left out.
-    pub(super) rows: Option<Vec<usize>>,
-}
-
 /// A graph on the way to a network.
-pub(super) struct Walk<'g> {
+struct Run<'g> {
+    walk: Walk,
     values: HashMap<&'g str, Value>,
-    pub(super) draft: Draft,
-    /// How many times steps were added to it.
-    at: usize,
     /// Numbers of constants that were made of others.
     made: usize,
-    /// Names of the weights of its layers.
-    pub(super) layers: Vec<String>,
-    pub(super) cast: Cast,
+    cast: Cast,
 }
 
 /// The network of an ONNX file: of the output `asked`, or of the only one.
@@ -67,26 +40,24 @@ pub(super) fn read(bytes: &[u8], asked: &[String], cast: Cast) -> Result<Importe
     let output = output(graph, asked)?;
     let needed = needed(graph, output)?;
     let input = graph.input()?;
-    let mut walk = Walk {
-        values: HashMap::new(),
-        draft: draft(&written, input.width)?,
-        at: 0,
-        made: 0,
-        layers: Vec::new(),
-        cast,
-    };
-    walk.values.insert(input.name, walk.number());
+    let walk = Walk::of(draft(&written, input.width)?);
+    let values = HashMap::from([(input.name, walk.number())]);
+    let mut run = Run { walk, values, made: 0, cast };
     for (name, tensor) in graph.tensors().filter(|(name, _)| needed.names.contains(name)) {
         let array = tensor.array(cast).map_err(|problem| format!("`{name}`: {problem}"))?;
-        walk.values.insert(name, Value::Constant(array));
+        run.values.insert(name, Value::Constant(array));
     }
     for node in needed.nodes {
-        walk.node(node).map_err(|problem| told(graph, node, problem))?;
+        run.node(node).map_err(|problem| told(graph, node, problem))?;
     }
-    let Some(Value::Number(last)) = walk.values.remove(output) else {
+    let Some(Value::Number(last)) = run.values.remove(output) else {
         return Err(format!("the output `{output}` does not depend on the input"));
     };
-    walk.close(last, None).map_err(|_| branches(graph, output))?;
+    let Run { mut walk, .. } = run;
+    walk.close(last, None).map_err(|problem| match problem {
+        Problem::Words(words) => format!("the output `{output}`: {words}"),
+        _ => branches(graph, output),
+    })?;
     let floats =
         graph.tensors().filter(|(name, tensor)| !needed.names.contains(name) && tensor.is_float());
     let others = graph.outputs().into_iter().filter(|name| *name != output);
@@ -176,30 +147,7 @@ fn branches(graph: &Graph, name: &str) -> String {
     format!("`{name}` branches into {}; a plain network does not", users.join(", "))
 }
 
-/// Why an operation is refused.
-#[derive(Debug)]
-pub(super) enum Problem {
-    /// Its value has been gone on from by another one.
-    Stale(String),
-    /// No dense network has it.
-    Unknown,
-    /// In words.
-    Words(String),
-}
-
-impl From<String> for Problem {
-    fn from(words: String) -> Self {
-        Self::Words(words)
-    }
-}
-
-impl From<&str> for Problem {
-    fn from(words: &str) -> Self {
-        Self::Words(words.to_owned())
-    }
-}
-
-impl<'g> Walk<'g> {
+impl<'g> Run<'g> {
     /// The operation `node`.
     fn node(&mut self, node: &'g Node) -> Result<(), Problem> {
         if !node.is_standard() {
@@ -218,7 +166,7 @@ impl<'g> Walk<'g> {
                 self.made += constant.numbers.len();
                 vec![Value::Constant(constant)]
             }
-            None => operations::apply(self, node, inputs)?,
+            None => operations::apply(&mut self.walk, node, inputs)?,
         };
         if self.made > MOST_MADE {
             return Err(Problem::Words(format!("more than {MOST_MADE} numbers made of constants")));
@@ -236,52 +184,5 @@ impl<'g> Walk<'g> {
             Some(value) => Ok(Some(value.clone())),
             None => Err(Problem::Words(format!("`{name}` is given by nothing before it"))),
         }
-    }
-
-    /// What the network gives so far.
-    pub(super) fn number(&self) -> Value {
-        Value::Number(Number { at: self.at, expression: Expression::plain(), rows: None })
-    }
-
-    /// Adds what was done with each number to the network, of `width` numbers where it does not know it.
-    ///
-    /// # Errors
-    /// A value that was gone on from already; an expression that is no activation.
-    pub(super) fn close(&mut self, number: Number, width: Option<usize>) -> Result<(), Problem> {
-        if number.at != self.at {
-            return Err(Problem::Stale(String::new()));
-        }
-        if let Some(rows) = &number.rows {
-            self.draft.select(rows)?;
-        }
-        let steps = number
-            .expression
-            .steps()
-            .ok_or("what comes before it is no activation that is known")?;
-        for each in steps {
-            let width = self.draft.width().or(width);
-            let width = width.ok_or("nobody says how many numbers the input has")?;
-            self.draft.push(each.step(width))?;
-        }
-        self.at += 1;
-        Ok(())
-    }
-
-    /// Adds a step behind `number`; what the network gives then.
-    ///
-    /// # Errors
-    /// As [`Walk::close`]; a step of another width.
-    pub(super) fn push(
-        &mut self,
-        number: Number,
-        width: usize,
-        step: Step,
-    ) -> Result<Value, Problem> {
-        if width == 0 {
-            return Err("with a constant that has no numbers".into());
-        }
-        self.close(number, Some(width))?;
-        self.draft.push(step)?;
-        Ok(self.number())
     }
 }

@@ -34,6 +34,8 @@ mod source;
 mod statistics;
 mod text;
 mod value;
+mod walk;
+mod weights;
 
 use std::path::Path;
 

@@ -3,9 +3,10 @@
 use super::array::Array;
 use super::draft::Step;
 use super::elementwise::{Each, erf};
-use super::graph::{Number, Problem, Value, Walk};
-use super::linear::Linear;
 use super::map::Map;
+use super::parts;
+use super::walk::{Number, Problem, Value, Walk, constant, optional};
+use super::weights::{batch_norm, convolution, gemm, layer_norm, left_product, product};
 use crate::policy::Activation;
 use crate::policy::onnx::Node;
 
@@ -67,7 +68,7 @@ const SELU: [f32; 2] = [1.673_263_2, 1.050_701];
 /// # Errors
 /// What is wrong with it, or that no dense network has it.
 pub(super) fn apply(
-    walk: &mut Walk<'_>,
+    walk: &mut Walk,
     node: &Node,
     inputs: Vec<Option<Value>>,
 ) -> Result<Vec<Value>, Problem> {
@@ -105,31 +106,14 @@ pub(super) fn apply(
         "Clip" => one(clip(walk, node, number, &rest)),
         "BatchNormalization" => one(batch_norm(walk, node, number, &rest)),
         "LayerNormalization" => one(layer_norm(walk, node, number, &rest)),
-        "Split" | "Slice" | "Gather" => super::parts::apply(walk, node, number, &rest),
+        "Split" | "Slice" | "Gather" => parts::apply(walk, node, number, &rest),
         _ => one(unary(node, number)),
-    }
-}
-
-/// The constant number `i` of the other inputs.
-pub(super) fn constant(rest: &[Option<Value>], i: usize) -> Result<&Array, Problem> {
-    match rest.get(i) {
-        Some(Some(Value::Constant(array))) => Ok(array),
-        Some(Some(_)) => Err("of two values that both depend on the input".into()),
-        _ => Err("an input is missing".into()),
-    }
-}
-
-/// The same, where the input may be left out.
-fn optional(rest: &[Option<Value>], i: usize) -> Result<Option<&Array>, Problem> {
-    match rest.get(i) {
-        None | Some(None) => Ok(None),
-        Some(Some(_)) => constant(rest, i).map(Some),
     }
 }
 
 /// Operations of a constant and a value.
 fn from_constant(
-    walk: &mut Walk<'_>,
+    walk: &mut Walk,
     node: &Node,
     constant: Array,
     mut rest: Vec<Option<Value>>,
@@ -209,7 +193,7 @@ fn unary(node: &Node, number: Number) -> Result<Value, Problem> {
 
 /// An operation of each number and another, which is a constant or of the same number.
 fn binary(
-    walk: &mut Walk<'_>,
+    walk: &mut Walk,
     node: &Node,
     number: Number,
     rest: &[Option<Value>],
@@ -253,7 +237,7 @@ fn both(node: &Node, number: Number, other: &Number) -> Result<Value, Problem> {
 }
 
 /// `number + constant`.
-fn add(walk: &mut Walk<'_>, number: Number, constant: &Array) -> Result<Value, Problem> {
+fn add(walk: &mut Walk, number: Number, constant: &Array) -> Result<Value, Problem> {
     match constant.uniform() {
         Some(shift) => Ok(Value::Number(then(number, Each::Affine { scale: 1.0, shift }))),
         None => {
@@ -265,7 +249,7 @@ fn add(walk: &mut Walk<'_>, number: Number, constant: &Array) -> Result<Value, P
 }
 
 /// `number * constant`.
-fn scale(walk: &mut Walk<'_>, number: Number, constant: &Array) -> Result<Value, Problem> {
+fn scale(walk: &mut Walk, number: Number, constant: &Array) -> Result<Value, Problem> {
     match constant.uniform() {
         Some(scale) => Ok(Value::Number(then(number, Each::Affine { scale, shift: 0.0 }))),
         None => {
@@ -278,7 +262,7 @@ fn scale(walk: &mut Walk<'_>, number: Number, constant: &Array) -> Result<Value,
 
 /// The value within limits.
 fn clamp(
-    walk: &mut Walk<'_>,
+    walk: &mut Walk,
     number: Number,
     low: Option<&Array>,
     high: Option<&Array>,
@@ -301,7 +285,7 @@ fn clamp(
 
 /// `Clip`: limits as inputs, or as attributes.
 fn clip(
-    walk: &mut Walk<'_>,
+    walk: &mut Walk,
     node: &Node,
     number: Number,
     rest: &[Option<Value>],
@@ -328,153 +312,6 @@ fn leaky(number: Number, slope: &Array) -> Result<Value, Problem> {
     let slope = slope.uniform().ok_or("with slopes that differ")?;
     let activation = Activation::LeakyRelu { slope: slope as f32 };
     Ok(Value::Number(then(number, Each::Activation(activation))))
-}
-
-/// A product with a weight `[inputs, outputs]`, and the value on its left.
-fn product(
-    walk: &mut Walk<'_>,
-    node: &Node,
-    number: Number,
-    weight: &Array,
-) -> Result<Value, Problem> {
-    let [inputs, outputs] = sides(&node.inputs[1], weight)?;
-    layer(walk, &node.inputs[1], number, Linear::transposed(&weight.numbers, [inputs, outputs]))
-}
-
-/// A product with a weight `[outputs, inputs]` on the left of the value.
-fn left_product(
-    walk: &mut Walk<'_>,
-    node: &Node,
-    number: Number,
-    weight: &Array,
-) -> Result<Value, Problem> {
-    let [_, inputs] = sides(&node.inputs[0], weight)?;
-    layer(walk, &node.inputs[0], number, Linear::new(weight.numbers.clone(), inputs))
-}
-
-/// `Gemm`: a product with a factor, and what is added.
-fn gemm(
-    walk: &mut Walk<'_>,
-    node: &Node,
-    number: Number,
-    rest: &[Option<Value>],
-) -> Result<Value, Problem> {
-    if node.integer("transA").unwrap_or(0) != 0 {
-        return Err("with transA, which no dense layer has".into());
-    }
-    let weight = constant(rest, 0)?;
-    let [rows, columns] = sides(&node.inputs[1], weight)?;
-    let alpha = f64::from(node.float("alpha").unwrap_or(1.0));
-    let scaled: Vec<f64> = weight.numbers.iter().map(|weight| alpha * weight).collect();
-    let mut linear = match node.integer("transB").unwrap_or(0) {
-        0 => Linear::transposed(&scaled, [rows, columns]),
-        _ => Linear::new(scaled, columns),
-    };
-    if let Some(bias) = optional(rest, 1)? {
-        let beta = f64::from(node.float("beta").unwrap_or(1.0));
-        linear.bias = bias_of(&node.inputs[2], bias, linear.outputs())?;
-        linear.bias.iter_mut().for_each(|bias| *bias *= beta);
-    }
-    layer(walk, &node.inputs[1], number, linear)
-}
-
-/// `Conv` whose kernel is as large as the input: each channel that comes out is one number.
-fn convolution(
-    walk: &mut Walk<'_>,
-    node: &Node,
-    number: Number,
-    rest: &[Option<Value>],
-) -> Result<Value, Problem> {
-    let plain = |name: &str, usual: i64| {
-        node.integers(name).is_none_or(|all| all.iter().all(|&i| i == usual))
-    };
-    let weight = constant(rest, 0)?;
-    let (outputs, inputs) = match weight.shape.as_slice() {
-        [outputs, kernel @ ..] if kernel.len() > 1 => (*outputs, kernel.iter().product::<usize>()),
-        _ => return Err(format!("`{}` has shape {:?}", node.inputs[1], weight.shape).into()),
-    };
-    let whole = walk.draft.width() == Some(inputs) && plain("pads", 0) && plain("dilations", 1);
-    if !whole || node.integer("group").unwrap_or(1) != 1 || weight.numbers.is_empty() {
-        return Err("whose kernel is not as large as its input".into());
-    }
-    let mut linear = Linear::new(weight.numbers.clone(), inputs);
-    if let Some(bias) = optional(rest, 1)? {
-        linear.bias = bias_of(&node.inputs[2], bias, outputs)?;
-    }
-    layer(walk, &node.inputs[1], number, linear)
-}
-
-/// Adds a layer with the weight `name`.
-fn layer(
-    walk: &mut Walk<'_>,
-    name: &str,
-    number: Number,
-    linear: Linear,
-) -> Result<Value, Problem> {
-    walk.layers.push(name.to_owned());
-    walk.push(number, linear.inputs, Step::Linear(linear))
-}
-
-/// The numbers of a bias.
-fn bias_of(name: &str, bias: &Array, outputs: usize) -> Result<Vec<f64>, Problem> {
-    match (bias.uniform(), bias.numbers.len()) {
-        (Some(one), 1) => Ok(vec![one; outputs]),
-        (_, have) if have == outputs => Ok(bias.numbers.clone()),
-        _ => {
-            Err(format!("`{name}` has shape {:?}, its layer {outputs} outputs", bias.shape).into())
-        }
-    }
-}
-
-/// The two lengths of a weight, neither of them 0.
-fn sides(name: &str, weight: &Array) -> Result<[usize; 2], Problem> {
-    match *weight.shape.as_slice() {
-        [rows, columns] if rows > 0 && columns > 0 => Ok([rows, columns]),
-        _ => {
-            Err(format!("`{name}` has shape {:?}; a weight has two dimensions", weight.shape)
-                .into())
-        }
-    }
-}
-
-/// `BatchNormalization` with statistics that stand.
-fn batch_norm(
-    walk: &mut Walk<'_>,
-    node: &Node,
-    number: Number,
-    rest: &[Option<Value>],
-) -> Result<Value, Problem> {
-    let epsilon = f64::from(node.float("epsilon").unwrap_or(1e-5));
-    let [scale, shift, mean, variance] =
-        [constant(rest, 0)?, constant(rest, 1)?, constant(rest, 2)?, constant(rest, 3)?];
-    let width = scale.numbers.len();
-    if [shift, mean, variance].iter().any(|other| other.numbers.len() != width) {
-        return Err("with statistics of different lengths".into());
-    }
-    let deviation: Vec<f64> =
-        variance.numbers.iter().map(|variance| (variance + epsilon).sqrt()).collect();
-    let normal = Map::normal(&mean.numbers, &deviation);
-    let map = normal.then(&Map::affine(scale.numbers.clone(), shift.numbers.clone()));
-    walk.push(number, width, Step::Map(map))
-}
-
-/// `LayerNormalization` over all numbers.
-fn layer_norm(
-    walk: &mut Walk<'_>,
-    node: &Node,
-    number: Number,
-    rest: &[Option<Value>],
-) -> Result<Value, Problem> {
-    if !matches!(node.integer("axis").unwrap_or(-1), -1 | 1) {
-        return Err("over something else than the last dimension".into());
-    }
-    let scale = constant(rest, 0)?.numbers.clone();
-    let shift = optional(rest, 1)?.map_or(vec![0.0; scale.len()], |shift| shift.numbers.clone());
-    if shift.len() != scale.len() {
-        return Err("with factors and summands of different lengths".into());
-    }
-    let epsilon = node.float("epsilon").unwrap_or(1e-5);
-    walk.push(number, scale.len(), Step::Norm { scale, shift, epsilon })
 }
 
 /// `Transpose`, which leaves a row or a column what it is.

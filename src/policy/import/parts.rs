@@ -1,7 +1,6 @@
 //! Parts of what a network gives: `Split`, `Slice` and `Gather`.
 
-use super::graph::{Number, Problem, Value, Walk};
-use super::operations::constant;
+use super::walk::{Number, Problem, Value, Walk, constant};
 use crate::policy::onnx::Node;
 
 /// Most numbers of a part.
@@ -12,7 +11,7 @@ const MOST: usize = 1 << 12;
 /// # Errors
 /// A part of something else than the last dimension, or one that is not there.
 pub(super) fn apply(
-    walk: &Walk<'_>,
+    walk: &Walk,
     node: &Node,
     number: Number,
     rest: &[Option<Value>],

@@ -98,7 +98,9 @@ fn activation(kwargs: &Value) -> Result<Option<Activation>, String> {
         "ReLU6" => Activation::Relu6,
         "Identity" => Activation::Identity,
         _ => {
-            return Err(format!("`data` has the activation `{class}`, which is none that is known"));
+            return Err(format!(
+                "`data` has the activation `{class}`, which is none that is known"
+            ));
         }
     }))
 }

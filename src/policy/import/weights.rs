@@ -1,0 +1,150 @@
+//! Operations of a graph that have weights: layers, convolutions over the whole input, and norms.
+
+use super::array::Array;
+use super::draft::Step;
+use super::linear::Linear;
+use super::map::Map;
+use super::walk::{Number, Problem, Value, Walk, constant, optional};
+use crate::policy::onnx::Node;
+
+/// A product with a weight `[inputs, outputs]`, and the value on its left.
+pub(super) fn product(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    weight: &Array,
+) -> Result<Value, Problem> {
+    let [inputs, outputs] = sides(&node.inputs[1], weight)?;
+    layer(walk, &node.inputs[1], number, Linear::transposed(&weight.numbers, [inputs, outputs]))
+}
+
+/// A product with a weight `[outputs, inputs]` on the left of the value.
+pub(super) fn left_product(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    weight: &Array,
+) -> Result<Value, Problem> {
+    let [_, inputs] = sides(&node.inputs[0], weight)?;
+    layer(walk, &node.inputs[0], number, Linear::new(weight.numbers.clone(), inputs))
+}
+
+/// `Gemm`: a product with a factor, and what is added.
+pub(super) fn gemm(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    rest: &[Option<Value>],
+) -> Result<Value, Problem> {
+    if node.integer("transA").unwrap_or(0) != 0 {
+        return Err("with transA, which no dense layer has".into());
+    }
+    let weight = constant(rest, 0)?;
+    let [rows, columns] = sides(&node.inputs[1], weight)?;
+    let alpha = f64::from(node.float("alpha").unwrap_or(1.0));
+    let scaled: Vec<f64> = weight.numbers.iter().map(|weight| alpha * weight).collect();
+    let mut linear = match node.integer("transB").unwrap_or(0) {
+        0 => Linear::transposed(&scaled, [rows, columns]),
+        _ => Linear::new(scaled, columns),
+    };
+    if let Some(bias) = optional(rest, 1)? {
+        let beta = f64::from(node.float("beta").unwrap_or(1.0));
+        linear.bias = bias_of(&node.inputs[2], bias, linear.outputs())?;
+        linear.bias.iter_mut().for_each(|bias| *bias *= beta);
+    }
+    layer(walk, &node.inputs[1], number, linear)
+}
+
+/// `Conv` whose kernel is as large as the input: each channel that comes out is one number.
+pub(super) fn convolution(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    rest: &[Option<Value>],
+) -> Result<Value, Problem> {
+    let plain = |name: &str, usual: i64| {
+        node.integers(name).is_none_or(|all| all.iter().all(|&i| i == usual))
+    };
+    let weight = constant(rest, 0)?;
+    let (outputs, inputs) = match weight.shape.as_slice() {
+        [outputs, kernel @ ..] if kernel.len() > 1 => (*outputs, kernel.iter().product::<usize>()),
+        _ => return Err(format!("`{}` has shape {:?}", node.inputs[1], weight.shape).into()),
+    };
+    let whole = walk.draft.width() == Some(inputs) && plain("pads", 0) && plain("dilations", 1);
+    if !whole || node.integer("group").unwrap_or(1) != 1 || weight.numbers.is_empty() {
+        return Err("whose kernel is not as large as its input".into());
+    }
+    let mut linear = Linear::new(weight.numbers.clone(), inputs);
+    if let Some(bias) = optional(rest, 1)? {
+        linear.bias = bias_of(&node.inputs[2], bias, outputs)?;
+    }
+    layer(walk, &node.inputs[1], number, linear)
+}
+
+/// Adds a layer with the weight `name`.
+fn layer(walk: &mut Walk, name: &str, number: Number, linear: Linear) -> Result<Value, Problem> {
+    walk.layers.push(name.to_owned());
+    walk.push(number, linear.inputs, Step::Linear(linear))
+}
+
+/// The numbers of a bias.
+fn bias_of(name: &str, bias: &Array, outputs: usize) -> Result<Vec<f64>, Problem> {
+    match (bias.uniform(), bias.numbers.len()) {
+        (Some(one), 1) => Ok(vec![one; outputs]),
+        (_, have) if have == outputs => Ok(bias.numbers.clone()),
+        _ => {
+            Err(format!("`{name}` has shape {:?}, its layer {outputs} outputs", bias.shape).into())
+        }
+    }
+}
+
+/// The two lengths of a weight, neither of them 0.
+fn sides(name: &str, weight: &Array) -> Result<[usize; 2], Problem> {
+    match *weight.shape.as_slice() {
+        [rows, columns] if rows > 0 && columns > 0 => Ok([rows, columns]),
+        _ => {
+            Err(format!("`{name}` has shape {:?}; a weight has two dimensions", weight.shape)
+                .into())
+        }
+    }
+}
+
+/// `BatchNormalization` with statistics that stand.
+pub(super) fn batch_norm(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    rest: &[Option<Value>],
+) -> Result<Value, Problem> {
+    let epsilon = f64::from(node.float("epsilon").unwrap_or(1e-5));
+    let [scale, shift, mean, variance] =
+        [constant(rest, 0)?, constant(rest, 1)?, constant(rest, 2)?, constant(rest, 3)?];
+    let width = scale.numbers.len();
+    if [shift, mean, variance].iter().any(|other| other.numbers.len() != width) {
+        return Err("with statistics of different lengths".into());
+    }
+    let deviation: Vec<f64> =
+        variance.numbers.iter().map(|variance| (variance + epsilon).sqrt()).collect();
+    let normal = Map::normal(&mean.numbers, &deviation);
+    let map = normal.then(&Map::affine(scale.numbers.clone(), shift.numbers.clone()));
+    walk.push(number, width, Step::Map(map))
+}
+
+/// `LayerNormalization` over all numbers.
+pub(super) fn layer_norm(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    rest: &[Option<Value>],
+) -> Result<Value, Problem> {
+    if !matches!(node.integer("axis").unwrap_or(-1), -1 | 1) {
+        return Err("over something else than the last dimension".into());
+    }
+    let scale = constant(rest, 0)?.numbers.clone();
+    let shift = optional(rest, 1)?.map_or(vec![0.0; scale.len()], |shift| shift.numbers.clone());
+    if shift.len() != scale.len() {
+        return Err("with factors and summands of different lengths".into());
+    }
+    let epsilon = node.float("epsilon").unwrap_or(1e-5);
+    walk.push(number, scale.len(), Step::Norm { scale, shift, epsilon })
+}

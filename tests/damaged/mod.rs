@@ -1,0 +1,84 @@
+//! Damaged and hostile files of the other readers: models, parameters, texts, safetensors and larger graphs.
+
+mod formats;
+mod hostile;
+
+use std::path::Path;
+
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use reachcast::policy::import::{Request, from_bytes};
+
+/// Files that are damaged, one of each reader, and the parts of them whose numbers decide something.
+const FILES: [&str; 13] = [
+    "brax.pkl",
+    "brax_numpy.pkl",
+    "flax.pkl",
+    "legacy.pth",
+    "sb3_ppo.zip",
+    "foreign.safetensors",
+    "acas.nnet",
+    "polar.txt",
+    "sherlock.txt",
+    "written_out.onnx",
+    "affine.onnx",
+    "halves.onnx",
+    "image.onnx",
+];
+
+/// The content of a file of `tests/fixtures/imports`.
+pub(crate) fn content(name: &str) -> Vec<u8> {
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/imports").join(name))
+        .unwrap()
+}
+
+/// Whether a network is imported; a refusal has to be one of wrong input.
+fn imports(name: &str, content: &[u8]) -> bool {
+    match from_bytes(Path::new(name), content, &Request::default()) {
+        Ok(found) => !found.network.digest().is_empty(),
+        Err(error) => {
+            assert_eq!(error.exit_code(), 2, "{name}: {error}");
+            false
+        }
+    }
+}
+
+/// What is cut off is refused, but for what ends where nothing is missing: blanks, and the version of a graph.
+#[test]
+fn truncated_files_are_refused() {
+    for name in FILES {
+        let whole = content(name);
+        assert!(imports(name, &whole), "{name}");
+        let step = whole.len().div_ceil(1500);
+        let taken = (0..whole.len())
+            .step_by(step)
+            .filter(|&length| imports(name, &whole[..length]))
+            .count();
+        // A text that ends within its last number has one digit less, or no map of its output.
+        let most = if name.ends_with(".txt") || name.ends_with(".nnet") { 24 } else { 8 };
+        assert!(taken <= most, "{name}: {taken} truncated files were imported");
+    }
+}
+
+#[test]
+fn changed_bytes_crash_nothing() {
+    let mut draw = StdRng::seed_from_u64(3);
+    let mut refused = 0;
+    for name in FILES {
+        let whole = content(name);
+        for _ in 0..1_500 {
+            let mut changed = whole.clone();
+            for _ in 0..draw.random_range(1..=4) {
+                let at = draw.random_range(0..changed.len());
+                changed[at] = match draw.random_range(0..3) {
+                    0 => draw.random(),
+                    1 => changed[at] ^ 1 << draw.random_range(0..8),
+                    _ => whole[draw.random_range(0..whole.len())],
+                };
+            }
+            refused += usize::from(!imports(name, &changed));
+        }
+    }
+    println!("{refused} refused");
+    assert!(refused > 5_000, "{refused} refused");
+}
