@@ -16,7 +16,7 @@ use reachcast::backend::Backend;
 use reachcast::backend::cpu::Cpu;
 use reachcast::bench::measure::{Protocol, measure};
 use reachcast::model::Plant;
-use reachcast::policy::Policy;
+use reachcast::policy::{Activation, Mlp, Policy};
 use reachcast::race::DroneRace;
 use reachcast::race::bench::data::{self, Data};
 use reachcast::rollout::{
@@ -77,8 +77,29 @@ fn main() -> ExitCode {
             );
         }
     }
+    sound &= activations(&backend, &data);
     sound &= text::hold();
     if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Most that rollouts under these activations may take of those under relu.
+const MOST_OF_RELU: f64 = 1.3;
+
+/// Whether rollouts under networks with other activations take little longer than under relu.
+fn activations(backend: &Backend, data: &Data) -> bool {
+    let (_, relu) = &data.networks[0];
+    let mut sound = true;
+    for activation in [Activation::Elu { alpha: 1.0 }, Activation::Silu, Activation::Tanh] {
+        let layers = relu.layers().to_vec();
+        let other = Mlp::new(layers, activation, relu.output()).expect("a network");
+        let mut calls = [&**relu, &other].map(|mlp| call(backend, mlp, data));
+        let [relu, other] = &mut calls;
+        let over = ratio(other, relu);
+        let name = activation.name();
+        println!("3x64 {name:7} {over:7.2} times the time of relu, at most {MOST_OF_RELU}");
+        sound &= over <= MOST_OF_RELU;
+    }
+    sound
 }
 
 /// Rollouts in lanes over rollouts in a loop.
@@ -87,26 +108,41 @@ where
     P: Policy<12, 3> + Clone + Send + Sync + 'static,
 {
     let (system, starts) = (DroneRace::default(), &data.starts[..ROLLOUTS]);
-    let program = backend.prepare(&Plant::of(system, policy.clone())).expect("it fits");
     let spec: RolloutSpec = data::rollout_spec().expect("a valid specification");
-    let task = ReachAvoidTask {
-        starts: Starts::listed(starts),
-        range: 0..starts.len() as u64,
-        spec,
-        tightening: &Tightening::none(&spec),
-        query: Query::Measure,
-    };
-    let lanes = || {
-        program.reach_avoid(&task, &mut |_, measures| {
-            black_box(measures);
-            Ok(())
-        })
-    };
+    let lanes = call(backend, policy, data);
     let plain = || {
         black_box(scalar::measures(&system, policy, black_box(starts), spec));
         Ok(())
     };
     ratio(plain, lanes)
+}
+
+/// A call of the rollouts under `policy`.
+fn call<'a, P>(
+    backend: &'a Backend,
+    policy: &P,
+    data: &'a Data,
+) -> impl FnMut() -> Result<()> + use<'a, P>
+where
+    P: Policy<12, 3> + Clone + Send + Sync + 'static,
+{
+    let starts = &data.starts[..ROLLOUTS];
+    let program =
+        backend.prepare(&Plant::of(DroneRace::default(), policy.clone())).expect("it fits");
+    let spec = data::rollout_spec().expect("a valid specification");
+    move || {
+        let task = ReachAvoidTask {
+            starts: Starts::listed(starts),
+            range: 0..starts.len() as u64,
+            spec,
+            tightening: &Tightening::none(&spec),
+            query: Query::Measure,
+        };
+        program.reach_avoid(&task, &mut |_, measures| {
+            black_box(measures);
+            Ok(())
+        })
+    }
 }
 
 /// Plans in lanes over plans in a loop.

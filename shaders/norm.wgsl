@@ -34,7 +34,9 @@ fn norm(@builtin(global_invocation_id) id: vec3<u32>) {
         squares = added(squares, select(vec4<f32>(0.0), gap * gap, neurons_of(quad)));
     }
     let first = params.layer_offset;
-    let factor = normaliser(squares / count, weights[first].x);
+    let variance = squares / count;
+    // By its bits: a driver may take it that nothing is infinite.
+    let factor = marked(normaliser(variance, weights[first].x), size_of(variance) >= INFINITE);
     for (var quad = 0u; quad < quads; quad += 1u) {
         let at = quad * params.stride + column;
         let scale = weights[first + 1u + quad];

@@ -134,7 +134,7 @@ fn layers_are_those_of_f64() {
                 weight[k * columns + j] += seed * f64::from(case.x[i * inputs + k]);
             }
         }
-        let exact: Vec<f64> = cells().map(|(i, j)| curved(curve, case.sum(i, j))).collect();
+        let exact: Vec<f64> = cells().map(|(i, j)| exact(curve, case.sum(i, j))).collect();
         for (found, exact) in
             [outputs, by_x, by_weight, by_bias].into_iter().zip([exact, x, weight, bias])
         {

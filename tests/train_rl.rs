@@ -303,7 +303,7 @@ fn plants_start_again_when_an_episode_is_over() {
 #[test]
 fn a_disturbed_system_is_pushed_after_its_step() {
     let weight: Vec<f32> = (0..36).map(|i| 0.1 * (i % 7) as f32 - 0.2).collect();
-    let layer = Layer { weight, bias: vec![0.1, -0.2, 0.3], inputs: 12, outputs: 3 };
+    let layer = Layer::dense(weight, vec![0.1, -0.2, 0.3]);
     let network = Mlp::new(vec![layer.clone()], Activation::Relu, Activation::Tanh).unwrap();
     let (system, entries) = (DroneRace::default(), [(7, 0.01_f32), (9, 0.02), (11, 0.03)]);
     let x: [f64; 12] = std::array::from_fn(|i| 0.1 * i as f64 - 0.4);

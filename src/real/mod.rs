@@ -2,6 +2,7 @@
 
 mod approx;
 pub mod bound;
+mod interval;
 mod lanes;
 mod normal;
 mod scalar;
@@ -255,7 +256,7 @@ pub trait Real:
     #[inline(always)]
     fn known_by(
         self,
-        _range: impl Fn(bound::Interval) -> (bound::Interval, bound::Interval),
+        _range: impl Fn(interval::Interval) -> (interval::Interval, interval::Interval),
     ) -> Option<Self> {
         None
     }

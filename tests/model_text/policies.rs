@@ -89,8 +89,7 @@ fn a_bare_network_sees_the_states_and_is_the_control() {
 #[test]
 fn a_network_sees_the_states_that_its_file_names() {
     let layer = |weight: Vec<f32>| {
-        let inputs = weight.len();
-        let layer = Layer { weight, bias: vec![0.0], inputs, outputs: 1 };
+        let layer = Layer::dense(weight, vec![0.0]);
         Mlp::new(vec![layer], Activation::Relu, Activation::Identity).expect("a network")
     };
     let file = "file = \"net.safetensors\"";

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 use std::rc::Rc;
 
-use super::interval::Interval;
 use super::pieces::{Caveats, Enclosure, Piece};
 use super::{direction, elementary};
+use crate::real::interval::Interval;
 
 /// The pieces of `a` that may have values in `window`, cut to it; `None` if there is none.
 fn within(a: &Enclosure, window: Interval) -> Option<Rc<Enclosure>> {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use super::elementary::{cos, sin};
-use super::interval::Interval;
+use crate::real::interval::Interval;
 
 /// Arcs of the unit circle; a constant exceeds the true one by at most `1 / cos(pi / 64)`, 0.12 %.
 pub(super) const ARCS: usize = 64;
@@ -56,8 +56,8 @@ pub(super) fn directions(at: Point) -> Vec<Point> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::interval::Interval;
     use super::{ARCS, directions};
+    use crate::real::interval::Interval;
 
     /// Largest `x cos t + y sin t` over the points: the support of their hull.
     fn support(points: &[[Interval; 2]], angle: f64) -> f64 {

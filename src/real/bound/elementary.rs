@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::interval::Interval;
+use crate::real::interval::Interval;
 use crate::real::normal;
 pub(crate) use crate::real::normal::{normal, normal_density};
 
@@ -213,8 +213,8 @@ pub(crate) fn powf(x: Interval, exponent: f64) -> (Interval, Interval) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::interval::Interval;
     use super::{cos, ln, sin, tanh};
+    use crate::real::interval::Interval;
 
     #[test]
     fn crests_and_troughs_are_in_the_range() {

@@ -3,7 +3,6 @@
 mod branch;
 mod direction;
 pub(crate) mod elementary;
-mod interval;
 mod pieces;
 #[cfg(test)]
 mod tests;
@@ -14,7 +13,7 @@ use std::rc::Rc;
 
 use super::Real;
 use super::approx::Exponent;
-pub use interval::Interval;
+pub use super::interval::Interval;
 pub use pieces::{Caveats, Enclosure, Piece};
 
 thread_local! {

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::interval::{Interval, norm};
+use crate::real::interval::{Interval, norm};
 
 /// Pieces beyond which operands are replaced by their hulls.
 pub(super) const LIMIT: usize = 1024;

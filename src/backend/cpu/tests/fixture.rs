@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::Cpu;
 use crate::model::Plant;
-use crate::policy::{Activation, Layer, Mlp, Policy};
+use crate::policy::{Activation, Layer, Mlp, Norm, Policy};
 use crate::race::system::DroneRace;
 use crate::real::Real;
 use crate::real::simd::Instructions;
@@ -74,6 +74,17 @@ pub(super) fn network(widths: &[usize], activation: Activation, output: Activati
     };
     let layers = widths.windows(2).map(|pair| layer(pair[0], pair[1])).collect();
     Mlp::new(layers, activation, output).expect("a valid network")
+}
+
+/// The same with a norm behind each layer but the last.
+pub(super) fn normed(widths: &[usize], activation: Activation) -> Mlp {
+    let mut layers = network(widths, activation, Activation::Tanh).layers().to_vec();
+    let hidden = layers.len() - 1;
+    for layer in &mut layers[..hidden] {
+        let row = |from: f32| (0..layer.outputs).map(|i| from + 0.1 * (i % 4) as f32).collect();
+        layer.norm = Some(Norm { scale: row(0.7), shift: row(-0.2), epsilon: 1e-5 });
+    }
+    Mlp::from_layers(layers).expect("a valid network")
 }
 
 /// The measures of `task`, which the sink must get in order.

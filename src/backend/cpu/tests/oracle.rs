@@ -8,7 +8,7 @@ use crate::rollout::{
 };
 use crate::system::System;
 
-/// Networks of odd widths with every activation.
+/// Networks of odd widths with every activation, some with norms.
 fn networks() -> Vec<Mlp> {
     let mut networks = Vec::new();
     let shapes: [&[usize]; 5] =
@@ -19,6 +19,10 @@ fn networks() -> Vec<Mlp> {
                 networks.push(network(widths, activation, output));
             }
         }
+    }
+    for activation in Activation::ALL {
+        networks.push(network(&[12, 19, 3], activation, Activation::Identity));
+        networks.push(normed(&[12, 19, 9, 3], activation));
     }
     networks
 }

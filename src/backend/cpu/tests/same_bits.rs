@@ -24,7 +24,8 @@ fn ranges(cuts: &[u64]) -> Vec<Range<u64>> {
 #[test]
 fn measures_and_signs_do_not_depend_on_threads_or_place() {
     let odd = network(&[12, 7, 100, 3], Activation::Silu, Activation::Tanh);
-    for plant in [race_under(odd), race_under(race_policy())] {
+    let normed = normed(&[12, 7, 101, 3], Activation::Mish);
+    for plant in [odd, normed, race_policy()].map(race_under) {
         for query in [Query::Measure, Query::Sign] {
             let whole = bits(&race(&cpu(1), &plant, 0..COUNT, query));
             for threads in [1, 2, 3] {
@@ -100,6 +101,11 @@ fn physics_is_the_same_on_all_instructions() {
 #[test]
 fn fused_kernels_agree_to_the_bit() {
     let policy = network(&[12, 100, 3, 3], Activation::Tanh, Activation::Identity);
+    let several = Activation::ALL.map(|activation| normed(&[12, 11, 3], activation));
+    several.into_iter().chain([policy]).for_each(agree_where_fused);
+}
+
+fn agree_where_fused(policy: Mlp) {
     let plant = race_under(policy);
     let mut cpus = every_cpu();
     let baseline = cpus.pop().expect("baseline instructions are always there");

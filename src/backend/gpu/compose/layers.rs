@@ -2,7 +2,7 @@
 
 use super::kernels::{Kernel, TILE_QUADS};
 use crate::formula::record;
-use crate::formula::wgsl::careful_function;
+use crate::formula::wgsl::function;
 use crate::policy::{Activation, Layer, Mlp, normaliser};
 
 const TILE: &str = include_str!("../../../../shaders/tile.wgsl");
@@ -152,11 +152,11 @@ pub(super) fn layer_text(kinds: &Kinds, kernel: Kernel) -> String {
 
 /// The function `name` of a number: `activation`.
 pub(super) fn recorded_activation(name: &str, activation: Activation) -> String {
-    careful_function(name, &[("x", 1)], &record(1, |x| vec![activation.apply(x[0])]))
+    function(name, &[("x", 1)], &record(1, |x| vec![activation.apply(x[0])]))
 }
 
 /// `normaliser`, of a variance.
 fn recorded_normaliser() -> String {
     let graph = record(2, |x| vec![normaliser(x[0], x[1])]);
-    careful_function("normaliser", &[("variance", 1), ("epsilon", 1)], &graph)
+    function("normaliser", &[("variance", 1), ("epsilon", 1)], &graph)
 }
