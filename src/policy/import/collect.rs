@@ -127,8 +127,8 @@ impl<'b> Walk<'_, 'b, '_> {
 
     /// Adds what is in a list or a tuple.
     fn items(&mut self, items: &[Value<'b>], path: &mut Vec<String>) -> Result<(), String> {
-        let numbered = items.iter().enumerate();
-        numbered.map(|(i, item)| self.within(i.to_string(), *item, path)).collect()
+        let mut numbered = items.iter().enumerate();
+        numbered.try_for_each(|(i, item)| self.within(i.to_string(), *item, path))
     }
 
     /// Adds what lies under `key`.

@@ -62,13 +62,13 @@ pub(super) struct Expression {
     /// Its operations, if they come one after the other.
     steps: Option<Vec<Each>>,
     /// Its values at the numbers of [`seen`].
-    values: [f64; SEEN],
+    values: Box<[f64; SEEN]>,
 }
 
 impl Expression {
     /// The number itself.
     pub(super) fn plain() -> Self {
-        Self { steps: Some(Vec::new()), values: seen() }
+        Self { steps: Some(Vec::new()), values: Box::new(seen()) }
     }
 
     /// Its operations one after the other; `None` for an expression that is no activation.
@@ -78,7 +78,7 @@ impl Expression {
 
     /// The same with one more operation.
     pub(super) fn then(mut self, each: Each) -> Self {
-        self.values = self.values.map(|x| each.apply(x));
+        *self.values = self.values.map(|x| each.apply(x));
         match &mut self.steps {
             Some(steps) => {
                 steps.push(each);
@@ -91,12 +91,12 @@ impl Expression {
 
     /// A function that is no activation of its value.
     pub(super) fn through(self, f: impl Fn(f64) -> f64) -> Self {
-        Self { steps: None, values: self.values.map(f) }.known()
+        Self { steps: None, values: Box::new(self.values.map(f)) }.known()
     }
 
     /// `f` of it and another of the same number.
     pub(super) fn with(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let values = from_fn(|i| f(self.values[i], other.values[i]));
+        let values = Box::new(from_fn(|i| f(self.values[i], other.values[i])));
         Self { steps: None, values }.known()
     }
 
@@ -104,7 +104,7 @@ impl Expression {
     fn known(mut self) -> Self {
         let inputs = seen();
         let is = |activation: &&Activation| {
-            inputs.iter().zip(&self.values).all(|(&x, value)| {
+            inputs.iter().zip(self.values.iter()).all(|(&x, value)| {
                 let expected: f64 = activation.apply(x);
                 (value - expected).abs() <= DIFFERENCE * x.abs().max(1.0)
             })
