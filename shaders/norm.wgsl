@@ -42,8 +42,8 @@ fn norm(@builtin(global_invocation_id) id: vec3<u32>) {
         let scale = weights[first + 1u + quad];
         let shift = weights[first + 1u + quads + quad];
         let normed = (sink[at] - mean) * factor * scale + shift;
-        let active =
+        let bent =
             vec4<f32>(activation(normed.x), activation(normed.y), activation(normed.z), activation(normed.w));
-        sink[at] = select(vec4<f32>(0.0), active, neurons_of(quad));
+        sink[at] = select(vec4<f32>(0.0), bent, neurons_of(quad));
     }
 }

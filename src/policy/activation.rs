@@ -232,7 +232,8 @@ impl Activation {
                 let x = floored(x, LOWEST_NORMAL);
                 let [first, third] = Self::GELU_TANH.map(R::lit);
                 let half = R::lit(0.5) * x;
-                half + half * (x * (first + third * (x * x))).tanh()
+                // The constant first: some drivers would move it there, and round otherwise.
+                half + half * (x * (first + (third * x) * x)).tanh()
             }
             // The logistic function is (1 + tanh(x / 2)) / 2.
             Self::Silu => {

@@ -56,6 +56,10 @@ impl Mlp {
             count += 1;
         }
         let file = File { tensors, metadata };
+        // Of a file of another program, the first thing to be said is that it has no words.
+        if !metadata.contains_key("activations") {
+            ["activation", "output"].iter().try_for_each(|key| file.word(key).map(drop))?;
+        }
         file.refuse_tensors(count)?;
         file.refuse_entries(count)?;
         file.network(count)
@@ -152,17 +156,15 @@ struct File<'a> {
 impl File<'_> {
     /// The network of `count` layers.
     fn network(&self, count: usize) -> std::result::Result<Mlp, String> {
-        let [hidden, words] = self.activations(count)?;
-        let layers = words.into_iter().enumerate().map(|(i, activation)| self.layer(i, activation));
-        let layers = layers.collect::<std::result::Result<Vec<_>, _>>()?;
-        let mlp = match hidden.first() {
-            Some(hidden) => {
-                let last = layers.last().map_or(Activation::Identity, |layer| layer.activation);
-                Mlp::new(layers, *hidden, last)
+        let mut mlp = match self.metadata.get("activations") {
+            None => Mlp::new(self.layers(count)?, self.word("activation")?, self.word("output")?),
+            Some(list) => {
+                let words = self.words(list, count)?;
+                let layers = self.layers(count)?.into_iter().zip(words);
+                Mlp::from_layers(layers.map(|(layer, word)| layer.activated(word)).collect())
             }
-            None => Mlp::from_layers(layers),
-        };
-        let mut mlp = mlp.map_err(in_words)?;
+        }
+        .map_err(in_words)?;
         if let Some(map) = self.map("input")? {
             mlp = mlp.with_input(map).map_err(in_words)?;
         }
@@ -171,41 +173,30 @@ impl File<'_> {
         }
         let Some(names) = self.metadata.get("state_order") else { return Ok(mlp) };
         let names = names.split(',').map(|name| name.trim().to_owned()).collect();
-        mlp.with_state_order(names)
-            .map_err(|error| format!("metadata `state_order` {}", in_words(error)))
+        let problem = |error| format!("metadata `state_order` {}", in_words(error));
+        mlp.with_state_order(names).map_err(problem)
     }
 
-    /// The activation that hidden layers share, if the file says that they do, and that of each layer.
-    fn activations(&self, count: usize) -> std::result::Result<[Vec<Activation>; 2], String> {
-        let Some(list) = self.metadata.get("activations") else {
-            let hidden = self.word("activation")?;
-            let last = self.word("output")?;
-            let words = (0..count).map(|i| if i + 1 == count { last } else { hidden });
-            return Ok([vec![hidden], words.collect()]);
-        };
-        if let Some(other) =
-            ["activation", "output"].iter().find(|key| self.metadata.contains_key(**key))
-        {
+    /// The activation of each of `count` layers, from a list of words.
+    fn words(&self, list: &str, count: usize) -> std::result::Result<Vec<Activation>, String> {
+        let mut pair = ["activation", "output"].iter();
+        if let Some(other) = pair.find(|key| self.metadata.contains_key(**key)) {
             return Err(format!(
                 "metadata has both `activations` and `{other}`: a word for each layer, or the two of all"
             ));
         }
-        let words: Vec<Activation> = list
-            .split_whitespace()
-            .map(str::parse)
-            .collect::<std::result::Result<_, String>>()
-            .map_err(|problem| {
-                format!(
-                    "activations `{list}`: {problem}; a word for each layer, with spaces between"
-                )
-            })?;
-        if words.len() != count {
-            return Err(format!(
+        let words: std::result::Result<Vec<Activation>, String> =
+            list.split_whitespace().map(str::parse).collect();
+        let words = words.map_err(|problem| {
+            format!("activations `{list}`: {problem}; a word for each layer, with spaces between")
+        })?;
+        match words.len() == count {
+            true => Ok(words),
+            false => Err(format!(
                 "activations `{list}` are {}, the file has {count} layers",
                 words.len()
-            ));
+            )),
         }
-        Ok([Vec::new(), words])
     }
 
     /// The activation in the metadata entry `key`.
@@ -216,15 +207,20 @@ impl File<'_> {
         word.ok_or_else(missing)?.parse().map_err(|problem| format!("{key} {problem}"))
     }
 
+    /// The layers, without activations.
+    fn layers(&self, count: usize) -> std::result::Result<Vec<Layer>, String> {
+        (0..count).map(|i| self.layer(i)).collect()
+    }
+
     /// Layer `i`.
-    fn layer(&self, i: usize, activation: Activation) -> std::result::Result<Layer, String> {
+    fn layer(&self, i: usize) -> std::result::Result<Layer, String> {
         let name = weight_of(i);
         let (weight, shape) = self.numbers(&name)?;
         let &[outputs, inputs] = shape.as_slice() else {
             return Err(format!("{name} has shape {shape:?}, expected [out, in]"));
         };
         let bias = self.vector(&format!("layers.{i}.bias"), outputs)?;
-        let norm = self.norm(i, outputs)?;
+        let (norm, activation) = (self.norm(i, outputs)?, Activation::Identity);
         Ok(Layer { weight, bias, inputs, outputs, norm, activation })
     }
 

@@ -22,8 +22,10 @@ pub(crate) fn activations() -> Vec<Activation> {
 
 /// `activation` at a finite `x`.
 pub(crate) fn exact(activation: Activation, x: f64) -> f64 {
-    let [scale, slope] = [1.050_700_987_355_480_5, 1.673_263_242_354_377_2];
     let number = |value: f32| f64::from(value);
+    // The numbers of f32 that the program has, and the product that it makes of two.
+    let [scale, below] = [number(1.050_701), number(1.050_701 * 1.673_263_2)];
+    let [first, third] = [number(0.797_884_6), number(0.035_677_407)];
     match activation {
         Activation::Identity => x,
         Activation::Relu => x.max(0.0),
@@ -41,14 +43,20 @@ pub(crate) fn exact(activation: Activation, x: f64) -> f64 {
                 x
             }
         }
-        Activation::Selu => scale * if x < 0.0 { slope * x.exp_m1() } else { x },
+        Activation::Selu => {
+            if x < 0.0 {
+                below * x.exp_m1()
+            } else {
+                scale * x
+            }
+        }
         Activation::Celu { alpha } => {
             let alpha = number(alpha);
             if x < 0.0 { alpha * (x / alpha).exp_m1() } else { x }
         }
         Activation::Gelu => 0.5 * x * erfc(-x / std::f64::consts::SQRT_2),
         Activation::GeluTanh => {
-            let inner = (2.0 / std::f64::consts::PI).sqrt() * (x + 0.044_715 * x.powi(3));
+            let inner = x * (first + third * x * x);
             0.5 * x * (1.0 + inner.tanh())
         }
         Activation::Silu => x / (1.0 + (-x).exp()),

