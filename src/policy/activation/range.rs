@@ -36,8 +36,8 @@ const GELU: Bend = Bend {
     value: |x| x * elementary::normal(x),
     slope: |x| elementary::normal(x) + x * elementary::normal_density(x),
     valley: turn(-0.7518, -0.7517, -0.169_971_3),
-    least: turn(-1.4143, -1.4142, -0.128_904_2),
-    most: turn(1.4142, 1.4143, 1.128_904_2),
+    least: turn(-1.4144, -1.4141, -0.128_904_2),
+    most: turn(1.4141, 1.4144, 1.128_904_2),
 };
 const GELU_BY_TANH: Bend = Bend {
     value: |x| 0.5 * x * (1.0 + inner(x).0.tanh()),
