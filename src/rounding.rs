@@ -44,6 +44,21 @@ pub(crate) fn interval([low, high]: [f64; 2]) -> String {
     format!("{} to {}", lower(low), upper(high))
 }
 
+/// As [`upper`], for weights and their like, which are not taken for infinite because they are large.
+pub(crate) fn finite_upper(value: f64) -> String {
+    finite(value, Rounding::Up)
+}
+
+/// As [`lower`], for weights and their like.
+pub(crate) fn finite_lower(value: f64) -> String {
+    finite(value, Rounding::Down)
+}
+
+/// As [`interval`], for weights and their like.
+pub(crate) fn finite_interval([low, high]: [f64; 2]) -> String {
+    format!("{} to {}", finite_lower(low), finite_upper(high))
+}
+
 /// `1 - beta` in words, never above the confidence that `beta` leaves.
 pub(crate) fn confidence(beta: f64) -> String {
     format!("1 - {}", upper(beta))
@@ -60,7 +75,12 @@ pub(crate) fn complement(share: f64) -> String {
 }
 
 fn rounded(value: f64, rounding: Rounding) -> String {
-    if !ordinary(value) {
+    if ordinary(value) { finite(value, rounding) } else { "not finite".to_owned() }
+}
+
+/// The same for any number that is finite.
+fn finite(value: f64, rounding: Rounding) -> String {
+    if !value.is_finite() {
         return "not finite".to_owned();
     }
     if value == 0.0 {

@@ -87,6 +87,57 @@ fn names_of_functions_are_refused_and_nothing_is_executed() {
     refused_pickle(&program(&[&text("x"), b")R"]), &["no name"]);
 }
 
+/// The pickle of the good checkpoint with more in its dictionary.
+fn with_item(key: &str, value: &[u8]) -> Vec<u8> {
+    let mut pickle = pickle(GOOD);
+    assert_eq!(pickle.pop(), Some(b'.'));
+    [&pickle, text(key).as_slice(), value, b"s."].concat()
+}
+
+#[test]
+fn plain_numbers_beside_a_network_are_not_dropped() {
+    let number = [b"G".as_slice(), &2.0_f64.to_be_bytes()].concat();
+    let list = [b"](".as_slice(), &number, &number, b"e"].concat();
+    let words = ["may act on what the network is given or gives", "--network 0,2,4"];
+    for (key, value) in
+        [("action_scale", &number), ("obs_mean", &list), ("shift", &b"K\x03".to_vec())]
+    {
+        let name = format!("`{key}`");
+        let pickle = with_item(key, value);
+        refused_pickle(&pickle, &[&words[..], &[name.as_str()]].concat());
+        let networks = ["0", "2", "4"].map(str::to_owned).to_vec();
+        let named = Request { networks, ..Request::default() };
+        let found = import(PTH.as_ref(), &with_pickle(GOOD, &pickle), &named).unwrap();
+        assert_eq!(found.left_out, [key]);
+    }
+    let counted = with_pickle(GOOD, &with_item("epoch", b"K\x07"));
+    let found = import(PTH.as_ref(), &counted, &Request::default()).unwrap();
+    assert_eq!(found.left_out, ["epoch"]);
+}
+
+#[test]
+fn tensors_with_another_sign_than_their_storage_are_refused() {
+    let mut pickle = pickle(GOOD);
+    // Behind the hooks, the last argument of a tensor so far.
+    let end = pickle.windows(5).position(|w| w[..3] == *b")Rq" && w[4] == b't').unwrap() + 4;
+    let mark = [b"}".as_slice(), &text("neg"), b"\x88s"].concat();
+    pickle.splice(end..end, mark);
+    refused_pickle(&pickle, &["marked `neg`", "resolve_neg()"]);
+}
+
+#[test]
+fn names_that_read_files_are_refused_beside_a_network() {
+    for name in ["io\nopen", "numpy\nload", "glob\nglob", "operator\nattrgetter", "torch\nload"] {
+        let value = [b"c", name.as_bytes(), b"\n"].concat();
+        let shown = format!("`{}`", name.replace('\n', "."));
+        refused_pickle(&with_item("extra", &value), &[&shown, "nothing was executed"]);
+    }
+    refused_pickle(
+        &replaced(&pickle(GOOD), b"ctorch\nFloatStorage", b"ctorch\nQInt8Storage"),
+        &["`torch.QInt8Storage`", "x.float()"],
+    );
+}
+
 #[test]
 fn shapes_that_do_not_fit() {
     let fits = "does not fit the 96 numbers";

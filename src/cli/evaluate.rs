@@ -72,7 +72,10 @@ fn evaluate(network: &Mlp, inputs: &Array) -> std::result::Result<Array, String>
     let numbers = match &inputs.data {
         Data::F32(numbers) => numbers.clone(),
         Data::F64(numbers) => numbers.iter().map(|&number| number as f32).collect(),
-        _ => return Err("integers; expected f32 or f64: x.astype('<f4')".to_owned()),
+        _ => {
+            return Err("integers; expected f32 or f64: numpy.ascontiguousarray(x, dtype=\"<f4\")"
+                .to_owned());
+        }
     };
     let outputs = numbers.par_chunks_exact(takes).flat_map_iter(|input| network.forward(input));
     Ok(Array { shape, data: Data::F32(outputs.collect()) })

@@ -15,15 +15,19 @@ use crate::policy::import::{self, Cast, Origin, Request};
 use crate::policy::inspect::{Inspection, output_intervals, output_ranges};
 use crate::real::bound::Interval;
 use crate::rollout::{Purpose, Stream};
-use crate::rounding::{interval, lower, upper};
+use crate::rounding::{finite_interval, finite_lower, finite_upper};
 use crate::system::Axis;
 
 /// Ending of policy files.
 const ENDING: &str = "safetensors";
 /// Tensors, or groups of them, that a line lists.
 const LISTED: usize = 12;
+/// What is said of a bound that is rough.
+const ROUGH: &str = " (rough, by sums of its weights: too wide a layer for a better bound)";
 /// Random states that the range of actions is seen over.
 const SAMPLES: u64 = 16_384;
+/// Most multiplications of all random states together: seconds of work.
+const MOST_PRODUCTS: u64 = 1 << 34;
 /// States that are evaluated side by side.
 const LANES: usize = 16;
 
@@ -277,13 +281,14 @@ pub(super) fn inspect(global: &Global, file: &Path, config: Option<&Path>) -> Re
         }
         None => (seed, unit_frame(&network)),
     };
+    let samples = samples(&network);
     let inspect = Inspect {
         file: file.display().to_string(),
-        actions: actions(&network, &frame, seed)?,
+        actions: actions(&network, &frame, seed, samples)?,
         network: Inspection::of(&network),
         low: frame.low,
         high: frame.high,
-        samples: SAMPLES,
+        samples,
         seed,
     };
     let place = config.map_or("from -1 to 1".to_owned(), |path| path.display().to_string());
@@ -304,13 +309,19 @@ fn unit_frame(network: &Mlp) -> Frame {
     }
 }
 
+/// How many random states are evaluated: fewer of a large network, in whole batches.
+fn samples(network: &Mlp) -> u64 {
+    let most = MOST_PRODUCTS / network.parameter_count() as u64;
+    (most.min(SAMPLES) / LANES as u64).max(1) * LANES as u64
+}
+
 /// The range of each action over the box.
-fn actions(network: &Mlp, frame: &Frame, seed: u64) -> Result<Vec<Action>> {
+fn actions(network: &Mlp, frame: &Frame, seed: u64, samples: u64) -> Result<Vec<Action>> {
     let Frame { controls, low, high, .. } = frame;
     let sides = low.iter().zip(high).map(|(&low, &high)| Interval::new(low.into(), high.into()));
     let intervals = output_intervals(network, &sides.collect::<Vec<_>>())?;
     let stream = Stream::new(seed, Purpose::USER, 0);
-    let batches = (0..SAMPLES).step_by(LANES).map(|i| stream.in_box::<LANES>(low, high, i));
+    let batches = (0..samples).step_by(LANES).map(|i| stream.in_box::<LANES>(low, high, i));
     let seen = output_ranges(network, batches);
     let action = |((name, Interval { low, high }), seen): ((&String, _), _)| Action {
         name: name.clone(),
@@ -339,23 +350,24 @@ fn inspect_text(inspect: &Inspect, place: &str) -> String {
     );
     for (i, layer) in network.layers.iter().enumerate() {
         text += &format!(
-            "layer {i}     {} -> {}, weights {}, biases {}, spectral norm at most {}\n",
+            "layer {i}     {} -> {}, weights {}, biases {}, spectral norm at most {}{}\n",
             layer.inputs,
             layer.outputs,
-            interval(layer.weight_range.map(f64::from)),
-            interval(layer.bias_range.map(f64::from)),
-            upper(layer.spectral_norm)
+            finite_interval(layer.weight_range.map(f64::from)),
+            finite_interval(layer.bias_range.map(f64::from)),
+            finite_upper(layer.spectral_norm),
+            if layer.spectral_norm_is_rough { ROUGH } else { "" }
         );
     }
-    text += &format!("Lipschitz   at most {}, everywhere\n", upper(network.lipschitz_bound));
+    text += &format!("Lipschitz   at most {}, everywhere\n", finite_upper(network.lipschitz_bound));
     text += &format!("actions     over the box ({place}):\n");
     for Action { name, interval: within, seen: [least, largest] } in &inspect.actions {
         // What was seen is rounded inwards: it was.
         text += &format!(
             "  {name}  within {}; seen {} to {} in {} states\n",
-            interval(*within),
-            upper(f64::from(*least)),
-            lower(f64::from(*largest)),
+            finite_interval(*within),
+            finite_upper(f64::from(*least)),
+            finite_lower(f64::from(*largest)),
             inspect.samples
         );
     }

@@ -230,11 +230,16 @@ fn parse(mut bytes: &[u8]) -> std::result::Result<Array, String> {
     let NpyHeader { descr, fortran_order, shape } = NpyHeader::read(&mut bytes)?;
     if fortran_order && shape.len() > 1 {
         return Err(
-            "column-major order is not supported; in NumPy: numpy.ascontiguousarray(x)".to_owned()
+            "column-major order, where rows one after the other are expected; in NumPy: numpy.ascontiguousarray(x, dtype=\"<f4\")".to_owned()
         );
     }
-    let data = Data::parse(&descr, bytes)
-        .ok_or_else(|| format!("{} bytes are no array of type `{descr}`", bytes.len()))?;
+    let data = Data::parse(&descr, bytes).ok_or_else(|| {
+        format!(
+            "{} bytes are no array of type `{descr}`: little-endian numbers of 32 or 64 bits are expected; in NumPy: \
+             numpy.ascontiguousarray(x, dtype=\"<f4\")",
+            bytes.len()
+        )
+    })?;
     let elements = shape.iter().try_fold(1, |n: u64, &length| n.checked_mul(length));
     let whole = shape.iter().map(|&length| usize::try_from(length).ok()).collect();
     match (elements, whole) {

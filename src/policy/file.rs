@@ -16,12 +16,14 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 
-use super::{Activation, Layer, Mlp, Norm, Rescale};
+use super::{Activation, Layer, Mlp, Norm, Rescale, repeated};
 use crate::error::{Error, Result};
 use crate::files::{RECORD_BYTES, read};
 
 /// The entries of the metadata that are not of one layer.
 const ENTRIES: [&str; 5] = ["activation", "output", "activations", "state_order", "format"];
+/// Bytes of the length of the header.
+const LENGTH: usize = 8;
 /// The tensors of a map.
 const MAP: [&str; 4] = ["scale", "shift", "low", "high"];
 
@@ -47,7 +49,8 @@ impl Mlp {
                  `reachcast policy import`"
             )
         };
-        let (_, header) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
+        let (length, header) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
+        repeated::refuse(&bytes[LENGTH..LENGTH + length])?;
         let tensors = SafeTensors::deserialize(bytes).map_err(damaged)?;
         let empty = HashMap::new();
         let metadata = header.metadata().as_ref().unwrap_or(&empty);

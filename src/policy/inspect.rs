@@ -50,9 +50,11 @@ pub struct LayerInspection {
     pub norm: bool,
     /// Activation behind that.
     pub activation: String,
-    /// Upper bound of the spectral norm of the weight, at most 1.0001 times the norm.
+    /// Upper bound of the spectral norm of the weight, at most 1.0001 times the norm unless it is rough.
     #[serde(with = "crate::files::number")]
     pub spectral_norm: f64,
+    /// Whether that bound is one by sums of squares and of magnitudes, as the layer is too wide for a better one.
+    pub spectral_norm_is_rough: bool,
 }
 
 impl Inspection {
@@ -93,6 +95,7 @@ fn slopes(network: &Mlp) -> impl Iterator<Item = f64> {
 fn layer(layer: &Layer) -> LayerInspection {
     let Layer { weight, bias, inputs, outputs, norm, activation } = layer;
     let (inputs, outputs) = (*inputs, *outputs);
+    let spectral = norm_bound(weight, [outputs, inputs]);
     LayerInspection {
         inputs,
         outputs,
@@ -100,7 +103,8 @@ fn layer(layer: &Layer) -> LayerInspection {
         bias_range: range(bias),
         norm: norm.is_some(),
         activation: activation.name(),
-        spectral_norm: norm_bound(weight, [outputs, inputs]),
+        spectral_norm: spectral.bound,
+        spectral_norm_is_rough: spectral.is_rough,
     }
 }
 

@@ -81,6 +81,11 @@ impl Mlp {
     pub fn with_state_order(mut self, names: Vec<String>) -> Result<Self> {
         let inputs = self.widths()[0];
         let plain = |name: &String| !name.is_empty() && !name.contains(',') && name.trim() == name;
+        if let Some(name) = names.iter().find(|name| name.chars().any(is_invisible)) {
+            let problem =
+                format!("{name:?} has characters that control a terminal or are not seen");
+            return Err(Error::invalid("state order", problem));
+        }
         let twice = (1..names.len()).any(|i| names[..i].contains(&names[i]));
         if names.len() != inputs || twice || !names.iter().all(plain) {
             let given = names.join(",");
@@ -303,4 +308,15 @@ impl Mlp {
             map.iter().try_for_each(|map| map.validate(end, count))
         })
     }
+}
+/// Whether a character controls, or is of no width: marks of direction and of format among them.
+fn is_invisible(c: char) -> bool {
+    let formats = [
+        '\u{ad}', '\u{61c}', '\u{180e}', '\u{feff}', '\u{2028}', '\u{2029}', '\u{115f}', '\u{3164}',
+    ];
+    c.is_control()
+        || formats.contains(&c)
+        || ('\u{200b}'..='\u{200f}').contains(&c)
+        || ('\u{202a}'..='\u{202e}').contains(&c)
+        || ('\u{2060}'..='\u{206f}').contains(&c)
 }

@@ -12,6 +12,7 @@ mod layer;
 mod mlp;
 #[cfg(feature = "import")]
 mod onnx;
+mod repeated;
 mod spectral;
 
 pub use activation::Activation;

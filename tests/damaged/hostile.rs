@@ -61,6 +61,9 @@ fn parameters_that_would_run_programs_are_refused() {
     ]
     .concat();
     refused("brax.pkl", &call, &["`os.system`", "nothing was executed"]);
+    // The order of bytes of a kind of numbers that several arrays share.
+    let swapped = replaced(&good, &short("<"), &short(">"));
+    refused("brax.pkl", &swapped, &["most significant byte first", "astype"]);
     let old = replaced(
         &content("legacy.pth"),
         b"ctorch._utils\n_rebuild_tensor_v2\n",
@@ -90,6 +93,23 @@ fn models_that_claim_something_else_are_refused() {
     let wide = br#"{"action_space": {":type:": "Box", "low": "[-1 -1 -1]", "high": "[1 2 3]"}}"#;
     refused("model.zip", &with_entry(&good, "data", wide), &["2 numbers", "takes 3"]);
     refused("model.zip", &with_entry(&good, "policy.pth", b"PK\x03\x04"), &["not a whole archive"]);
+    for (data, class) in [
+        (
+            r#"{"policy_kwargs": {"features_extractor_class": "<class 'x.Norm'>"}}"#,
+            "<class 'x.Norm'>",
+        ),
+        (r#"{"policy_class": {"__module__": "mine.policies"}}"#, "mine.policies"),
+    ] {
+        let own = with_entry(&good, "data", data.as_bytes());
+        refused("model.zip", &own, &[class, "--network imports the layers alone"]);
+        let networks = ["mlp_extractor.policy_net", "action_net"].map(str::to_owned).to_vec();
+        let named = Request { networks, ..Request::default() };
+        assert!(from_bytes(Path::new("model.zip"), &own, &named).is_ok());
+    }
+    let flat = br#"{"policy_kwargs": {"features_extractor_class":
+        "<class 'stable_baselines3.common.torch_layers.FlattenExtractor'>"}}"#;
+    let flat = with_entry(&good, "data", flat);
+    assert!(from_bytes(Path::new("model.zip"), &flat, &Request::default()).is_ok());
     // Objects in it are texts that nobody looks at.
     let pickled = br#"{"policy_class": {":type:": "x", ":serialized:": "Y29zCnN5c3RlbQo="}}"#;
     let model = with_entry(&good, "data", pickled);
@@ -108,6 +128,10 @@ fn lengths_that_are_not_there_take_no_memory() {
     let acas = |text: &str, words: &[&str]| refused("net.nnet", text.as_bytes(), words);
     acas("60,1000000,2,1000000,\n", &["cut off"]);
     acas("1,1,1,1,\n1,1,\n0,\n-1,\n1,\n0,0,\n0,1,\n1,\n0,\n", &["range", "not positive"]);
+    acas(
+        "1,1,1,1,\n1,1,\n0,\n1,\n-1,\n0,0,\n1,1,\n1,\n0,\n",
+        &["input 0", "least value 1", "above"],
+    );
     acas("1,2,1,2,\n1,1,\n", &["widths [1, 1]"]);
     acas("1,1,1,1,\n1,1,\n0,\n-1,\n1,\n0,0,\n1,1,\n1,\n0,\n7", &["1 words behind"]);
     // A length of a storage, of bytes in a pickle, and of a header.

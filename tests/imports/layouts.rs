@@ -103,19 +103,95 @@ fn what_may_act_on_a_network_is_not_dropped() {
         let content = file(&layers, others);
         from_bytes("x.safetensors".as_ref(), &content, &Request::default()).unwrap_err().to_string()
     };
-    for name in ["obs_rms.mean", "normalizer.loc", "encoder.conv.weight", "pi_scale"] {
+    for name in [
+        "obs_rms.mean",
+        "normalizer.loc",
+        "encoder.conv.weight",
+        "pi_scale",
+        "obs.std",
+        "alpha",
+        "sigma_in",
+        "cost_scale",
+        "target_offset",
+        "q1.scale",
+        "c.weight",
+        "encoder_old.conv.weight",
+    ] {
         let error = refusal(&[name]);
         assert!(
             error.contains(&format!("`{name}` may act on")) && error.contains("--network pi"),
             "{error}"
         );
     }
-    let content = file(&layers, &["log_std", "optimizer.lr", "critic.scale"]);
+    // A network that judges has layers of its own.
+    let judged = [layers[0], layers[1], ("critic.0", [1, 4])];
+    let content = file(&judged, &["log_std", "optimizer.lr", "critic.scale"]);
     let found = from_bytes("x.safetensors".as_ref(), &content, &Request::default()).unwrap();
-    assert_eq!(found.left_out, ["critic.scale", "log_std", "optimizer.lr"]);
+    assert_eq!(
+        found.left_out,
+        ["critic.scale", "log_std", "optimizer.lr", "critic.0.bias", "critic.0.weight"]
+    );
     // What is a policy file is none to be imported.
     let own = found.network.to_bytes();
     let error =
         from_bytes("x.safetensors".as_ref(), &own, &Request::default()).unwrap_err().to_string();
     assert!(error.contains("a policy file already"), "{error}");
+}
+
+#[test]
+fn an_order_that_the_names_do_not_say_is_asked_for() {
+    let chain = |names: [&'static str; 3], networks: &[&str]| {
+        let content = file(&names.map(|name| (name, [4, 4])), &[]);
+        from_bytes("x.safetensors".as_ref(), &content, &super::named(networks))
+    };
+    let refusal = |names| chain(names, &[]).unwrap_err().to_string();
+    let error = refusal(["fc1", "log_std", "mean"]);
+    assert!(
+        error.contains("`log_std` may give deviations") && error.contains("fc1,mean"),
+        "{error}"
+    );
+    assert_eq!(
+        chain(["fc1", "log_std", "mean"], &["fc1", "mean"]).unwrap().layers,
+        ["fc1", "mean"]
+    );
+    let error = refusal(["body", "gas", "steer"]);
+    assert!(
+        error.contains("both on the layer before") && error.contains("body,gas,steer"),
+        "{error}"
+    );
+    assert!(chain(["body", "gas", "steer"], &["body", "gas", "steer"]).is_ok());
+    assert_eq!(chain(["fc1", "fc2", "mu"], &[]).unwrap().layers, ["fc1", "fc2", "mu"]);
+}
+
+/// A safetensors file of two layers, with this metadata and a tensor of integers.
+fn told(metadata: &[(&str, &str)], integers: &[&str]) -> Vec<u8> {
+    let layers = file(&[("layers.0", [8, 4]), ("layers.1", [2, 8])], &[]);
+    let tensors = safetensors::SafeTensors::deserialize(&layers).unwrap();
+    let mut views: Vec<(String, TensorView<'_>)> =
+        tensors.iter().map(|(name, view)| (name.to_owned(), view)).collect();
+    let zeros = [0; 32];
+    for name in integers {
+        let view = TensorView::new(Dtype::I64, vec![4], &zeros).unwrap();
+        views.push(((*name).to_owned(), view));
+    }
+    let entry = |(key, text): &(&str, &str)| ((*key).to_owned(), (*text).to_owned());
+    serialize(views, Some(metadata.iter().map(entry).collect())).unwrap()
+}
+
+#[test]
+fn what_a_file_says_beside_its_tensors_is_not_dropped() {
+    let read = |content: &[u8]| from_bytes("x.safetensors".as_ref(), content, &Request::default());
+    let refusal = |content: &[u8]| read(content).unwrap_err().to_string();
+    let error = refusal(&told(&[("obs_mean", "[0.1, 0.2]"), ("action_scale", "2.0")], &[]));
+    assert!(error.contains("`action_scale`, `obs_mean` may act on"), "{error}");
+    let found =
+        read(&told(&[("format", "pt"), ("author", "a name"), ("epoch", "7")], &[])).unwrap();
+    assert_eq!(found.left_out, ["epoch", "author"]);
+    let error = refusal(&told(&[], &["permutation"]));
+    assert!(error.contains("`permutation` may act on"), "{error}");
+    // A policy file that is damaged is none of another program.
+    let error = refusal(&told(&[("activation", "swish"), ("output", "identity")], &[]));
+    assert!(error.contains("a policy file already, which is damaged: activation"), "{error}");
+    let whole = told(&[("activation", "elu"), ("output", "identity")], &[]);
+    assert!(refusal(&whole).contains("needs no import"));
 }

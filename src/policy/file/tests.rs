@@ -150,6 +150,9 @@ fn halves_of_norms_maps_and_lists_are_refused() {
     refused(&mlp, say("activations", None), &["no `activation`", "softsign"]);
     refused(&mlp, say("output", Some("tanh")), &["both `activations` and `output`"]);
     refused(&mlp, say("state_order", Some("a,b")), &["state_order", "expected 3 names"]);
+    for hidden in ["a,b,c\u{1b}[2J", "a,b,c\n.", "a,b,c\u{202e}", "a,\u{200b}b,c"] {
+        refused(&mlp, say("state_order", Some(hidden)), &["state_order", "control a terminal"]);
+    }
     let swap = |header: &mut Map<String, Value>| {
         let [low, high] = ["low", "high"].map(|kind| header[&format!("output.{kind}")].clone());
         header.insert("output.low".to_owned(), high);
@@ -175,4 +178,23 @@ fn maps_and_norms_of_other_sizes_are_refused() {
     layers[0].norm.as_mut().expect("a norm").scale.pop();
     let problem = Mlp::from_layers(layers).expect_err("refused").to_string();
     assert!(problem.contains("layers.0.norm.weight has 1 entries"), "{problem}");
+}
+
+#[test]
+fn an_entry_that_is_there_twice_is_refused() {
+    let bytes = whole().to_bytes();
+    let (length, rest) = bytes.split_at(LENGTH);
+    let length = u64::from_le_bytes(length.try_into().expect("8 bytes")) as usize;
+    let header = std::str::from_utf8(&rest[..length]).expect("a text");
+    let twice = |old: &str, new: &str| {
+        let header = header.replacen(old, new, 1);
+        let parts = [&(header.len() as u64).to_le_bytes(), header.as_bytes(), &rest[length..]];
+        Mlp::from_bytes(&parts.concat()).expect_err("refused")
+    };
+    let key = "\"state_order\":";
+    let problem = twice(key, &format!("{key}\"c,b,a\",{key}"));
+    assert!(problem.contains("`state_order` is there twice"), "{problem}");
+    let metadata = "\"__metadata__\":";
+    let problem = twice(metadata, &format!("{metadata}{{\"output\":\"tanh\"}},{metadata}"));
+    assert!(problem.contains("duplicate field `__metadata__`"), "{problem}");
 }

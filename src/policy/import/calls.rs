@@ -8,7 +8,7 @@ const MOST_DIMENSIONS: usize = 64;
 /// Arguments of a call that are looked at.
 const ARGUMENTS: usize = 8;
 /// Modules that read, write, run or load: a file that names one of them is no policy.
-const HOSTILE: [&str; 26] = [
+const HOSTILE: [&str; 35] = [
     "os",
     "posix",
     "nt",
@@ -35,6 +35,34 @@ const HOSTILE: [&str; 26] = [
     "tempfile",
     "urllib",
     "requests",
+    "io",
+    "_io",
+    "glob",
+    "operator",
+    "_operator",
+    "dill",
+    "asyncio",
+    "bdb",
+    "http",
+];
+/// Functions of other modules that do so.
+const LOADERS: [&str; 16] = [
+    "load",
+    "loads",
+    "loadtxt",
+    "load_module",
+    "fromfile",
+    "memmap",
+    "genfromtxt",
+    "save",
+    "savez",
+    "savetxt",
+    "dump",
+    "dumps",
+    "open",
+    "open_memmap",
+    "compile_file",
+    "load_state_dict_from_url",
 ];
 /// Names of Python itself that make plain values.
 const BUILTINS: [&str; 14] = [
@@ -61,9 +89,10 @@ const BUILTINS: [&str; 14] = [
 pub(super) fn is_harmless(Name { module, name }: Name<'_>) -> Result<(), String> {
     let first = module.split('.').next().unwrap_or_default();
     let builtin = matches!(first, "builtins" | "__builtin__") && !BUILTINS.contains(&name);
-    match builtin || HOSTILE.contains(&first) {
+    let loader = LOADERS.contains(&name);
+    match builtin || loader || HOSTILE.contains(&first) {
         true => Err(format!(
-            "names `{module}.{name}`, which runs programs; nothing was executed, and the file is not to be trusted"
+            "names `{module}.{name}`, which runs programs, or reads or writes files; nothing was executed, and the file is not to be trusted"
         )),
         false => Ok(()),
     }
@@ -120,7 +149,8 @@ pub(super) fn result<'a>(
             latin(pickle, text)
         }
         ("numpy", "dtype", &[Value::Text(name), ..] | &[Value::Name(Name { name, .. }), ..]) => {
-            Ok(Value::Type(Kind::of_numpy(name)))
+            pickle.kinds.push(Kind::of_numpy(name));
+            Ok(Value::Type(pickle.kinds.len() - 1))
         }
         (_, "scalar", &[Value::Type(kind), Value::Bytes(number)]) if numpy => {
             Ok(array(pickle, kind, number, Vec::new(), false))
@@ -175,19 +205,19 @@ pub(super) fn filled<'a>(
     }
 }
 
-/// Turns a kind of numbers around, if `state` says so.
+/// Turns a kind of numbers around, wherever it is used from now on, if `state` says so.
 ///
 /// # Errors
 /// A sentence about a state that is none.
 pub(super) fn order<'a>(
-    pickle: &Pickle<'a>,
-    kind: &mut Value<'a>,
+    pickle: &mut Pickle<'a>,
+    kind: usize,
     state: Value<'a>,
 ) -> Result<(), String> {
     let items = if let Value::Tuple(number) = state { head(pickle, number) } else { Vec::new() };
-    match (items.as_slice(), &mut *kind) {
-        ([_, Value::Text(">"), ..], Value::Type(kind)) => *kind = kind.swapped(),
-        ([_, Value::Text(_), ..], _) => {}
+    match items.as_slice() {
+        [_, Value::Text(">"), ..] => pickle.kinds[kind] = pickle.kinds[kind].swapped(),
+        [_, Value::Text(_), ..] => {}
         _ => return Err("a kind of numbers without an order of bytes".to_owned()),
     }
     Ok(())
@@ -220,7 +250,7 @@ fn latin<'a>(pickle: &mut Pickle<'a>, text: &'a str) -> Result<Value<'a>, String
 /// An array of NumPy whose numbers are a run of bytes.
 fn array<'a>(
     pickle: &mut Pickle<'a>,
-    kind: Kind,
+    kind: usize,
     bytes: usize,
     shape: Vec<usize>,
     by_columns: bool,
@@ -235,7 +265,7 @@ fn array<'a>(
         true => (0..shape.len()).for_each(&mut pass),
         false => (0..shape.len()).rev().for_each(&mut pass),
     }
-    let storage = Storage { kind, place: Place::Bytes(bytes) };
+    let storage = Storage { kind: pickle.kinds[kind], place: Place::Bytes(bytes) };
     pickle.tensors.push(View { storage, offset: 0, shape, strides });
     Value::Tensor(pickle.tensors.len() - 1)
 }
@@ -250,15 +280,28 @@ fn tensor<'a>(
         Value::Int(offset),
         Value::Tuple(shape),
         Value::Tuple(strides),
-        ..,
+        ref rest @ ..,
     ] = arguments
     else {
         return Ok(None);
     };
+    refuse_lazy(pickle, rest.get(2))?;
     let offset = usize::try_from(offset).map_err(|_| "a tensor with an offset < 0")?;
     let (shape, strides) = (lengths(pickle, shape)?, lengths(pickle, strides)?);
     pickle.tensors.push(View { storage, offset, shape, strides });
     Ok(Some(Value::Tensor(pickle.tensors.len() - 1)))
+}
+
+/// Refuses a tensor whose numbers are not those of its storage, as its last argument says.
+fn refuse_lazy(pickle: &Pickle<'_>, marks: Option<&Value<'_>>) -> Result<(), String> {
+    let Some(&Value::Dict(marks)) = marks else { return Ok(()) };
+    match pickle.dicts[marks].iter().find(|(_, value)| *value == Value::Truth(true)) {
+        Some((Value::Text(mark), _)) => Err(format!(
+            "a tensor that is marked `{mark}`: its numbers are those of its storage with another sign; save \
+             x.resolve_neg().resolve_conj() in its place"
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// The tuple number `tuple` as lengths.

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::bearing::{is_memory, is_parametrized};
 use super::draft::{Draft, MOST_LAYERS, Step};
 use super::kind::Cast;
 use super::layers::{self, Dense, Order};
@@ -9,7 +10,7 @@ use super::layouts::{self, Layout, Recognised};
 use super::linear::Linear;
 use super::lost;
 use super::map::Map;
-use super::names::under;
+use super::names::{split, under};
 use super::request::{Hints, Imported, Origin, Request};
 use super::source::{Source, Tensor};
 use super::statistics;
@@ -73,9 +74,9 @@ pub(super) fn policy(
         let of_layout = choice.layout.and_then(|layout| layout.refusal).map(str::to_owned);
         hints.refusal.clone().or(of_layout).map_or(Ok(()), Err)?;
         choice.add_ends(&mut source, &mut made, hints)?;
-        let first = choice.layers.first().map_or("", |layer| &layer.name);
-        let beside = choice.layout.map_or(&[][..], |layout| layout.beside);
-        lost::refuse(&source, &made.used, beside, layers::module(first))?;
+        let own: Vec<&str> = choice.layers.iter().map(|layer| layer.name.as_str()).collect();
+        let beside = choice.layout.map_or(Vec::new(), |layout| layout.beside(&choice.outer));
+        lost::refuse(&source, &made.used, &beside, &own)?;
     }
     let origin = |stated: bool, hinted: bool| match (stated, hinted, choice.layout) {
         (true, ..) => Origin::Stated,
@@ -109,10 +110,13 @@ impl Choice {
             None => layers::only(source, &dense)?,
         };
         layers::check(&layers)?;
+        if !by_name && recognised.is_none() {
+            layers::check_order(&layers)?;
+        }
         if layers.len() > MOST_LAYERS {
             return Err(format!("{} layers; a network has at most {MOST_LAYERS}", layers.len()));
         }
-        let same = |found: &&Recognised<'_>| names(&found.layers) == names(&layers);
+        let same = |found: &&Recognised<'_>| layers::names(&found.layers) == layers::names(&layers);
         let found = recognised.as_ref().filter(same);
         Ok(Self {
             layout: found.map(|found| found.layout),
@@ -202,6 +206,15 @@ impl Choice {
 
 /// The refusal of a file without a dense layer.
 fn none(source: &Source<'_>) -> String {
+    let names = || source.tensors.iter().map(|tensor| tensor.name.as_str());
+    if let Some(name) = names().find(|name| is_parametrized(name)) {
+        return layers::parametrized(name);
+    }
+    if let Some(name) = names().find(|name| is_memory(split(name).1)) {
+        return format!(
+            "recurrent layers alone, `{name}` the first: a network with a memory is no dense one, and none is read"
+        );
+    }
     let count = source.tensors.len();
     let unmade = source.unmade.first().map(|object| {
         format!(
@@ -214,11 +227,6 @@ fn none(source: &Source<'_>) -> String {
         "no dense layer among its {count} tensors: none is called `.weight` and has the shape [out, in]{}",
         unmade.unwrap_or_default()
     )
-}
-
-/// Names of layers.
-fn names<'a>(layers: &[Dense<'a>]) -> Vec<&'a str> {
-    layers.iter().map(|layer| layer.name).collect()
 }
 
 /// The layer with its numbers.

@@ -103,6 +103,10 @@ impl<'b> Walk<'_, 'b, '_> {
                 self.found.unmade.push(Unmade { name: path, dict: self.dict, maker });
                 Ok(())
             }
+            Value::Int(_) | Value::Float => {
+                self.found.plain.push(path.join("."));
+                Ok(())
+            }
             _ => Ok(()),
         }
     }
@@ -127,6 +131,11 @@ impl<'b> Walk<'_, 'b, '_> {
 
     /// Adds what is in a list or a tuple.
     fn items(&mut self, items: &[Value<'b>], path: &mut Vec<String>) -> Result<(), String> {
+        let plain = |item: &Value<'_>| matches!(item, Value::Int(_) | Value::Float);
+        if !items.is_empty() && items.iter().all(plain) {
+            self.found.plain.push(path.join("."));
+            return Ok(());
+        }
         let mut numbered = items.iter().enumerate();
         numbered.try_for_each(|(i, item)| self.within(i.to_string(), *item, path))
     }

@@ -101,6 +101,7 @@ fn unknown(bytes: &[u8]) -> String {
     let what = if text { "a text" } else { "a file" };
     format!(
         "{what} of a format that is not known: neither a checkpoint of PyTorch (a zip archive), a pickle, safetensors, \
-         .nnet, nor called .onnx"
+         .nnet, \
+         the text of Sherlock or POLAR (two lines of a whole number each at its beginning), nor called .onnx"
     )
 }

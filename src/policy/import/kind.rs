@@ -37,6 +37,14 @@ pub(super) enum Kind {
     NoFloat(u8),
 }
 
+/// The refusal of a storage of PyTorch whose numbers are not read.
+pub(super) fn unread(name: &impl std::fmt::Display) -> String {
+    format!(
+        "`{name}` is no storage of PyTorch that is read: quantised, complex and 8-bit numbers are not; save the tensors as \
+         x.float(), of the network before it was quantised"
+    )
+}
+
 impl Kind {
     /// The kind of the numbers of the storage `name` of PyTorch.
     pub(super) fn of_storage(name: &str) -> Option<Self> {
@@ -122,7 +130,11 @@ impl Kind {
                             x.astype('<f4')"
                     .to_owned());
             }
-            Self::NoFloat(_) => return Err("its numbers are no floats".to_owned()),
+            Self::NoFloat(_) => {
+                return Err("its numbers are no floats of 16, 32 or 64 bits; save x.float(), and a quantised \
+                            network as it was before: integers say nothing of their scale"
+                    .to_owned());
+            }
         };
         if self != Self::F32 && cast == Cast::Refused {
             return Err(format!(

@@ -2,7 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::names::{Bearing, around, bearing, compare, holds, numbered, split, starts_with};
+use super::bearing::{Bearing, Known, gives_deviations, is_parametrized};
+use super::names::{compare, holds, is_head, numbered, split, starts_with};
 use super::source::{Source, Tensor};
 
 /// The modules of a tianshou actor or critic that hold its layers: a body and a head.
@@ -144,18 +145,18 @@ fn pick<'a>(
 ) -> Result<Vec<Dense<'a>>, String> {
     let chosen = layers.iter().filter(|layer| rule(layer.name, prefix));
     let chosen: Vec<Dense<'a>> = chosen.copied().collect();
-    let known = parts(&chosen);
+    let parts = parts(&chosen);
+    let (all, own) = (names(layers), names(&chosen));
+    let known = Known { all: &all, own: &own };
     let bears = |tensor: &&Tensor| {
         let name = tensor.name.as_str();
-        let inside = if prefix.is_empty() {
-            name
-        } else {
-            around(name, prefix).map_or(name, |(_, inside)| inside)
-        };
-        let other = rule(name, prefix) && !known.contains(name);
-        other && tensor.is_float() && bearing(inside) != Bearing::None
+        rule(name, prefix) && !parts.contains(name) && known.bearing(name) != Bearing::None
     };
-    match source.tensors.iter().find(bears) {
+    let others: Vec<&Tensor> = source.tensors.iter().filter(bears).collect();
+    if let Some(tensor) = others.iter().find(|tensor| is_parametrized(&tensor.name)) {
+        return Err(parametrized(&tensor.name));
+    }
+    match others.first() {
         Some(Tensor { name, shape, .. }) if !chosen.is_empty() => Err(format!(
             "`{name}` of shape {shape:?} is no part of a dense layer, so this is not a plain \
              network; if it does not bear on the output, give --network the prefixes of its \
@@ -163,6 +164,66 @@ fn pick<'a>(
         )),
         _ => Ok(chosen),
     }
+}
+
+/// The refusal of a weight that is computed from several tensors.
+pub(super) fn parametrized(name: &str) -> String {
+    format!(
+        "`{name}` is a part of a weight that weight_norm or spectral_norm computes from several tensors; compute it before \
+         saving: torch.nn.utils.parametrize.remove_parametrizations(layer, 'weight'), or remove_weight_norm(layer) and \
+         remove_spectral_norm(layer) where the older functions were used"
+    )
+}
+
+/// Refuses layers of an order that only the file's has, where another one is as likely.
+///
+/// # Errors
+/// A sentence that names the layers in doubt, and the remedy.
+pub(super) fn check_order(layers: &[Dense<'_>]) -> Result<(), String> {
+    let without = |odd: &str| {
+        let names = layers.iter().map(|layer| layer.name).filter(|name| *name != odd);
+        names.collect::<Vec<_>>().join(",")
+    };
+    if layers.len() > 1
+        && let Some(Dense { name, .. }) = layers.iter().find(|layer| gives_deviations(layer.name))
+    {
+        return Err(format!(
+            "`{name}` may give deviations beside the layer before it, and not follow on it; without it: --network {}",
+            without(name)
+        ));
+    }
+    let table = |layer: &&Dense<'_>| split(layer.name).1.starts_with("emb") && layer.bias.is_none();
+    if let Some(Dense { name, .. }) = layers.iter().find(table) {
+        return Err(format!(
+            "`{name}` has no bias, and is called as a table of embeddings is, which no dense layer stands for; if it is a \
+             layer: --network {}",
+            without("")
+        ));
+    }
+    match layers.windows(2).find(|pair| may_stand_side_by_side(&pair[0], &pair[1])) {
+        Some(pair) => Err(format!(
+            "`{}` and `{}` may follow on one another, or both on the layer before: the names do not say it; if they follow: \
+             --network {}",
+            pair[0].name,
+            pair[1].name,
+            without("")
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Whether two layers may be heads of one body: square, and neither a last layer nor counted together.
+fn may_stand_side_by_side(before: &Dense<'_>, after: &Dense<'_>) -> bool {
+    let stem = |layer: &Dense<'_>| numbered(layer.name).map(|(stem, _)| stem.to_owned());
+    let counted = stem(before).is_some() && stem(before) == stem(after);
+    let ends = is_head(after.name) && !is_head(before.name);
+    let square = [before.inputs(), before.outputs()] == [after.inputs(), after.outputs()];
+    square && before.inputs() == before.outputs() && !counted && !ends
+}
+
+/// Names of layers.
+pub(super) fn names<'a>(layers: &[Dense<'a>]) -> Vec<&'a str> {
+    layers.iter().map(|layer| layer.name).collect()
 }
 
 /// Names of the tensors of these layers.

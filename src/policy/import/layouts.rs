@@ -15,7 +15,7 @@ pub(super) struct Layout {
     /// What lies beside them; of several words between bars, one.
     marks: &'static [&'static str],
     /// What else lies beside them, and is no part of the policy, whatever its names.
-    pub(super) beside: &'static [&'static str],
+    beside: &'static [&'static str],
     /// Between the layers, unless something else is stated.
     pub(super) hidden: Activation,
     /// Behind the last layer, unless something else is stated.
@@ -28,6 +28,17 @@ pub(super) struct Layout {
     pub(super) refusal: Option<&'static str>,
     /// What the library does with the output that no file of its says.
     pub(super) beyond: Option<&'static str>,
+}
+
+impl Layout {
+    /// What in a file is known to be no part of the policy: what marks the layout, and what lies beside it.
+    pub(super) fn beside(&self, outer: &str) -> Vec<String> {
+        let own =
+            self.marks.iter().flat_map(|marks| marks.split('|')).chain(self.beside.iter().copied());
+        own.map(|name| under(outer, name))
+            .chain(self.beside.iter().map(|&name| name.to_owned()))
+            .collect()
+    }
 }
 
 /// Every layout has these unless it says otherwise.
@@ -94,6 +105,7 @@ const LAYOUTS: [Layout; 22] = [
         name: "rl_games",
         body: &["a2c_network.actor_mlp", "a2c_network.mu"],
         marks: &["a2c_network.value"],
+        beside: &["a2c_network.sigma", "value_mean_std"],
         hidden: ELU,
         last: Activation::Identity,
         ..PLAIN
@@ -110,6 +122,7 @@ const LAYOUTS: [Layout; 22] = [
         name: "rsl_rl",
         body: &["actor_state_dict.mlp"],
         marks: &["critic_state_dict"],
+        beside: &["actor_state_dict.distribution"],
         hidden: ELU,
         last: Activation::Identity,
         ..PLAIN
@@ -161,6 +174,7 @@ const LAYOUTS: [Layout; 22] = [
         name: "safe-control-gym (PPO)",
         body: &["actor.pi_net.fcs"],
         marks: &["actor.logstd"],
+        beside: &["reward_normalizer"],
         hidden: GAUSSIAN.0,
         last: GAUSSIAN.1,
         ..PLAIN
@@ -169,6 +183,7 @@ const LAYOUTS: [Layout; 22] = [
         name: "safe-control-gym (SAC)",
         body: &["actor.net.fcs", "actor.mu_layer"],
         marks: &["actor.log_std_layer"],
+        beside: &["reward_normalizer"],
         beyond: LIMITS,
         ..PLAIN
     },

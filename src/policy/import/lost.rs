@@ -2,8 +2,9 @@
 
 use std::collections::HashSet;
 
+use super::bearing::{Bearing, Known, is_parametrized};
 use super::layers;
-use super::names::{Bearing, bearing, split, starts_with};
+use super::names::{split, starts_with};
 use super::source::{Source, Tensor, Unmade};
 
 /// Names that a refusal lists.
@@ -23,31 +24,30 @@ pub(super) fn refuse_unmade(source: &Source<'_>, dicts: &HashSet<usize>) -> Resu
     }
 }
 
-/// Refuses tensors that are not `used`, lie under nothing that is `beside` the policy, and may act on what
-/// the network `name` is given or gives.
+/// Refuses tensors and plain numbers that are not `used`, lie under nothing that is `beside` the policy, and may
+/// act on what the network of the layers `own` is given or gives.
 ///
 /// # Errors
 /// The refusal, which names them, and says how the network is had without them.
 pub(super) fn refuse(
     source: &Source<'_>,
     used: &HashSet<String>,
-    beside: &[&str],
-    name: &str,
+    beside: &[String],
+    own: &[&str],
 ) -> Result<(), String> {
     let modules: HashSet<&str> = used.iter().map(|name| split(name).0).collect();
-    let rest =
-        source.tensors.iter().filter(|tensor| tensor.is_float() && !used.contains(&tensor.name));
-    let known = |name: &str| beside.iter().any(|module| starts_with(name, module));
-    let rest = rest.filter(|tensor| !is_of_statistics(tensor, &modules) && !known(&tensor.name));
-    let rest: Vec<&Tensor> = rest.collect();
-    let remedy = match name {
-        "" => "give --network the names of its layers".to_owned(),
-        name => format!("--network {name}"),
-    };
+    let rest = source.tensors.iter().filter(|tensor| !used.contains(&tensor.name));
+    let rest = rest.filter(|tensor| !is_of_statistics(tensor, &modules));
+    let rest = rest.map(|tensor| tensor.name.as_str());
+    let lies_beside = |name: &&str| beside.iter().any(|module| starts_with(name, module));
+    let rest = rest.chain(source.plain.iter().map(String::as_str));
+    let rest: Vec<&str> = rest.filter(|name| !lies_beside(name)).collect();
+    let all = layers::names(&layers::dense(source));
+    let known = Known { all: &all, own };
     let of = |wanted: Bearing| -> Vec<&str> {
-        let names = rest.iter().map(|tensor| tensor.name.as_str());
-        names.filter(|name| bearing(name) == wanted).collect()
+        rest.iter().copied().filter(|name| known.bearing(name) == wanted).collect()
     };
+    let remedy = remedy(own);
     let (memory, unknown) = (of(Bearing::Memory), of(Bearing::Unknown));
     match (memory.is_empty(), unknown.is_empty()) {
         (false, _) => Err(format!(
@@ -55,11 +55,24 @@ pub(super) fn refuse(
              which are another policy: {remedy}",
             listed(&memory)
         )),
+        (_, false) if unknown.iter().any(|name| is_parametrized(name)) => {
+            let name = unknown.iter().find(|name| is_parametrized(name));
+            Err(layers::parametrized(name.copied().unwrap_or_default()))
+        }
         (_, false) => Err(format!(
             "{} may act on what the network is given or gives, and would be lost; to import it without: {remedy}",
             listed(&unknown)
         )),
         _ => Ok(()),
+    }
+}
+
+/// How the layers `own` are had alone.
+fn remedy(own: &[&str]) -> String {
+    let module = layers::module(own.first().copied().unwrap_or_default());
+    match module {
+        "" => format!("--network {}", own.join(",")),
+        module => format!("--network {module}"),
     }
 }
 
@@ -81,7 +94,8 @@ fn listed(names: &[&str]) -> String {
     format!("{}{more}", first.join(", "))
 }
 
-/// Names of what is not `used`: objects that were not made, tensors of no dense layer, and the others.
+/// Names of what is not `used`: objects that were not made, plain numbers and words, tensors of no dense layer, and the
+/// others.
 pub(super) fn left_out(source: &Source<'_>, used: &HashSet<String>) -> Vec<String> {
     let dense = layers::dense(source);
     let of_layers = layers::parts(&dense);
@@ -90,5 +104,6 @@ pub(super) fn left_out(source: &Source<'_>, used: &HashSet<String>) -> Vec<Strin
         source.tensors.iter().map(|tensor| &tensor.name).filter(|name| !used.contains(*name));
     let mut rest: Vec<&String> = rest.collect();
     rest.sort_by_key(|name| of_layers.contains(name.as_str()));
-    unmade.chain(rest.into_iter().cloned()).collect()
+    let plain = source.plain.iter().chain(&source.said).cloned();
+    unmade.chain(plain).chain(rest.into_iter().cloned()).collect()
 }

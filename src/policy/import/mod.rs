@@ -4,6 +4,7 @@
 
 mod archive;
 mod array;
+mod bearing;
 mod calls;
 mod checkpoint;
 mod choice;

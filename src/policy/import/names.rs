@@ -1,52 +1,7 @@
-//! Names of tensors: their keys, their order, and what they tell about what bears on a policy.
+//! Names of tensors: their keys, and their order.
 
 use std::cmp::Ordering;
 
-/// Keys of what trains a policy or judges it, and is no part of it. A key that begins so counts.
-const BESIDE: [&str; 34] = [
-    "critic",
-    "value",
-    "vf",
-    "qf",
-    "q_net",
-    "q1",
-    "q2",
-    "Q1",
-    "Q2",
-    "target",
-    "optim",
-    "log_std",
-    "logstd",
-    "std",
-    "sigma",
-    "fc_logstd",
-    "log_alpha",
-    "alpha",
-    "log_ent_coef",
-    "ent_coef",
-    "reward",
-    "ret_",
-    "return",
-    "cost",
-    "scheduler",
-    "lr_",
-    "distribution",
-    "privileged_obs_norm",
-    "critic_obs_norm",
-    "actor_opt",
-    "pi_opt",
-    "discriminator",
-    "loss",
-    "num_batches_tracked",
-];
-/// Ends of such keys.
-const ENDS_BESIDE: [&str; 8] =
-    ["_target", "_old", "_optimizer", "_opt", "_log_std", "_logstd", "_std_layer", "_sigma"];
-/// Such keys as a whole.
-const WHOLE_BESIDE: [&str; 4] = ["v", "q", "c", "obs"];
-/// Beginnings of the keys of the tensors of recurrent layers.
-const RECURRENT: [&str; 6] =
-    ["weight_ih", "weight_hh", "bias_ih", "bias_hh", "kernel_h", "recurrent"];
 /// Keys that a last layer goes by.
 const HEADS: [&str; 13] = [
     "mu",
@@ -63,33 +18,6 @@ const HEADS: [&str; 13] = [
     "last",
     "final",
 ];
-
-/// What a tensor that is no part of the network may have to do with the policy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Bearing {
-    /// Nothing: it trains or judges.
-    None,
-    /// It is a part of a layer with a memory.
-    Memory,
-    /// It may act on what the network is given or gives.
-    Unknown,
-}
-
-/// What the tensor `name` may have to do with the policy.
-pub(super) fn bearing(name: &str) -> Bearing {
-    let mut keys = name.split('.');
-    let last = name.rsplit('.').next().unwrap_or_default();
-    let of_training = |key: &str| {
-        BESIDE.iter().any(|begin| key.starts_with(begin))
-            || ENDS_BESIDE.iter().any(|end| key.ends_with(end))
-            || WHOLE_BESIDE.contains(&key)
-    };
-    match RECURRENT.iter().any(|begin| last.starts_with(begin)) {
-        _ if keys.any(of_training) => Bearing::None,
-        true => Bearing::Memory,
-        false => Bearing::Unknown,
-    }
-}
 
 /// Whether `name` lies under `prefix`.
 pub(super) fn starts_with(name: &str, prefix: &str) -> bool {
@@ -124,10 +52,15 @@ pub(super) fn split(name: &str) -> (&str, &str) {
 
 /// The order of two names in a file without one: numbers as numbers, last layers last.
 pub(super) fn compare(a: &str, b: &str) -> Ordering {
-    let head = |name: &str| HEADS.contains(&split(name).1);
+    let head = is_head;
     let module = split(a).0.cmp(split(b).0);
     let heads = if module == Ordering::Equal { head(a).cmp(&head(b)) } else { Ordering::Equal };
     heads.then_with(|| parts(a).cmp(&parts(b)))
+}
+
+/// Whether the last key of a layer is one that a last layer goes by.
+pub(super) fn is_head(name: &str) -> bool {
+    HEADS.contains(&split(name).1)
 }
 
 /// A run of digits as its number, or of other characters.
@@ -173,21 +106,6 @@ mod tests {
         assert_eq!(names, ["p.Dense_09.bias", "p.Dense_9.kernel", "p.Dense_10.kernel"]);
         assert_eq!(numbered("fc12"), Some(("fc", 12)));
         assert_eq!(numbered("mu"), None);
-    }
-
-    #[test]
-    fn what_bears_on_a_policy_is_told_by_its_keys() {
-        let none = [
-            "critic.0.weight",
-            "optimizer.state.0",
-            "log_std",
-            "actor_target.mu.0.weight",
-            "v.0.bias",
-        ];
-        assert!(none.iter().all(|name| bearing(name) == Bearing::None));
-        assert_eq!(bearing("memory.weight_ih_l0"), Bearing::Memory);
-        assert_eq!(bearing("obs_rms.mean"), Bearing::Unknown);
-        assert_eq!(bearing("encoder.0.weight"), Bearing::Unknown);
     }
 
     #[test]

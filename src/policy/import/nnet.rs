@@ -50,6 +50,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Imported, String> {
 fn maps(words: &mut Words<'_>, inputs: usize, outputs: usize) -> Result<[Map; 2], String> {
     let low = words.numbers(inputs, "a least input")?;
     let high = words.numbers(inputs, "a largest input")?;
+    if let Some(i) = (0..inputs).find(|&i| low[i] > high[i]) {
+        return Err(format!(
+            "input {i}: its least value {} lies above its largest, {}",
+            low[i], high[i]
+        ));
+    }
     let mean = words.numbers(inputs + 1, "a mean")?;
     let range = words.numbers(inputs + 1, "a range")?;
     if !range.iter().all(|range| *range > 0.0) {

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use super::calls;
-use super::kind::Kind;
+use super::kind::{self, Kind};
 use super::value::{Name, Pickle, Place, Storage, Value};
 
 /// Most instructions: some 100,000 tensors.
@@ -74,7 +74,7 @@ impl<'a> Machine<'a> {
             b'N' => self.push(Value::Other)?,
             b'G' => {
                 self.take(8)?;
-                self.push(Value::Other)?;
+                self.push(Value::Float)?;
             }
             0x88 | 0x89 => self.push(Value::Truth(code == 0x88))?,
             b'K' | b'M' | b'J' | 0x8a => self.number(code)?,
@@ -303,7 +303,7 @@ impl<'a> Machine<'a> {
             _ => return Err("a reference to something else than a storage".to_owned()),
         };
         let known = Kind::of_storage(kind.name).filter(|_| kind.module == "torch");
-        let kind = known.ok_or_else(|| format!("`{kind}` is no storage of PyTorch"))?;
+        let kind = known.ok_or_else(|| kind::unread(&kind))?;
         if key.len() > LONGEST_KEY {
             return Err(format!("a storage with a name of {} bytes", key.len()));
         }
@@ -369,7 +369,7 @@ impl<'a> Machine<'a> {
         let top = self.stack.last_mut().ok_or(EMPTY)?;
         match *top {
             Value::Dict(_) | Value::Tensor(_) | Value::List(_) => Ok(()),
-            Value::Type(_) => calls::order(&self.pickle, top, state),
+            Value::Type(kind) => calls::order(&mut self.pickle, kind, state),
             Value::Object(number) => {
                 match calls::filled(&mut self.pickle, number, state)? {
                     Some(array) => *top = array,

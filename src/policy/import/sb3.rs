@@ -66,6 +66,7 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
         serde_json::from_slice(data).map_err(|e| format!("entry `data`: no JSON ({e})"))?;
     let kwargs = &data["policy_kwargs"];
     let mut hints = Hints { activation: activation(kwargs)?, ..Hints::default() };
+    hints.refusal = own_classes(&data);
     // With exploration that depends on the state, PPO may bound its actions as SAC does.
     let squashed =
         kwargs["squash_output"] == Value::Bool(true) || kwargs["squash_output"] == "True";
@@ -75,6 +76,26 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
     let is_off_policy = data.get("replay_buffer_class").is_some();
     actions(&data["action_space"], squashed || is_off_policy, &mut hints);
     Ok(hints)
+}
+
+/// The refusal of a model with a class of its own, which may do anything with observations and actions.
+fn own_classes(data: &Value) -> Option<String> {
+    let extractor = data["policy_kwargs"]["features_extractor_class"].as_str();
+    let extractor = extractor.filter(|class| !class.ends_with("torch_layers.FlattenExtractor'>"));
+    let module = data["policy_class"]["__module__"].as_str();
+    let module = module.filter(|module| {
+        !["stable_baselines3", "sb3_contrib"]
+            .contains(&module.split('.').next().unwrap_or_default())
+    });
+    let (what, class) = match (extractor, module) {
+        (Some(class), _) => ("features_extractor_class", class),
+        (_, Some(class)) => ("policy_class", class),
+        _ => return None,
+    };
+    Some(format!(
+        "`data` has the {what} `{class}`, whose code is not in plain words: what it does with the observations would be \
+         lost; --network imports the layers alone, or export the model to ONNX with it"
+    ))
 }
 
 /// The activation between the layers, where the model was given one.

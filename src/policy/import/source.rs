@@ -8,6 +8,10 @@ use super::kind::{Cast, FloatReader, Kind};
 pub(super) struct Source<'a> {
     /// Its tensors in the order of the file, which is that of the modules in a state dict.
     pub(super) tensors: Vec<Tensor>,
+    /// Names of plain numbers, and lists of them.
+    pub(super) plain: Vec<String>,
+    /// What else it says, with its names.
+    pub(super) said: Vec<String>,
     /// What in it is no tensor, and was not made.
     pub(super) unmade: Vec<Unmade>,
     /// Numbers that are entries of an archive.
@@ -88,11 +92,6 @@ impl Tensor {
     pub(super) fn plain(name: String, shape: Vec<usize>, kind: Kind, run: usize) -> Self {
         let strides = (0..shape.len()).map(|i| shape[i + 1..].iter().product()).collect();
         Self { name, dict: 0, shape, strides, offset: 0, kind, place: Place::Run(run) }
-    }
-
-    /// Whether its numbers are floats of some width.
-    pub(super) fn is_float(&self) -> bool {
-        self.kind.is_float()
     }
 
     /// Its numbers in a storage of these bytes.

@@ -11,6 +11,8 @@ pub(super) enum Value<'a> {
     Text(&'a str),
     /// An integer of at most 64 bits.
     Int(i64),
+    /// A float.
+    Float,
     /// A truth value.
     Truth(bool),
     /// The name of a class or a function.
@@ -25,13 +27,13 @@ pub(super) enum Value<'a> {
     Bytes(usize),
     /// Numbers outside of the pickle.
     Storage(Storage<'a>),
-    /// A kind of numbers of NumPy.
-    Type(Kind),
+    /// Number of a kind of numbers of NumPy, which is set up after it was made.
+    Type(usize),
     /// Number of a tensor or an array.
     Tensor(usize),
     /// Number of an object of a class that is not known.
     Object(usize),
-    /// What no network is made of: None, a float, a long integer.
+    /// What no network is made of: None, a long integer.
     Other,
 }
 
@@ -105,6 +107,8 @@ pub(super) struct Pickle<'a> {
     pub(super) bytes: Vec<Vec<u8>>,
     /// Runs of bytes that were written as a text, by the place of the text in memory.
     pub(super) encoded: HashMap<usize, usize>,
+    /// Kinds of numbers of NumPy.
+    pub(super) kinds: Vec<Kind>,
     /// Kinds of the storages that it refers to.
     pub(super) storages: HashMap<&'a str, Kind>,
     /// Objects that nobody made.
