@@ -134,8 +134,11 @@ fn overflowing(activation: Activation, output: Activation) -> Mlp {
         let outputs = weight.len() / inputs;
         Layer::dense(weight, vec![0.0; outputs])
     };
-    let layers = vec![layer(vec![1e38, 1e38], 1), layer(vec![1.0, -1.0], 2), layer(vec![1.0], 1)];
-    Mlp::new(layers, activation, output).expect("a whole network")
+    let [first, second, last] =
+        [layer(vec![1e38, 1e38], 1), layer(vec![1.0, -1.0], 2), layer(vec![1.0], 1)];
+    // What is bounded would make numbers of the infinities.
+    let layers = vec![first, second.activated(activation), last.activated(output)];
+    Mlp::from_layers(layers).expect("a whole network")
 }
 
 /// Whether a network without a number fails the rollout that it drives, whatever its activations.

@@ -143,9 +143,10 @@ fn activations_have_their_exact_range() {
                 let values: Vec<f64> = grid.map(|x| exact(&network, &[x])[0]).collect();
                 let least = values.iter().copied().fold(f64::INFINITY, f64::min);
                 let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                // The library's exp and tanh are within a few units in the last place.
-                let slack = 1e-15;
-                assert!(found.low <= least + slack && most <= found.high + slack, "{found:?}");
+                // The library's exp and tanh are within a few units in the last place, erfc is not.
+                let slack = if activation == Activation::Gelu { 1e-10 } else { 1e-15 };
+                let held = found.low <= least + slack && most <= found.high + slack;
+                assert!(held, "{activation} {low} + {width}: {found:?}, {least} to {most}");
                 // A grid of 5 / 1000 misses the valley of SiLU by at most 0.5 (2.5e-3)^2 / 2; the
                 // valley is taken to be 1e-4 wide.
                 let loose = least - found.low < 3e-6 && found.high - most < 3e-6;

@@ -16,8 +16,6 @@ const LOWEST: f32 = -40.0;
 const LOWEST_NORMAL: f32 = -9.0;
 /// The same where a factor is a bare exponential, which f32 still has at -103.
 const LOWEST_EXPONENT: f32 = -105.0;
-/// Above it an exponential makes no difference to 1 in f64.
-const HIGHEST_EXPONENT: f32 = 20.0;
 /// Beyond it 1 makes no difference.
 const FAR: f32 = 1e30;
 
@@ -200,7 +198,7 @@ impl Activation {
     fn is_smooth(self) -> bool {
         let known = matches!(self, Self::Identity | Self::Relu | Self::LeakyRelu { .. });
         let clipped = matches!(self, Self::Hardtanh { .. } | Self::Relu6);
-        !(known || clipped || matches!(self, Self::Tanh | Self::Silu | Self::Sigmoid))
+        !(known || clipped || matches!(self, Self::Tanh | Self::Silu))
     }
 
     /// Its formula.
@@ -240,15 +238,24 @@ impl Activation {
                 let half = R::lit(0.5) * floored(x, LOWEST);
                 half + half * half.tanh()
             }
-            // The tangent of the logarithm is n / (n + 2) with n = e (e + 2), e = exp(x).
+            // With e = exp(-|x|), the tangent of the logarithm is n / (n + 2), n = e (e + 2), below 0, and
+            // n / (n + 2 e^2), n = 1 + 2 e, above.
             Self::Mish => {
                 let x = floored(x, LOWEST_EXPONENT);
-                let e = x.min(R::lit(HIGHEST_EXPONENT)).exp();
-                let n = e * (e + R::lit(2.0));
-                x * (n / (n + R::lit(2.0)))
+                let (one, two) = (R::lit(1.0), R::lit(2.0));
+                let e = (-x.abs()).exp_negative();
+                let n = x.if_lt(zero, e * (e + two), one + two * e);
+                let more = x.if_lt(zero, two, (two * e) * e);
+                x * (n / (n + more))
             }
             Self::Tanh => x.tanh(),
-            Self::Sigmoid => x.sigmoid(),
+            // Of exp(-|x|) as well: the other exponential is rounded otherwise by some drivers.
+            Self::Sigmoid => {
+                let e = (-x.abs()).exp_negative();
+                let one = R::lit(1.0);
+                x.if_lt(zero, e, one) / (one + e)
+            }
+
             Self::Softplus { beta: 1.0 } => x.max(zero) + x.softplus_excess(),
             Self::Softplus { beta } => {
                 let beta = R::lit(beta);
