@@ -191,7 +191,7 @@ fn value(name: &str, width: usize) -> Named {
 }
 
 fn float(name: &str, float: f32) -> Attribute {
-    Attribute { name: name.to_owned(), float, kind: FLOAT, ..Attribute::default() }
+    Attribute { name: name.to_owned(), float: Some(float), kind: FLOAT, ..Attribute::default() }
 }
 
 fn integer(name: &str, integer: i64) -> Attribute {

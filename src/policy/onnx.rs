@@ -73,8 +73,9 @@ pub(super) struct Node {
 pub(super) struct Attribute {
     #[prost(string, tag = "1")]
     pub(super) name: String,
-    #[prost(float, tag = "2")]
-    pub(super) float: f32,
+    /// Optional, so that -0 is written.
+    #[prost(float, optional, tag = "2")]
+    pub(super) float: Option<f32>,
     #[prost(int64, tag = "3")]
     pub(super) integer: i64,
     #[prost(bytes = "vec", tag = "4")]

@@ -1,6 +1,7 @@
 //! Damaged and hostile files of the other readers: models, parameters, texts, safetensors and larger graphs.
 
 mod formats;
+mod graphs;
 mod hostile;
 
 use std::path::Path;

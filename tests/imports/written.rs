@@ -71,6 +71,31 @@ fn maps_norms_and_names_come_back() {
 }
 
 #[test]
+fn signs_of_zero_and_many_layers_come_back() {
+    for activation in [Activation::LeakyRelu { slope: -0.0 }, Activation::Elu { alpha: -0.0 }] {
+        let layers = vec![layer(3, 4, activation), layer(4, 2, Activation::Identity)];
+        let network = Mlp::from_layers(layers).unwrap();
+        assert_eq!(again(&network).digest(), network.digest(), "{activation}");
+    }
+    let layers = (0..300).map(|_| layer(3, 3, Activation::Tanh)).collect();
+    let deep = Mlp::from_layers(layers).unwrap();
+    assert_eq!(again(&deep).digest(), deep.digest());
+}
+
+#[test]
+fn what_does_not_come_back_gives_the_same() {
+    let plain = Rescale::affine(vec![1.0; 3], vec![0.0; 3]);
+    let clip = Activation::Hardtanh { low: 0.0, high: 6.0 };
+    let layers = vec![layer(3, 4, clip), layer(4, 2, Activation::Identity)];
+    let network = Mlp::from_layers(layers).unwrap().with_input(plain).unwrap();
+    let back = again(&network);
+    assert_eq!(back.layers()[0].activation, Activation::Relu6);
+    assert!(back.input_map().is_none() && network.input_map().is_some());
+    let x = numbers(3, 40);
+    assert_eq!(back.forward(&x), network.forward(&x));
+}
+
+#[test]
 fn what_was_imported_comes_back() {
     for name in
         ["sb3_ppo.zip", "omnisafe.pt", "affine.onnx", "layer_norm.onnx", "smooth.onnx", "acas.nnet"]

@@ -24,12 +24,13 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
         }
         ("Div", Some(other)) => first.with(other, |a, b| a / b),
         ("Pow", Some(other)) => first.with(other, f64::powf),
-        ("Max", Some(other)) => first.with(other, f64::max),
-        ("Min", Some(other)) => first.with(other, f64::min),
+        ("Max", _) => every(inputs, f64::max),
+        ("Min", _) => every(inputs, f64::min),
         ("Neg", None) => Some(first.each(|x| -x)),
         ("Sqrt", None) => Some(first.each(f64::sqrt)),
         ("Exp", None) => Some(first.each(f64::exp)),
         ("Reciprocal", None) => Some(first.each(|x| 1.0 / x)),
+        ("Reshape", Some(shape)) if shape.numbers.iter().any(|length| length.is_nan()) => None,
         ("Reshape", Some(shape)) => first.reshaped(&shape.wholes()),
         ("Transpose", None) => first.transposed(node.integers("perm")),
         ("Flatten", None) => flat(first, node.integer("axis").unwrap_or(1)),
@@ -47,6 +48,13 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
         _ => return Err("of constants, which is not followed".to_owned()),
     };
     found.ok_or_else(|| format!("the shapes of `{}` do not go together", node.inputs.join("`, `")))
+}
+
+/// `f` of all of them.
+fn every(inputs: &[Option<&Array>], f: fn(f64, f64) -> f64) -> Option<Array> {
+    let mut all = inputs.iter().flatten();
+    let first = (*all.next()?).clone();
+    all.try_fold(first, |joint, other| joint.with(other, f))
 }
 
 /// The name of what a node gives.

@@ -4,8 +4,10 @@ use super::linear::Linear;
 use super::map::Map;
 use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
 
-/// Most layers of a network: layers may share their numbers, memory does not.
+/// Layers of a network whose weights are not counted: layers may share their numbers, memory does not.
 pub(super) const MOST_LAYERS: usize = 64;
+/// Most weights of a network of more layers, and of layers that are made for an operation alone.
+const MOST_WEIGHTS: usize = 1 << 24;
 /// Most numbers between two layers that a layer of its own is made for.
 const WIDEST: usize = 4096;
 
@@ -40,6 +42,8 @@ struct Stage {
     linear: Linear,
     norm: Option<Norm>,
     activation: Activation,
+    /// Whether it is there for an operation that no layer comes before.
+    is_made: bool,
 }
 
 impl Draft {
@@ -77,10 +81,23 @@ impl Draft {
             }
             (_, step) => self.steps.push(step),
         }
-        match self.steps.len() > 4 * MOST_LAYERS {
-            true => Err(format!("more than {MOST_LAYERS} layers")),
+        match self.steps.len() > 4 * MOST_LAYERS && self.weights() > MOST_WEIGHTS {
+            true => Err(format!(
+                "more than {MOST_LAYERS} layers with more than {MOST_WEIGHTS} weights together"
+            )),
             false => Ok(()),
         }
+    }
+
+    /// Numbers of all steps.
+    fn weights(&self) -> usize {
+        let of = |step: &Step| match step {
+            Step::Linear(linear) => linear.weight.len(),
+            Step::Map(map) => 4 * map.width(),
+            Step::Norm { scale, .. } => 2 * scale.len(),
+            Step::Activation(_) => 0,
+        };
+        self.steps.iter().map(of).sum()
     }
 
     /// Numbers that come out of the last step, where that is known.
@@ -175,9 +192,6 @@ impl Draft {
         if stages.is_empty() {
             return Err("no layer between input and output".to_owned());
         }
-        if stages.len() > MOST_LAYERS {
-            return Err(format!("{} layers; a network has at most {MOST_LAYERS}", stages.len()));
-        }
         let layers: Vec<Layer> = stages.into_iter().map(layer).collect();
         let mut network = match (layers.as_slice(), self.hidden) {
             ([only], Some(hidden)) => Mlp::new(vec![only.clone()], hidden, only.activation),
@@ -200,7 +214,8 @@ impl Draft {
 fn stage(stages: &mut Vec<Stage>, step: Step, inputs: Option<usize>) -> Result<(), String> {
     match step {
         Step::Linear(linear) => {
-            stages.push(Stage { linear, norm: None, activation: Activation::Identity });
+            let activation = Activation::Identity;
+            stages.push(Stage { linear, norm: None, activation, is_made: false });
         }
         Step::Norm { scale, shift, epsilon } => {
             let narrow = |values: Vec<f64>| values.into_iter().map(|value| value as f32).collect();
@@ -235,8 +250,16 @@ fn open(
         let width = width.ok_or(
             "an operation before the first layer, of which nobody says how many numbers it takes",
         )?;
+        let made = stages.iter().filter(|stage| stage.is_made);
+        let made: usize = made.map(|stage| stage.linear.weight.len()).sum();
+        if made + width * width > MOST_WEIGHTS {
+            return Err(format!(
+                "operations between layers that need layers of more than {MOST_WEIGHTS} weights"
+            ));
+        }
         let linear = Linear::diagonal(&Map::affine(vec![1.0; width], vec![0.0; width]))?;
-        stages.push(Stage { linear, norm: None, activation: Activation::Identity });
+        let activation = Activation::Identity;
+        stages.push(Stage { linear, norm: None, activation, is_made: true });
     }
     stages.last_mut().ok_or_else(|| "no layer".to_owned())
 }
@@ -256,7 +279,7 @@ fn clip([low, high]: [f64; 2]) -> Result<Activation, String> {
 
 /// The layer in f32, each number rounded once.
 fn layer(stage: Stage) -> Layer {
-    let Stage { linear: Linear { weight, bias, .. }, norm, activation } = stage;
+    let Stage { linear: Linear { weight, bias, .. }, norm, activation, .. } = stage;
     let narrow = |values: Vec<f64>| values.into_iter().map(|value| value as f32).collect();
     Layer { norm, activation, ..Layer::dense(narrow(weight), narrow(bias)) }
 }

@@ -9,7 +9,9 @@ use crate::policy::Activation;
 
 /// Numbers that an expression is looked at for.
 const SEEN: usize = 192;
-/// Largest difference of an activation written out, as a part of the number or of 1.
+/// Beyond it an exponential of a number may be more than f32 has.
+const OVERFLOW: f64 = 88.0;
+/// Largest difference of an activation written out, as a part of its value or of 1.
 const DIFFERENCE: f64 = 1e-6;
 /// Activations that are written out: those of a single form.
 const WRITTEN_OUT: [Activation; 8] = [
@@ -46,6 +48,18 @@ impl Each {
         }
     }
 
+    /// Whether it cuts off at another number than 0.
+    fn is_clip(self) -> bool {
+        let cuts = |limit: f64| limit.is_finite() && limit != 0.0;
+        match self {
+            Self::Clamp { low, high } => cuts(low) || cuts(high),
+            Self::Activation(activation) => {
+                matches!(activation, Activation::Hardtanh { .. } | Activation::Relu6)
+            }
+            Self::Affine { .. } => false,
+        }
+    }
+
     /// The value at `x`.
     fn apply(self, x: f64) -> f64 {
         match self {
@@ -63,12 +77,14 @@ pub(super) struct Expression {
     steps: Option<Vec<Each>>,
     /// Its values at the numbers of [`seen`].
     values: Box<[f64; SEEN]>,
+    /// Whether it is cut off somewhere, which its values need not show.
+    is_clipped: bool,
 }
 
 impl Expression {
     /// The number itself.
     pub(super) fn plain() -> Self {
-        Self { steps: Some(Vec::new()), values: Box::new(seen()) }
+        Self { steps: Some(Vec::new()), values: Box::new(seen()), is_clipped: false }
     }
 
     /// Its operations one after the other; `None` for an expression that is no activation.
@@ -79,6 +95,7 @@ impl Expression {
     /// The same with one more operation.
     pub(super) fn then(mut self, each: Each) -> Self {
         *self.values = self.values.map(|x| each.apply(x));
+        self.is_clipped |= each.is_clip();
         match &mut self.steps {
             Some(steps) => {
                 steps.push(each);
@@ -91,22 +108,28 @@ impl Expression {
 
     /// A function that is no activation of its value.
     pub(super) fn through(self, f: impl Fn(f64) -> f64) -> Self {
-        Self { steps: None, values: Box::new(self.values.map(f)) }.known()
+        Self { steps: None, values: Box::new(self.values.map(f)), ..self }.known()
     }
 
     /// `f` of it and another of the same number.
     pub(super) fn with(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
         let values = Box::new(from_fn(|i| f(self.values[i], other.values[i])));
-        Self { steps: None, values }.known()
+        let is_clipped = self.is_clipped || other.is_clipped;
+        Self { steps: None, values, is_clipped }.known()
     }
 
     /// The same as the activation that its values are those of, if there is one.
     fn known(mut self) -> Self {
+        if self.is_clipped {
+            return self;
+        }
         let inputs = seen();
         let is = |activation: &&Activation| {
             inputs.iter().zip(self.values.iter()).all(|(&x, value)| {
                 let expected: f64 = activation.apply(x);
-                (value - expected).abs() <= DIFFERENCE * x.abs().max(1.0)
+                let near = (value - expected).abs() <= DIFFERENCE * expected.abs().max(1.0);
+                // An exponential written out leaves the range of floats there.
+                near || (x.abs() > OVERFLOW && !value.is_finite())
             })
         };
         if let Some(activation) = WRITTEN_OUT.iter().find(is) {
@@ -138,8 +161,8 @@ fn seen() -> [f64; SEEN] {
     from_fn(|i| {
         let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
         let at = (i / 2) as f64;
-        // Even steps up to 8, where activations bend, and a few beyond.
-        sign * if at < 80.0 { at / 10.0 } else { 1.3 * (at - 74.0) }
+        // Even steps up to 8, where activations bend, and from 10 to a million.
+        sign * if at < 80.0 { at / 10.0 } else { 10.0_f64.powf(1.0 + (at - 80.0) / 3.0) }
     })
 }
 

@@ -37,25 +37,31 @@ pub(super) fn read(bytes: &[u8], asked: &[String], cast: Cast) -> Result<Importe
     if graph.nodes.len() > MOST_NODES {
         return Err(format!("{} operations; at most {MOST_NODES} are read", graph.nodes.len()));
     }
+    graph.distinct()?;
     let output = output(graph, asked)?;
-    let needed = needed(graph, output)?;
+    let needed = needed(graph, output);
     let input = graph.input()?;
-    let walk = Walk::of(draft(&written, input.width)?);
-    let values = HashMap::from([(input.name, walk.number(input.is_flat))]);
+    let walk = Walk::of(draft(&written, input.form.width())?);
+    let values = HashMap::from([(input.name, walk.number(input.form))]);
     let mut run = Run { walk, values, made: 0, cast };
     for (name, tensor) in graph.tensors().filter(|(name, _)| needed.names.contains(name)) {
         let array = tensor.array(cast).map_err(|problem| format!("`{name}`: {problem}"))?;
         run.values.insert(name, Value::Constant(array));
     }
     for node in needed.nodes {
-        run.node(node)
-            .map_err(|problem| told(graph, &format!("operation `{}`", node.operation), problem))?;
+        run.node(node).map_err(|problem| told(graph, &place(node), problem))?;
     }
     let last = run.value(output).map_err(|problem| told(graph, "the output", problem))?;
     let Some(Value::Number(last)) = last else {
         return Err(format!("the output `{output}` does not depend on the input"));
     };
     let Run { mut walk, .. } = run;
+    if !last.form.is_in_order() {
+        return Err(format!(
+            "the output is {}: transposed, it does not count inputs first",
+            last.form
+        ));
+    }
     walk.close(last, None).map_err(|problem| told(graph, "the output", problem))?;
     let floats =
         graph.tensors().filter(|(name, tensor)| !needed.names.contains(name) && tensor.is_float());
@@ -108,22 +114,26 @@ struct Needed<'g> {
 }
 
 /// What `output` needs.
-fn needed<'g>(graph: &'g Graph, output: &'g str) -> Result<Needed<'g>, String> {
+fn needed<'g>(graph: &'g Graph, output: &'g str) -> Needed<'g> {
     let mut names = HashSet::from([output]);
     let mut nodes = Vec::new();
-    let mut given = HashSet::new();
     for node in graph.nodes.iter().rev() {
         if !node.outputs.iter().any(|name| names.contains(name.as_str())) {
             continue;
-        }
-        if let Some(twice) = node.outputs.iter().find(|name| !given.insert(name.as_str())) {
-            return Err(format!("two operations give `{twice}`"));
         }
         names.extend(node.inputs.iter().map(String::as_str).filter(|name| !name.is_empty()));
         nodes.push(node);
     }
     nodes.reverse();
-    Ok(Needed { nodes, names })
+    Needed { nodes, names }
+}
+
+/// The operation `node` in words.
+fn place(node: &Node) -> String {
+    match node.is_standard() {
+        true => format!("operation `{}`", node.operation),
+        false => format!("operation `{}` of the domain `{}`", node.operation, node.domain),
+    }
 }
 
 /// A problem at `place`; of a value that was gone on from already, what goes on from it.

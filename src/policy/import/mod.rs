@@ -3,6 +3,7 @@
 //! Nothing in a file is executed, and no length in it decides how much memory is taken.
 
 mod archive;
+mod arrange;
 mod array;
 mod calls;
 mod checkpoint;
@@ -12,6 +13,7 @@ mod constants;
 mod draft;
 mod elementwise;
 mod foreign;
+mod form;
 mod format;
 mod graph;
 mod kind;

@@ -1,24 +1,30 @@
 //! ONNX files read: what a graph begins and ends with, the attributes of its nodes, and its numbers.
 
+use std::collections::HashMap;
+
 use prost::Message;
 
 use super::array::Array;
+use super::form::Form;
 use super::kind::{Cast, FloatReader, Kind};
 use crate::policy::export::PRODUCER;
-use crate::policy::onnx::{Attribute, Entry, Graph, Length, Model, Named, Node, Tensor};
+use crate::policy::onnx::{Attribute, Entry, Graph, Model, Named, Node, Tensor};
 
 /// The numbers of two kinds of integers.
 const INT32: i32 = 6;
 const INT64: i32 = 7;
 
+/// What gives a value that is neither an input nor a tensor.
+const OPERATION: &str = "what an operation gives";
+/// Most numbers of one input, which a graph claims without having them.
+const MOST_INPUTS: usize = 1 << 16;
+
 /// The value that a graph begins with.
 pub(super) struct Input<'a> {
     /// Its name.
     pub(super) name: &'a str,
-    /// Numbers of one input, where the graph says it.
-    pub(super) width: Option<usize>,
-    /// Whether it has two dimensions: inputs, and their numbers.
-    pub(super) is_flat: bool,
+    /// Its dimensions.
+    pub(super) form: Form,
 }
 
 /// A graph, and what its file says about it.
@@ -69,8 +75,18 @@ impl Graph {
         let inputs: Vec<&Named> = self.inputs.iter().filter(|input| !tensor(input)).collect();
         match inputs.as_slice() {
             [input] => {
-                let is_flat = input.lengths().is_some_and(|lengths| lengths.len() == 2);
-                Ok(Input { name: &input.name, width: input.width(), is_flat })
+                let form = input.form();
+                if let Some(width) = form.width().filter(|width| *width > MOST_INPUTS) {
+                    return Err(format!(
+                        "the input `{}` has {width} numbers; at most {MOST_INPUTS} are read",
+                        input.name
+                    ));
+                }
+                Ok(Input { name: &input.name, form })
+            }
+            [] => {
+                Err("no input: it has none, or all are tensors that it carries; a policy has one"
+                    .to_owned())
             }
             several => {
                 let names: Vec<&str> = several.iter().map(|input| input.name.as_str()).collect();
@@ -82,6 +98,37 @@ impl Graph {
         }
     }
 
+    /// Refuses names that stand for two values.
+    ///
+    /// # Errors
+    /// A sentence with the name.
+    pub(super) fn distinct(&self) -> Result<(), String> {
+        let mut given = HashMap::new();
+        for (name, _) in self.tensors().filter(|(name, _)| !name.is_empty()) {
+            if given.insert(name, "a tensor that the graph carries").is_some() {
+                return Err(format!("two tensors are called `{name}`"));
+            }
+        }
+        for input in &self.inputs {
+            given.entry(&input.name).or_insert("an input of the graph");
+        }
+        for node in &self.nodes {
+            for name in node.outputs.iter().filter(|name| !name.is_empty()) {
+                match given.insert(name, OPERATION) {
+                    Some(OPERATION) => return Err(format!("two operations give `{name}`")),
+                    Some(other) => {
+                        return Err(format!(
+                            "operation `{}` gives `{name}`, which is {other}",
+                            node.operation
+                        ));
+                    }
+                    None => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The names of the outputs.
     pub(super) fn outputs(&self) -> Vec<&str> {
         self.outputs.iter().map(|output| output.name.as_str()).collect()
@@ -89,31 +136,12 @@ impl Graph {
 }
 
 impl Named {
-    /// Its lengths, where the graph says how many there are.
-    fn lengths(&self) -> Option<&[Length]> {
-        Some(&self.kind.as_ref()?.tensor.as_ref()?.shape.as_ref()?.lengths)
-    }
-
-    /// Numbers of one value, where the first length counts values.
-    fn width(&self) -> Option<usize> {
-        let lengths = self.lengths()?;
-        let rest = if let [_, rest @ ..] = lengths
-            && !rest.is_empty()
-        {
-            rest
-        } else {
-            lengths
-        };
-        // One number after many inputs, or a column of numbers: what takes it says so.
-        if lengths.first().is_some_and(|first| first.value > 1)
-            && rest.iter().all(|length| length.value == 1)
-        {
-            return None;
-        }
-        rest.iter().try_fold(1, |n: usize, length| {
-            let length = usize::try_from(length.value).ok().filter(|length| *length > 0)?;
-            n.checked_mul(length)
-        })
+    /// Its dimensions.
+    fn form(&self) -> Form {
+        let shape = self.kind.as_ref().and_then(|kind| kind.tensor.as_ref()?.shape.as_ref());
+        let lengths: Option<Vec<i64>> =
+            shape.map(|shape| shape.lengths.iter().map(|length| length.value).collect());
+        Form::of(lengths.as_deref())
     }
 }
 
@@ -126,7 +154,7 @@ impl Node {
         match self.attributes.first() {
             Some(Attribute { tensor: Some(tensor), .. }) => tensor.array(cast),
             Some(value) => match value.name.as_str() {
-                "value_float" => Ok(Array::number(value.float.into())),
+                "value_float" => Ok(Array::number(value.float.unwrap_or_default().into())),
                 "value_int" => Ok(Array::number(value.integer as f64).integers(true)),
                 "value_floats" => Ok(Array::list(value.floats.iter().map(|&f| f.into()).collect())),
                 "value_ints" => {
@@ -146,7 +174,7 @@ impl Node {
 
     /// The float attribute `name`, if it is given.
     pub(super) fn float(&self, name: &str) -> Option<f32> {
-        self.attribute(name).map(|attribute| attribute.float)
+        self.attribute(name).map(|attribute| attribute.float.unwrap_or_default())
     }
 
     /// The integer attribute `name`, if it is given.
@@ -187,6 +215,7 @@ impl Tensor {
                 "its numbers are in another file; export with external_data=False".to_owned()
             );
         }
+        self.placed()?;
         let numbers = if self.is_float() { self.reals(cast)? } else { self.wholes()? };
         let shape: Option<Vec<usize>> =
             self.lengths.iter().map(|&length| usize::try_from(length).ok()).collect();
@@ -195,6 +224,26 @@ impl Tensor {
         array.ok_or_else(|| {
             format!("{} numbers do not fill the shape {:?}", numbers.len(), self.lengths)
         })
+    }
+
+    /// Refuses numbers that lie in two places, and bytes that are no whole numbers.
+    fn placed(&self) -> Result<(), String> {
+        let size = match self.data_type {
+            INT32 => 4,
+            INT64 => 8,
+            other => Kind::of_onnx(other).size().max(1),
+        };
+        let lists = [self.floats.len(), self.small.len(), self.integers.len(), self.doubles.len()];
+        match self.raw.len() {
+            0 => Ok(()),
+            _ if lists != [0; 4] => {
+                Err("its numbers are there twice, as bytes and as a list".to_owned())
+            }
+            bytes if bytes % size > 0 => {
+                Err(format!("its {bytes} bytes are no whole numbers of {size} bytes each"))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn reals(&self, cast: Cast) -> Result<Vec<f64>, String> {

@@ -1,5 +1,6 @@
 //! What each operation of a graph does to a network.
 
+use super::arrange;
 use super::array::Array;
 use super::draft::Step;
 use super::elementwise::{Each, erf};
@@ -78,9 +79,9 @@ pub(super) fn apply(
     let rest: Vec<Option<Value>> = inputs.collect();
     let known = OPERATIONS.iter().any(|name| name.split(' ').next() == Some(operation));
     let number = match first {
-        Value::Number(number) if operation == "Shape" => return Ok(vec![walk.sizes(&number)]),
+        Value::Number(number) if operation == "Shape" => return lengths(node, &number),
         Value::Number(number) => number,
-        Value::Sizes => return Ok(vec![Value::Sizes]),
+        Value::Sizes => return sizes(&rest),
         Value::Constant(constant) => return from_constant(walk, node, constant, rest),
     };
     if !known {
@@ -89,21 +90,18 @@ pub(super) fn apply(
     let one = |value: Result<Value, Problem>| value.map(|value| vec![value]);
     match operation {
         "Identity" | "Dropout" => Ok(vec![Value::Number(number)]),
-        "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" => {
-            let is_flat = operation == "Flatten" && node.integer("axis").unwrap_or(1) == 1;
-            Ok(vec![Value::Number(Number { is_flat, ..number })])
+        "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" | "Transpose" => {
+            one(arrange::apply(node, number, &rest))
         }
         "Cast" if FLOATS.contains(&node.integer("to").unwrap_or(1)) => {
             Ok(vec![Value::Number(number)])
         }
         "Cast" => Err("to another kind of number".into()),
-        "Transpose" => one(transposed(node, number)),
         "Gemm" => one(gemm(walk, node, number, &rest)),
         "MatMul" => one(product(walk, node, number, constant(&rest, 0)?)),
         "Conv" => one(convolution(walk, node, number, &rest)),
-        "Add" | "Sub" | "Mul" | "Div" | "Max" | "Min" | "Pow" => {
-            one(binary(walk, node, number, &rest))
-        }
+        "Max" | "Min" => one(extreme(walk, node, number, rest)),
+        "Add" | "Sub" | "Mul" | "Div" | "Pow" => one(binary(walk, node, number, &rest)),
         "PRelu" => one(leaky(number, constant(&rest, 0)?)),
         "Clip" => one(clip(walk, node, number, &rest)),
         "BatchNormalization" => one(batch_norm(walk, node, number, &rest)),
@@ -120,27 +118,52 @@ fn from_constant(
     constant: Array,
     mut rest: Vec<Option<Value>>,
 ) -> Result<Vec<Value>, Problem> {
-    let number = match rest.first_mut().map(Option::take) {
-        Some(Some(Value::Number(number))) => number,
-        // Lengths, put together with others.
-        _ => return Ok(vec![Value::Sizes]),
+    let is_number = |value: &Option<Value>| matches!(value, Some(Value::Number(_)));
+    let first = rest.iter().position(is_number);
+    // Lengths, put together with others.
+    let Some(first) = first else { return sizes(&rest) };
+    let constant = Some(Value::Constant(constant));
+    let Some(Value::Number(number)) = std::mem::replace(&mut rest[first], constant.clone()) else {
+        return Err(Problem::Unknown);
     };
-    let value = match node.operation.as_str() {
-        "Add" | "Mul" | "Max" | "Min" => {
-            binary(walk, node, number, &[Some(Value::Constant(constant))])
-        }
+    let operation = node.operation.as_str();
+    if matches!(operation, "Max" | "Min") {
+        return extreme(walk, node, number, rest).map(|value| vec![value]);
+    }
+    if first > 0 {
+        return Err("of a constant and a value, in this order".into());
+    }
+    let Some(Value::Constant(constant)) = constant else { return Err(Problem::Unknown) };
+    let value = match operation {
+        "Add" | "Mul" => binary(walk, node, number, &[Some(Value::Constant(constant))]),
         "Sub" => {
             let turned = then(number, Each::Affine { scale: -1.0, shift: 0.0 });
-            add(walk, turned, &constant)
+            add(walk, turned.beside(&constant)?, &constant)
         }
         "Div" if constant.uniform().is_some() => {
             let one = constant.uniform().unwrap_or_default();
-            Ok(through(number, move |x| one / x))
+            Ok(through(number.beside(&constant)?, move |x| one / x))
         }
         "MatMul" => left_product(walk, node, number, &constant),
         _ => Err("of a constant and a value, in this order".into()),
     };
     value.map(|value| vec![value])
+}
+
+/// The lengths of a value.
+fn lengths(node: &Node, number: &Number) -> Result<Vec<Value>, Problem> {
+    match (node.integer("start"), node.integer("end")) {
+        (None | Some(0), None) => Ok(vec![Walk::sizes(number)]),
+        _ => Err("of some dimensions alone".into()),
+    }
+}
+
+/// What an operation makes of lengths that are not all known: others of them, as long as no number is among them.
+fn sizes(rest: &[Option<Value>]) -> Result<Vec<Value>, Problem> {
+    match rest.iter().any(|value| matches!(value, Some(Value::Number(_)))) {
+        true => Err("of lengths and a value".into()),
+        false => Ok(vec![Value::Sizes]),
+    }
 }
 
 /// The value with one more operation.
@@ -202,9 +225,10 @@ fn binary(
 ) -> Result<Value, Problem> {
     let operation = node.operation.as_str();
     if let Some(Some(Value::Number(other))) = rest.first() {
-        return both(node, number, other);
+        return both(node, number, other).map(Value::Number);
     }
     let other = constant(rest, 0)?;
+    let number = number.beside(other)?;
     match operation {
         "Add" => add(walk, number, other),
         "Sub" => add(walk, number, &other.each(|x| -x)),
@@ -219,10 +243,39 @@ fn binary(
     }
 }
 
+/// `Max` or `Min` of a value and any number of others: first of those of the same number, then of the constants.
+fn extreme(
+    walk: &mut Walk,
+    node: &Node,
+    number: Number,
+    rest: Vec<Option<Value>>,
+) -> Result<Value, Problem> {
+    let pick = if node.operation == "Max" { f64::max } else { f64::min };
+    let (mut value, mut limit) = (number, None::<Array>);
+    for other in rest.into_iter().flatten() {
+        match other {
+            Value::Number(other) => value = both(node, value, &other)?,
+            Value::Constant(other) => {
+                let joint = limit.as_ref().map_or(Some(other.clone()), |a| a.with(&other, pick));
+                limit = Some(joint.ok_or("of constants whose shapes do not go together")?);
+            }
+            Value::Sizes => return Err("of lengths and a value".into()),
+        }
+    }
+    match limit {
+        Some(limit) => binary(walk, node, value, &[Some(Value::Constant(limit))]),
+        None => Ok(Value::Number(value)),
+    }
+}
+
 /// An operation of two expressions of the same number.
-fn both(node: &Node, number: Number, other: &Number) -> Result<Value, Problem> {
+fn both(node: &Node, number: Number, other: &Number) -> Result<Number, Problem> {
     if number.rows != other.rows {
         return Err("of two parts of the same value".into());
+    }
+    if number.form != other.form {
+        let (one, other) = (&number.form, &other.form);
+        return Err(format!("of a value {one} and the same as {other}").into());
     }
     let f = match node.operation.as_str() {
         "Add" => |a, b| a + b,
@@ -234,7 +287,7 @@ fn both(node: &Node, number: Number, other: &Number) -> Result<Value, Problem> {
         _ => return Err("of two values that both depend on the input".into()),
     };
     let expression = number.expression.with(&other.expression, f);
-    Ok(Value::Number(Number { expression, ..number }))
+    Ok(Number { expression, ..number })
 }
 
 /// `number + constant`.
@@ -296,6 +349,7 @@ fn clip(
         Ok(optional(rest, i)?.cloned().or(attribute))
     };
     let (low, high) = (limit(0, "min")?, limit(1, "max")?);
+    let number = low.iter().chain(&high).try_fold(number, Number::beside)?;
     let one = |limit: &Option<Array>| limit.as_ref().and_then(Array::uniform);
     let activation = match (one(&low), one(&high)) {
         (Some(0.0), None) if high.is_none() => Activation::Relu,
@@ -310,16 +364,8 @@ fn clip(
 
 /// `PRelu` with one slope.
 fn leaky(number: Number, slope: &Array) -> Result<Value, Problem> {
+    let number = number.beside(slope)?;
     let slope = slope.uniform().ok_or("with slopes that differ")?;
     let activation = Activation::LeakyRelu { slope: slope as f32 };
     Ok(Value::Number(then(number, Each::Activation(activation))))
-}
-
-/// `Transpose`, which leaves a row or a column what it is.
-fn transposed(node: &Node, number: Number) -> Result<Value, Problem> {
-    match node.integers("perm") {
-        None | Some([1, 0]) => Ok(Value::Number(Number { is_flat: false, ..number })),
-        Some(order) if order.iter().copied().eq(0..order.len() as i64) => Ok(Value::Number(number)),
-        Some(order) => Err(format!("of a value, with the order {order:?}").into()),
-    }
 }

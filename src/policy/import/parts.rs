@@ -16,53 +16,79 @@ pub(super) fn apply(
     number: Number,
     rest: &[Option<Value>],
 ) -> Result<Vec<Value>, Problem> {
+    let axis = axis(node, &number, rest)?;
+    number.form.along(axis)?;
     let all = match &number.rows {
         Some(rows) => rows.clone(),
         None => {
-            let width = walk.draft.width().filter(|width| *width <= MOST);
-            (0..width.ok_or("of an input of unknown width")?).collect()
+            let width = walk.draft.width().ok_or("of an input of unknown width")?;
+            few(width)?;
+            (0..width).collect()
         }
     };
+    let unknown = |value: &Option<Value>| match value {
+        Some(Value::Constant(array)) => array.numbers.iter().any(|number| number.is_nan()),
+        Some(_) => true,
+        None => false,
+    };
+    if rest.iter().any(unknown) {
+        return Err("whose ends are not known: they depend on the input, or count inputs".into());
+    }
     let wholes = |i: usize, name: &str| match rest.get(i) {
         Some(Some(Value::Constant(array))) => Some(array.wholes()),
         _ => node.integers(name).map(<[i64]>::to_vec),
     };
     let parts = match node.operation.as_str() {
-        "Split" => {
-            last(node.integer("axis").unwrap_or(0))?;
-            split(&all, wholes(0, "split"), node.outputs.len())
-        }
+        "Split" => split(&all, wholes(0, "split"), node.outputs.len()),
         "Slice" => {
-            let axes = wholes(2, "axes").ok_or("without an axis")?;
-            axes.iter().try_for_each(|&axis| last(axis))?;
             let steps = wholes(3, "steps").unwrap_or_default();
             let one = |all: Option<Vec<i64>>| all.filter(|all| all.len() == 1).map(|all| all[0]);
             let ends = one(wholes(0, "starts")).zip(one(wholes(1, "ends")));
-            let ends = ends.filter(|_| steps.iter().all(|&step| step == 1) && axes.len() == 1);
+            let ends = ends.filter(|_| steps.iter().all(|&step| step == 1));
             ends.map(|(start, end)| vec![slice(&all, start, end)])
         }
         _ => {
-            last(node.integer("axis").unwrap_or(0))?;
             let picks = constant(rest, 0)?.wholes();
+            few(picks.len())?;
             let pick = |&i: &i64| all.get(place(i, all.len())?).copied();
             let picked = picks.iter().map(pick).collect::<Option<Vec<usize>>>();
-            picked.filter(|rows| rows.len() <= MOST).map(|rows| vec![rows])
+            picked.map(|rows| vec![rows])
         }
     };
     let parts = parts.filter(|parts| parts.iter().all(|rows| !rows.is_empty()));
     let parts = parts.ok_or("a part that is not there")?;
-    Ok(parts
-        .into_iter()
-        .map(|rows| Value::Number(Number { rows: Some(rows), ..number.clone() }))
-        .collect())
+    let picked = match node.operation.as_str() {
+        "Gather" => Some(constant(rest, 0)?.shape.clone()),
+        _ => None,
+    };
+    let part = |rows: Vec<usize>| {
+        let lengths = picked.clone().unwrap_or_else(|| vec![rows.len()]);
+        let form = number.form.clone().replaced(axis, &lengths);
+        Value::Number(Number { rows: Some(rows), form, ..number.clone() })
+    };
+    Ok(parts.into_iter().map(part).collect())
 }
 
-/// Refuses another dimension than the last: the first counts inputs.
-fn last(axis: i64) -> Result<(), Problem> {
-    match axis {
-        0 => Err("of the dimension that counts inputs".into()),
-        -1 | 1.. => Ok(()),
-        _ => Err("of another dimension than the last".into()),
+/// The dimension of which a part is taken.
+fn axis(node: &Node, number: &Number, rest: &[Option<Value>]) -> Result<usize, Problem> {
+    let axis = match (node.operation.as_str(), rest.get(2)) {
+        ("Slice", Some(Some(Value::Constant(axes)))) => one(&axes.wholes()),
+        ("Slice", _) => node.integers("axes").and_then(one),
+        _ => Some(node.integer("axis").unwrap_or(0)),
+    };
+    Ok(number.form.axis(axis.ok_or("not of one axis")?)?)
+}
+
+/// The only one of them.
+fn one(all: &[i64]) -> Option<i64> {
+    if let [one] = all { Some(*one) } else { None }
+}
+
+/// Refuses a part of more than [`MOST`] numbers.
+fn few(count: usize) -> Result<(), Problem> {
+    match count <= MOST {
+        true => Ok(()),
+        false => Err(format!("with a part of {count} numbers; at most {MOST} are taken").into()),
     }
 }
 

@@ -3,13 +3,14 @@
 use super::array::Array;
 use super::draft::{Draft, Step};
 use super::elementwise::Expression;
+use super::form::Form;
 
 /// A value of a graph.
 #[derive(Clone, Debug)]
 pub(super) enum Value {
     /// Numbers that do not depend on the input.
     Constant(Array),
-    /// Lengths of what depends on the input: they keep its numbers as they are.
+    /// Lengths of what depends on the input, which are not all known.
     Sizes,
     /// What the network has made of the input so far.
     Number(Number),
@@ -24,8 +25,15 @@ pub(super) struct Number {
     pub(super) expression: Expression,
     /// Which of the numbers, where some are left out.
     pub(super) rows: Option<Vec<usize>>,
-    /// Whether it is known to have two dimensions: inputs, and their numbers.
-    pub(super) is_flat: bool,
+    /// Its dimensions.
+    pub(super) form: Form,
+}
+
+impl Number {
+    /// The same next to a constant, which leaves it as many numbers as it has.
+    pub(super) fn beside(self, constant: &Array) -> Result<Self, Problem> {
+        Ok(Self { form: self.form.beside(constant)?, ..self })
+    }
 }
 
 /// A graph on the way to a network.
@@ -67,17 +75,14 @@ impl Walk {
     }
 
     /// What the network gives so far.
-    pub(super) fn number(&self, is_flat: bool) -> Value {
-        Value::Number(Number { at: self.at, expression: Expression::plain(), rows: None, is_flat })
+    pub(super) fn number(&self, form: Form) -> Value {
+        Value::Number(Number { at: self.at, expression: Expression::plain(), rows: None, form })
     }
 
     /// The lengths of a value, that of the inputs not a number; where they are not known, that they are lengths.
-    pub(super) fn sizes(&self, number: &Number) -> Value {
-        let width = number.rows.as_ref().map_or(self.draft.width(), |rows| Some(rows.len()));
-        match width.filter(|_| number.is_flat) {
-            Some(width) => {
-                Value::Constant(Array::list(vec![f64::NAN, width as f64]).integers(true))
-            }
+    pub(super) fn sizes(number: &Number) -> Value {
+        match number.form.sizes() {
+            Some(sizes) => Value::Constant(Array::list(sizes).integers(true)),
             None => Value::Sizes,
         }
     }
@@ -121,10 +126,10 @@ impl Walk {
         if width == 0 {
             return Err("with a constant that has no numbers".into());
         }
-        let is_flat = number.is_flat;
+        let form = number.form.clone();
         self.close(number, Some(width))?;
         self.draft.push(step)?;
-        Ok(self.number(is_flat))
+        Ok(self.number(form))
     }
 }
 

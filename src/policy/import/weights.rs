@@ -15,7 +15,9 @@ pub(super) fn product(
     weight: &Array,
 ) -> Result<Value, Problem> {
     let [inputs, outputs] = sides(&node.inputs[1], weight)?;
-    layer(walk, &node.inputs[1], number, Linear::transposed(&weight.numbers, [inputs, outputs]))
+    let linear = Linear::transposed(&weight.numbers, [inputs, outputs]);
+    let axis = number.form.axis(-1)?;
+    layer(walk, &node.inputs[1], along(number, axis, outputs)?, linear)
 }
 
 /// A product with a weight `[outputs, inputs]` on the left of the value.
@@ -25,7 +27,11 @@ pub(super) fn left_product(
     number: Number,
     weight: &Array,
 ) -> Result<Value, Problem> {
-    let [_, inputs] = sides(&node.inputs[0], weight)?;
+    let [outputs, inputs] = sides(&node.inputs[0], weight)?;
+    let number = Number { form: number.form.as_column(), ..number };
+    // The last dimension but one, or the only one.
+    let axis = number.form.rank().saturating_sub(2);
+    let number = along(number, axis, outputs)?;
     layer(walk, &node.inputs[0], number, Linear::new(weight.numbers.clone(), inputs))
 }
 
@@ -47,13 +53,17 @@ pub(super) fn gemm(
         0 => Linear::transposed(&scaled, [rows, columns]),
         _ => Linear::new(scaled, columns),
     };
+    if number.form.rank() != 2 {
+        return Err(format!("of a value {}; it takes matrices alone", number.form).into());
+    }
+    let mut number = along(number, 1, linear.outputs())?;
     if let Some(bias) = optional(rest, 1)? {
+        number = number.beside(bias)?;
         let beta = f64::from(node.float("beta").unwrap_or(1.0));
         linear.bias = bias_of(&node.inputs[2], bias, linear.outputs())?;
         linear.bias.iter_mut().for_each(|bias| *bias *= beta);
     }
-    // A `Gemm` is of matrices alone.
-    layer(walk, &node.inputs[1], Number { is_flat: true, ..number }, linear)
+    layer(walk, &node.inputs[1], number, linear)
 }
 
 /// `Conv` whose kernel is as large as the input: each channel that comes out is one number.
@@ -72,6 +82,9 @@ pub(super) fn convolution(
         _ => return Err(format!("`{}` has shape {:?}", node.inputs[1], weight.shape).into()),
     };
     let whole = walk.draft.width() == Some(inputs) && plain("pads", 0) && plain("dilations", 1);
+    if !matches!(node.text("auto_pad"), "" | "NOTSET" | "VALID") {
+        return Err(format!("with auto_pad {}", node.text("auto_pad")).into());
+    }
     if !whole || node.integer("group").unwrap_or(1) != 1 || weight.numbers.is_empty() {
         return Err("whose kernel is not as large as its input".into());
     }
@@ -79,7 +92,15 @@ pub(super) fn convolution(
     if let Some(bias) = optional(rest, 1)? {
         linear.bias = bias_of(&node.inputs[2], bias, outputs)?;
     }
-    layer(walk, &node.inputs[1], number, linear)
+    let form = number.form.convolved(&weight.shape)?;
+    layer(walk, &node.inputs[1], Number { form, ..number }, linear)
+}
+
+/// The value whose numbers lie along a dimension, which becomes one of `outputs` numbers.
+fn along(number: Number, axis: usize, outputs: usize) -> Result<Number, Problem> {
+    number.form.along(axis)?;
+    let form = number.form.replaced(axis, &[outputs]);
+    Ok(Number { form, ..number })
 }
 
 /// Adds a layer with the weight `name`.
@@ -117,6 +138,10 @@ pub(super) fn batch_norm(
     number: Number,
     rest: &[Option<Value>],
 ) -> Result<Value, Problem> {
+    if node.integer("training_mode").unwrap_or(0) != 0 || node.outputs.len() > 1 {
+        return Err("in training mode, where it takes statistics of the inputs; export the model in eval mode".into());
+    }
+    number.form.along(1)?;
     let epsilon = f64::from(node.float("epsilon").unwrap_or(1e-5));
     let [scale, shift, mean, variance] =
         [constant(rest, 0)?, constant(rest, 1)?, constant(rest, 2)?, constant(rest, 3)?];
@@ -138,7 +163,9 @@ pub(super) fn layer_norm(
     number: Number,
     rest: &[Option<Value>],
 ) -> Result<Value, Problem> {
-    if !matches!(node.integer("axis").unwrap_or(-1), -1 | 1) {
+    let axis = number.form.axis(node.integer("axis").unwrap_or(-1))?;
+    number.form.along(axis)?;
+    if axis + 1 != number.form.rank() {
         return Err("over something else than the last dimension".into());
     }
     let scale = constant(rest, 0)?.numbers.clone();
