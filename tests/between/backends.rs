@@ -21,17 +21,25 @@ fn close(found: f32, wanted: f64, about: &str) -> Result<(), String> {
     near.then_some(()).ok_or_else(|| format!("{about}: {found}, not {wanted}"))
 }
 
-fn task_of<'a>(tightening: &'a Tightening, query: Query) -> ReachAvoidTask<'a> {
-    ReachAvoidTask { starts: starts(), range: 0..STARTS, spec: spec(), tightening, query }
+/// The measures or signs of the first `count` starts.
+fn found_of(
+    backend: &Backend,
+    plant: &Plant,
+    query: Query,
+    count: u64,
+) -> Result<Vec<f32>, String> {
+    let (losses, range) = (losses(), 0..count);
+    let program = backend.prepare(plant).map_err(|e| e.to_string())?;
+    let (starts, spec, tightening) = (starts(), spec(), &losses);
+    let task = ReachAvoidTask { starts, range: range.clone(), spec, tightening, query };
+    let tally = program.tally(&task, Keep::Measures);
+    let found = tally.and_then(|tally| tally.finish(range));
+    found.map(|found| found.values).map_err(|e| e.to_string())
 }
 
-/// The measures or signs of all starts.
+/// Those of all starts.
 fn found(backend: &Backend, plant: &Plant, query: Query) -> Result<Vec<f32>, String> {
-    let losses = losses();
-    let program = backend.prepare(plant).map_err(|e| e.to_string())?;
-    let tally = program.tally(&task_of(&losses, query), Keep::Measures);
-    let found = tally.and_then(|tally| tally.finish(0..STARTS));
-    found.map(|found| found.values).map_err(|e| e.to_string())
+    found_of(backend, plant, query, STARTS)
 }
 
 /// Whether measures and signs of a task on `backend` are those of its definition.
@@ -153,7 +161,8 @@ fn signs_of_plants_that_change_with_the_time_are_those_of_measures() {
     let text = format!("{ELLIPSE}[model.task]\n{lines}{TARGET}{CONSTRAINT}{POLICY}");
     let plant = plant(&text.replace("0.5 * sin(3 * t)", "5 * sin(3 * t)")).expect("a plant");
     for backend in backends() {
-        let of = |query| found(&backend, &plant, query).expect("run");
+        // More than a tile of any width holds, so that lanes change hands.
+        let of = |query| found_of(&backend, &plant, query, 40_000).expect("run");
         let signs: Vec<bool> = of(Query::Sign).iter().map(|sign| *sign > 0.0).collect();
         let measures: Vec<bool> = of(Query::Measure).iter().map(|measure| *measure > 0.0).collect();
         assert_eq!(signs, measures, "{}", backend.name());
