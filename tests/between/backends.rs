@@ -157,15 +157,16 @@ fn every_kind_is_its_definition_on_every_backend() {
 /// read the time are those of their measures.
 #[test]
 fn signs_of_plants_that_change_with_the_time_are_those_of_measures() {
-    let lines = "kind = \"reach-avoid\"\n";
-    let text = format!("{ELLIPSE}[model.task]\n{lines}{TARGET}{CONSTRAINT}{POLICY}");
-    let plant = plant(&text.replace("0.5 * sin(3 * t)", "5 * sin(3 * t)")).expect("a plant");
-    for backend in backends() {
-        // More than a tile of any width holds, so that lanes change hands.
-        let of = |query| found_of(&backend, &plant, query, 40_000).expect("run");
-        let signs: Vec<bool> = of(Query::Sign).iter().map(|sign| *sign > 0.0).collect();
-        let measures: Vec<bool> = of(Query::Measure).iter().map(|measure| *measure > 0.0).collect();
-        assert_eq!(signs, measures, "{}", backend.name());
+    for lines in ["kind = \"reach-avoid\"\n", "kind = \"reach-avoid\"\nbetween = 3\n"] {
+        let text = format!("{ELLIPSE}[model.task]\n{lines}{TARGET}{CONSTRAINT}{POLICY}");
+        let plant = plant(&text.replace("0.5 * sin(3 * t)", "5 * sin(3 * t)")).expect("a plant");
+        for backend in backends() {
+            // More than a tile of any width holds, so that lanes change hands.
+            let of = |query| found_of(&backend, &plant, query, 40_000).expect("run");
+            let positive = |found: Vec<f32>| found.iter().map(|g| *g > 0.0).collect::<Vec<_>>();
+            let [signs, measures] = [Query::Sign, Query::Measure].map(|query| positive(of(query)));
+            assert_eq!(signs, measures, "{} {lines}", backend.name());
+        }
     }
 }
 

@@ -1,9 +1,11 @@
 //! In f64: every kind of task, margin drops, scores, tubes, and what training ascends.
 
+use reachcast::model::Interface;
 use reachcast::rollout::drops::Shapes;
 use reachcast::rollout::replay::{self, measure_of, pair_margins, states_margins};
 use reachcast::rollout::{NON_FINITE, PairControl, Pairs, Tightening};
-use reachcast::train::soft::{Measured, measure_tape};
+use reachcast::train::soft::{Measured, further_tapes, measure_tape, step_tape};
+use reachcast::train::tape::Tape;
 use reachcast::tube::Tube;
 
 use crate::mathematics::{
@@ -66,6 +68,43 @@ fn samples_are_those_of_the_whole_step() {
             assert!(near(x[0], wanted[0]) && near(x[1], wanted[1]), "{x:?}, not {wanted:?}");
         }
     }
+}
+
+/// What a tape makes of these inputs.
+fn run(tape: &Tape, inputs: &[&[f64]]) -> Vec<f64> {
+    let mut values = Vec::new();
+    tape.forward(&inputs.concat(), 0.0, &mut values);
+    tape.read(&values).collect()
+}
+
+/// The parts of a period that training steps through lead from look to look.
+#[test]
+fn the_parts_of_training_are_the_looks_of_a_rollout() {
+    let mut compared = 0;
+    for between in BETWEEN {
+        let plant = Case { between, ..cases()[0] }.plant();
+        let (model, interface) = (&*plant.model, Interface::plain(&plant.model));
+        let (first, further) = (step_tape(model, &interface), further_tapes(model, &interface));
+        for i in 0..50 {
+            let looks = replay::looks::<f64>(&plant, &starts().start(i), HORIZON);
+            for (step, period) in (0..HORIZON).zip(looks.windows(between + 2).step_by(between + 1))
+            {
+                let (x, t) = (&period[0], [f64::from(step)]);
+                let u = plant.control(x, step);
+                let mut found = vec![run(&first, &[x, &u, &t])];
+                for part in &further {
+                    let last = found[found.len() - 1].clone();
+                    found.push(run(part, &[&last, x, &u, &t]));
+                }
+                assert_eq!(found.len(), between + 1);
+                for (found, wanted) in found.iter().flatten().zip(period[1..].iter().flatten()) {
+                    assert!(near(*found, *wanted) || wanted.is_nan(), "{found}, not {wanted}");
+                    compared += u32::from(wanted.is_finite());
+                }
+            }
+        }
+    }
+    assert!(compared > 1000, "{compared}");
 }
 
 /// The proof of margin drops, pair by pair: a pair whose drops are at most lambda, and whose nominal start is
