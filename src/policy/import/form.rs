@@ -100,7 +100,7 @@ impl Form {
     }
 
     /// The same as numbers of one input, where that may be meant.
-    pub(super) fn as_column(mut self) -> Self {
+    pub(super) fn into_column(mut self) -> Self {
         if let Some(count) = self.column.take() {
             let numbers = Length::Numbers(Some(count));
             self.lengths.iter_mut().filter(|l| **l == Length::Inputs).for_each(|l| *l = numbers);
@@ -115,7 +115,7 @@ impl Form {
     pub(super) fn beside(self, constant: &Array) -> Result<Self, String> {
         let Array { shape, .. } = constant;
         let several = shape.iter().any(|&length| length != 1);
-        let mut form = if several { self.as_column() } else { self };
+        let mut form = if several { self.into_column() } else { self };
         while form.rank() < shape.len() {
             form.lengths.insert(0, ONE);
         }
@@ -176,7 +176,7 @@ impl Form {
     /// Other lengths, in which -1 is what is left, 0 what was there, and what is no number the inputs.
     pub(super) fn reshaped(&self, wanted: &[f64]) -> Option<Self> {
         let rows = Self { column: None, ..self.clone() };
-        rows.filled(wanted).or_else(|| self.clone().as_column().filled(wanted))
+        rows.filled(wanted).or_else(|| self.clone().into_column().filled(wanted))
     }
 
     /// The same of a form that is clear.
@@ -237,7 +237,7 @@ impl Form {
 
     /// Its dimensions in another order, turned around if none is given; the numbers of an input keep theirs.
     pub(super) fn transposed(self, order: Option<&[i64]>) -> Option<Self> {
-        let form = self.as_column();
+        let form = self.into_column();
         let rank = form.rank();
         let order: Vec<usize> = match order {
             None => (0..rank).rev().collect(),

@@ -28,7 +28,7 @@ pub(super) fn left_product(
     weight: &Array,
 ) -> Result<Value, Problem> {
     let [outputs, inputs] = sides(&node.inputs[0], weight)?;
-    let number = Number { form: number.form.as_column(), ..number };
+    let number = Number { form: number.form.into_column(), ..number };
     // The last dimension but one, or the only one.
     let axis = number.form.rank().saturating_sub(2);
     let number = along(number, axis, outputs)?;
