@@ -45,16 +45,19 @@ pub(crate) fn interval([low, high]: [f64; 2]) -> String {
 }
 
 /// As [`upper`], for weights and their like, which are not taken for infinite because they are large.
+#[cfg(feature = "cli")]
 pub(crate) fn finite_upper(value: f64) -> String {
     finite(value, Rounding::Up)
 }
 
 /// As [`lower`], for weights and their like.
+#[cfg(feature = "cli")]
 pub(crate) fn finite_lower(value: f64) -> String {
     finite(value, Rounding::Down)
 }
 
 /// As [`interval`], for weights and their like.
+#[cfg(feature = "cli")]
 pub(crate) fn finite_interval([low, high]: [f64; 2]) -> String {
     format!("{} to {}", finite_lower(low), finite_upper(high))
 }

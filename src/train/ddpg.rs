@@ -18,8 +18,8 @@ use super::rows::Rows;
 use super::run::Learner;
 use super::score::{share, successes};
 use super::settings::DdpgSettings;
-use super::starts::check_stationary;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::model::Model;
 use crate::policy::{Activation, Mlp};
 use crate::rollout::{RolloutSpec, StateList, States, Stream};
 
@@ -57,7 +57,7 @@ impl<'a> Ddpg<'a> {
     /// Random networks, and plants at their starts.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for a model whose formulas read the time: the backup knows none.
+    /// [`Error::Invalid`] for a model whose formulas read the time: the backup knows none.
     pub fn new(task: Task<'a>, game: Game, settings: DdpgSettings) -> Result<Self> {
         check_stationary(&task.model)?;
         task.check_interface()?;
@@ -237,7 +237,7 @@ impl<'a> Ddpg<'a> {
     /// Control, disturbance and critic as the engine takes them.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if a parameter is not finite.
+    /// [`Error::Invalid`] if a parameter is not finite.
     pub fn exported(&self) -> Result<[Mlp; 3]> {
         let Task { model, interface, .. } = &self.task;
         let states: Vec<String> = model.states.iter().map(|axis| axis.name.clone()).collect();
@@ -252,6 +252,20 @@ impl<'a> Ddpg<'a> {
             self.critic.network.export(joint)?,
         ])
     }
+}
+
+/// Refuses a model whose formulas read the time, for what is learned of states alone, whenever they are
+/// met.
+///
+/// # Errors
+/// [`Error::Invalid`] saying so.
+fn check_stationary(model: &Model) -> Result<()> {
+    if model.is_stationary() {
+        return Ok(());
+    }
+    let problem = "its formulas read the time; train with `analytic`, `ppo`, `value` or `action-value`, which \
+                   know at which step a state is met, or make the time a state";
+    Err(Error::invalid("model", problem))
 }
 
 /// States and acts side by side.

@@ -1,7 +1,5 @@
 //! Where training draws its starts from: a mixture of boxes, each start a function of its index.
 
-use crate::error::{Error, Result};
-use crate::model::Model;
 use crate::rollout::{Purpose, Region, Starts, StateList, Stream};
 
 /// Boxes with the share of the starts that each gets.
@@ -33,18 +31,4 @@ impl Mixture {
         }
         starts
     }
-}
-
-/// Refuses a model whose formulas read the time, for what is learned of states alone, whenever they are
-/// met.
-///
-/// # Errors
-/// [`Error::Invalid`] saying so.
-pub(super) fn check_stationary(model: &Model) -> Result<()> {
-    if model.is_stationary() {
-        return Ok(());
-    }
-    let problem = "its formulas read the time; train with `analytic`, `ppo` or `value`, which know at \
-                   which step a state is met, or make the time a state";
-    Err(Error::invalid("model", problem))
 }
