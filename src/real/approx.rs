@@ -10,6 +10,8 @@ mod tests;
 
 use super::Real;
 pub(super) use angle::{acos, asin, atan, atan2, cos, principal_sin_cos, sin, tan, wrap};
+#[cfg(feature = "train")]
+pub(crate) use exponential::{NORMAL_END, NORMAL_SERIES};
 pub(super) use exponential::{
     exp, exp_m1_negative, exp_negative, ln, ln_unit, normal_share, parts, power, power_of_two,
     sigmoid, softplus_excess, tanh, unit_parts, whole_power,

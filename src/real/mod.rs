@@ -12,6 +12,8 @@ mod wide;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+#[cfg(feature = "train")]
+pub(crate) use approx::{NORMAL_END, NORMAL_SERIES};
 pub use lanes::Lanes;
 pub(crate) use lanes::per_lane;
 pub(crate) use vector::{Vector, load_rows, store_rows};

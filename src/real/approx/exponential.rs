@@ -75,21 +75,24 @@ pub(in crate::real) fn softplus_excess<R: Real>(x: R) -> R {
     (ratio + ratio) * (R::lit(1.0) + square * series)
 }
 
-/// `erf(x / sqrt(2))` as the hyperbolic tangent of an odd polynomial, fitted to relative error 1e-7; 1 from 5.65
-/// on, where the truth is 1.6e-8 below.
+/// Of `erf(x / sqrt(2))` as the hyperbolic tangent of an odd polynomial: its coefficients, of x, x^3 and so on.
+pub(crate) const NORMAL_SERIES: [f32; 7] = [
+    0.79788463,
+    0.036334355,
+    -3.391_76e-5,
+    -5.4779685e-05,
+    3.8728052e-06,
+    -1.2524703e-07,
+    1.5673046e-09,
+];
+/// Where it ends: 1 from there on, where the truth is 1.6e-8 below.
+pub(crate) const NORMAL_END: f32 = 5.65;
+
+/// `erf(x / sqrt(2))`, fitted to relative error 1e-7.
 #[inline(always)]
 pub(in crate::real) fn normal_share<R: Real>(x: R) -> R {
-    let x = x.clamp(R::lit(-5.65), R::lit(5.65));
-    let series = [
-        0.79788463,
-        0.036334355,
-        -3.391_76e-5,
-        -5.4779685e-05,
-        3.8728052e-06,
-        -1.2524703e-07,
-        1.5673046e-09,
-    ];
-    tanh(x * polynomial(x * x, series))
+    let x = x.clamp(R::lit(-NORMAL_END), R::lit(NORMAL_END));
+    tanh(x * polynomial(x * x, NORMAL_SERIES))
 }
 
 /// Logistic function.
