@@ -218,11 +218,13 @@ fn what_cannot_be_trained_is_refused_by_name() {
     }
     let told = open + "[policy]\nact = { force = \"5 * out[0]\" }\n";
     assert!(problem(&told, &[]).contains("nothing"), "an open bound with `act`");
-    let found = problem(SLEDGE, &["train.method=ddpg"]);
+    let timed = SLEDGE.replace("\"avoid\"", "\"at-end\"\ntarget = \"0.5 - x^2\"");
+    let found = problem(&timed, &["train.method=ddpg"]);
     assert!(found.contains("`ddpg`") && found.contains("`ppo`"), "{found}");
     for method in ["train.method=ppo", "train.method=action-value"] {
-        assert!(problem(SLEDGE, &[method]).contains("nothing"));
+        assert!(problem(&timed, &[method]).contains("nothing"));
     }
+    assert!(problem(SLEDGE, &["train.method=ddpg"]).contains("nothing"));
     for (key, value) in [("unit", "0"), ("gamma", "1.5"), ("stepwise", "-1")] {
         let found = problem(CART, &[&format!("train.analytic.{key}={value}")]);
         assert!(found.contains(&format!("train.analytic.{key}")), "{found}");
