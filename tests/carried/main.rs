@@ -10,6 +10,7 @@ mod common;
 mod flying;
 mod formulas;
 mod ground;
+mod levels;
 mod network;
 mod plans;
 mod poles;
@@ -39,6 +40,7 @@ fn all() -> Vec<Truth> {
         poles::pendulum(),
         flying::planar_quadrotor(),
         flying::quadrotor(),
+        levels::two_tanks(),
     ]
 }
 

@@ -41,7 +41,7 @@ macro_rules! bytes {
 }
 
 /// All of them, the one that a newcomer starts from first.
-pub(super) const TEMPLATES: [Template; 10] = [
+pub(super) const TEMPLATES: [Template; 11] = [
     Template {
         name: "cart-pole",
         about: "a pole on a cart, kept upright and on its track",
@@ -112,6 +112,13 @@ pub(super) const TEMPLATES: [Template; 10] = [
             bytes: bytes!("learned_pendulum.safetensors"),
         }],
         varied: "",
+    },
+    Template {
+        name: "two-tanks",
+        about: "two tanks in a row, the level of the second brought to a height and held there",
+        text: text!("two_tanks.toml"),
+        files: &[],
+        varied: "hole.value=0.4,0.5,0.6",
     },
     Template {
         name: "drone-race",
