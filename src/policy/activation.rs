@@ -207,27 +207,28 @@ impl Activation {
         let zero = R::lit(0.0);
         match self {
             Self::Identity => x,
-            Self::Relu => x.if_lt(zero, zero, x),
+            Self::Relu => x.at_least(zero),
             // Minus infinity times 0 would be no number.
-            Self::LeakyRelu { slope: 0.0 } => x.if_lt(zero, zero, x),
+            Self::LeakyRelu { slope: 0.0 } => x.at_least(zero),
             Self::LeakyRelu { slope } => x.if_lt(zero, R::lit(slope) * x, x),
-            Self::Elu { alpha } => x.if_lt(zero, R::lit(alpha) * x.exp_m1_negative(), x),
+            // The part of either side is 0 on the other.
+            Self::Elu { alpha: 1.0 } => x.at_least(zero) + x.exp_m1_negative(),
+            Self::Elu { alpha } => x.at_least(zero) + R::lit(alpha) * x.exp_m1_negative(),
             Self::Selu => {
                 let [scale, alpha] = Self::SELU;
-                let below = R::lit(scale * alpha) * x.exp_m1_negative();
-                x.if_lt(zero, below, R::lit(scale) * x)
+                R::lit(scale) * x.at_least(zero) + R::lit(scale * alpha) * x.exp_m1_negative()
             }
             Self::Celu { alpha } => {
                 let alpha = R::lit(alpha);
-                x.if_lt(zero, alpha * (x / alpha).exp_m1_negative(), x)
+                x.at_least(zero) + alpha * (x / alpha).exp_m1_negative()
             }
             Self::Gelu => {
-                let x = floored(x, LOWEST_NORMAL);
+                let x = x.at_least(R::lit(LOWEST_NORMAL));
                 let half = R::lit(0.5) * x;
                 half + half * x.normal_share()
             }
             Self::GeluTanh => {
-                let x = floored(x, LOWEST_NORMAL);
+                let x = x.at_least(R::lit(LOWEST_NORMAL));
                 let [first, third] = Self::GELU_TANH.map(R::lit);
                 let half = R::lit(0.5) * x;
                 // The constant first: some drivers would move it there, and round otherwise.
@@ -235,13 +236,13 @@ impl Activation {
             }
             // The logistic function is (1 + tanh(x / 2)) / 2.
             Self::Silu => {
-                let half = R::lit(0.5) * floored(x, LOWEST);
+                let half = R::lit(0.5) * x.at_least(R::lit(LOWEST));
                 half + half * half.tanh()
             }
             // With e = exp(-|x|), the tangent of the logarithm is n / (n + 2), n = e (e + 2), below 0, and
             // n / (n + 2 e^2), n = 1 + 2 e, above.
             Self::Mish => {
-                let x = floored(x, LOWEST_EXPONENT);
+                let x = x.at_least(R::lit(LOWEST_EXPONENT));
                 let (one, two) = (R::lit(1.0), R::lit(2.0));
                 let e = (-x.abs()).exp_negative();
                 let n = x.if_lt(zero, e * (e + two), one + two * e);
@@ -256,10 +257,10 @@ impl Activation {
                 x.if_lt(zero, e, one) / (one + e)
             }
 
-            Self::Softplus { beta: 1.0 } => x.max(zero) + x.softplus_excess(),
+            Self::Softplus { beta: 1.0 } => x.at_least(zero) + x.softplus_excess(),
             Self::Softplus { beta } => {
                 let beta = R::lit(beta);
-                x.max(zero) + (beta * x).softplus_excess() / beta
+                x.at_least(zero) + (beta * x).softplus_excess() / beta
             }
             Self::Softsign => {
                 let x = x.clamp(R::lit(-FAR), R::lit(FAR));
@@ -269,13 +270,6 @@ impl Activation {
             Self::Relu6 => x.clamp(zero, R::lit(6.0)),
         }
     }
-}
-
-/// `x`, or `least` below it.
-#[inline(always)]
-fn floored<R: Real>(x: R, least: f32) -> R {
-    let least = R::lit(least);
-    x.if_lt(least, least, x)
 }
 
 /// A parameter as it is read again: the shortest decimal, a whole number without a point.

@@ -85,6 +85,10 @@ impl<const N: usize> Real for Lanes<N> {
         Self(per_lane!(N, i => Real::max(self.0[i], rhs.0[i])))
     }
     #[inline(always)]
+    fn at_least(self, low: Self) -> Self {
+        Self(per_lane!(N, i => Real::at_least(self.0[i], low.0[i])))
+    }
+    #[inline(always)]
     fn clamp(self, low: Self, high: Self) -> Self {
         Self(per_lane!(N, i => Real::clamp(self.0[i], low.0[i], high.0[i])))
     }

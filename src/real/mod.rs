@@ -99,6 +99,12 @@ pub trait Real:
         rhs.if_lt(self, self, rhs)
     }
 
+    /// `self`, and `low`, a number, where it is below.
+    #[inline(always)]
+    fn at_least(self, low: Self) -> Self {
+        self.if_lt(low, low, self)
+    }
+
     /// `self` within `[low, high]`.
     #[inline(always)]
     fn clamp(self, low: Self, high: Self) -> Self {

@@ -39,6 +39,10 @@ macro_rules! primitives {
             if rhs < self || self.is_nan() { self } else { rhs }
         }
         #[inline(always)]
+        fn at_least(self, low: Self) -> Self {
+            if self < low { low } else { self }
+        }
+        #[inline(always)]
         fn clamp(self, low: Self, high: Self) -> Self {
             let floored = if self < low { low } else { self };
             let held = if high < floored { high } else { floored };

@@ -1,14 +1,15 @@
 //! A network for a tile of trajectories in lockstep: weights packed in panels, activations in
 //! blocks.
 
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::dispatch::Unit;
 use super::kernel::{GRANULE, Kernel, Panel};
 use crate::error::{Error, Result};
 use crate::policy::{Activation, Layer, Mlp, Norm, normaliser};
+use crate::real::Vector;
 use crate::real::simd::Body;
-use crate::real::{Lanes, Real, Vector};
 use crate::tile::Frame;
 
 /// A network whose weights are in the order in which a kernel reads them.
@@ -79,13 +80,7 @@ impl PackedLayer {
     }
 
     /// The layer for `lanes` trajectories; `inputs` and `outputs` are `[blocks, features, BLOCK]`.
-    fn forward<K: Kernel, const N: usize>(
-        &self,
-        kernel: K,
-        lanes: usize,
-        inputs: &[f32],
-        outputs: &mut [f32],
-    ) {
+    fn forward<K: Kernel>(&self, kernel: K, lanes: usize, inputs: &[f32], outputs: &mut [f32]) {
         let floor = match (self.activation, &self.norm) {
             (Activation::Relu, None) => 0.0,
             _ => f32::NEG_INFINITY,
@@ -101,14 +96,16 @@ impl PackedLayer {
                 let y = &mut outputs[first..][..bias.len() * K::BLOCK];
                 kernel.panel(panel, lanes - block * K::BLOCK, x, y);
                 if squashes {
-                    kernel.call(Squashing::<N> { activation: self.activation, values: y });
+                    let (activation, vector) = (self.activation, PhantomData::<K::Vector>);
+                    kernel.call(Squashing { activation, values: y, vector });
                 }
             }
         }
         if let Some(norm) = &self.norm {
             for values in outputs.chunks_mut(block_out).take(lanes.div_ceil(K::BLOCK)) {
-                let activation = self.activation;
-                kernel.call(Normalising { norm, activation, values, columns: K::BLOCK });
+                let (activation, columns) = (self.activation, K::BLOCK);
+                let vector = PhantomData::<K::Vector>;
+                kernel.call(Normalising { norm, activation, values, columns, vector });
             }
         }
     }
@@ -121,59 +118,77 @@ impl PackedLayer {
     }
 }
 
-/// Activation of a panel's sums, a multiple of a granule, by the widest lanes that fit.
-struct Squashing<'a, const N: usize> {
+/// Activation of a panel's sums, a multiple of a granule, in the vectors of the instructions.
+struct Squashing<'a, V> {
     activation: Activation,
     values: &'a mut [f32],
+    vector: PhantomData<V>,
 }
 
-impl<const N: usize> Body for Squashing<'_, N> {
+impl<V: Vector> Body for Squashing<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let (groups, rest) = self.values.as_chunks_mut::<N>();
-        for group in groups {
-            *group = self.activation.apply(Lanes(*group)).0;
-        }
-        for group in rest.as_chunks_mut::<GRANULE>().0 {
-            *group = self.activation.apply(Lanes(*group)).0;
+        let Self { activation, values, .. } = self;
+        // A loop of its own for each of the usual ones: what is constant is made ready before it.
+        match activation {
+            Activation::Tanh => squash::<V>(Activation::Tanh, values),
+            Activation::Silu => squash::<V>(Activation::Silu, values),
+            Activation::Elu { alpha: 1.0 } => squash::<V>(Activation::Elu { alpha: 1.0 }, values),
+            other => squash::<V>(other, values),
         }
     }
 }
 
+#[inline(always)]
+fn squash<V: Vector>(activation: Activation, values: &mut [f32]) {
+    let mut places = values.chunks_exact_mut(2 * V::WIDTH);
+    for place in &mut places {
+        let (first, second) = place.split_at_mut(V::WIDTH);
+        let pair = [V::load(first), V::load(second)];
+        let [one, other] = [activation.apply(pair[0]), activation.apply(pair[1])];
+        one.store(first);
+        other.store(second);
+    }
+    for place in places.into_remainder().chunks_exact_mut(V::WIDTH) {
+        activation.apply(V::load(place)).store(place);
+    }
+}
+
 /// Norm and activation of a layer's sums in a block, `[neurons, columns]`. Twin: shaders/norm.wgsl.
-struct Normalising<'a> {
+struct Normalising<'a, V> {
     norm: &'a Norm,
     activation: Activation,
     values: &'a mut [f32],
     columns: usize,
+    vector: PhantomData<V>,
 }
 
-impl Body for Normalising<'_> {
+impl<V: Vector> Body for Normalising<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { norm, activation, values, columns } = self;
+        let Self { norm, activation, values, columns, .. } = self;
         let rows = values.len() / columns;
-        let count = Lanes::<GRANULE>::lit(rows as f32);
-        for first in (0..columns).step_by(GRANULE) {
-            let mut total = Lanes::lit(0.0);
+        let count = V::lit(rows as f32);
+        for first in (0..columns).step_by(V::WIDTH) {
+            let mut total = V::lit(0.0);
             for row in 0..rows {
-                total = total + Lanes::load(&values[row * columns + first..]);
+                total = total + V::load(&values[row * columns + first..]);
             }
             let mean = total / count;
-            let mut total = Lanes::lit(0.0);
+            let mut total = V::lit(0.0);
             for row in 0..rows {
-                let gap = Lanes::load(&values[row * columns + first..]) - mean;
+                let gap = V::load(&values[row * columns + first..]) - mean;
                 total = total + gap * gap;
             }
-            let factor = normaliser(total / count, Lanes::lit(norm.epsilon));
+            let factor = normaliser(total / count, V::lit(norm.epsilon));
             for row in 0..rows {
                 let place = &mut values[row * columns + first..];
-                let normed = (Lanes::load(place) - mean) * factor * Lanes::lit(norm.scale[row]);
-                activation.apply(normed + Lanes::lit(norm.shift[row])).store(place);
+                let normed = (V::load(place) - mean) * factor * V::lit(norm.scale[row]);
+                activation.apply(normed + V::lit(norm.shift[row])).store(place);
             }
         }
     }
@@ -214,7 +229,7 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
                     .copy_from_slice(&frame.row(row)[first..][..GRANULE]);
             }
         }
-        self.layers::<GRANULE>(lanes);
+        self.layers(lanes);
         for granule in 0..lanes.div_ceil(GRANULE) {
             let (first, at) = (granule * GRANULE, place::<K>(granule, to.len()));
             for (feature, row) in to.clone().enumerate() {
@@ -224,10 +239,10 @@ impl<'a, K: Kernel> Evaluator<'a, K> {
         }
     }
 
-    /// All layers, from `inputs` back to `inputs`; activations by groups of `N`.
-    fn layers<const N: usize>(&mut self, lanes: usize) {
+    /// All layers, from `inputs` back to `inputs`.
+    fn layers(&mut self, lanes: usize) {
         for layer in &self.network.layers {
-            layer.forward::<K, N>(self.kernel, lanes, &self.inputs, &mut self.outputs);
+            layer.forward(self.kernel, lanes, &self.inputs, &mut self.outputs);
             std::mem::swap(&mut self.inputs, &mut self.outputs);
         }
     }

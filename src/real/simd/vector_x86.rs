@@ -48,6 +48,13 @@ mod avx512 {
         _mm512_mask_max_ps(a, compare::<_CMP_ORD_Q>(a, a), a, b)
     }
 
+    // The second operand stays where it is NaN, and of two zeros.
+    #[target_feature(enable = "avx512f")]
+    #[inline]
+    pub(super) fn at_least(x: Register, low: Register) -> Register {
+        _mm512_max_ps(low, x)
+    }
+
     // Bounds rarely change, so that their comparison is done ahead of a loop.
     #[target_feature(enable = "avx512f")]
     #[inline]
@@ -109,6 +116,12 @@ mod avx2 {
 
     #[target_feature(enable = "avx2")]
     #[inline]
+    pub(super) fn at_least(x: Register, low: Register) -> Register {
+        _mm256_max_ps(low, x)
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
     pub(super) fn clamp(x: Register, low: Register, high: Register) -> Register {
         nan_unless_ordered(low, high, _mm256_min_ps(high, _mm256_max_ps(low, x)))
     }
@@ -160,6 +173,11 @@ macro_rules! x86_vector {
                     let less = $set::compare::<_CMP_LT_OQ>(self.0, rhs.0);
                     $set::choose(less, no.0, yes.0)
                 })
+            }
+            #[inline(always)]
+            fn at_least(self, low: Self) -> Self {
+                // SAFETY: see the top of this file.
+                Self(unsafe { $set::at_least(self.0, low.0) })
             }
             #[inline(always)]
             fn clamp(self, low: Self, high: Self) -> Self {

@@ -24,7 +24,7 @@ const CASES: [f32; 12] = [
 ];
 
 /// The results of every operation on `a`, `b` and `c`.
-fn operations<R: Real>(a: R, b: R, c: R) -> [R; 36] {
+fn operations<R: Real>(a: R, b: R, c: R) -> [R; 37] {
     let [sine, cosine] = a.principal_sin_cos();
     [
         a + b,
@@ -41,6 +41,7 @@ fn operations<R: Real>(a: R, b: R, c: R) -> [R; 36] {
         a.if_eq(b, c, a),
         a.min(b),
         a.max(b),
+        a.at_least(b),
         a.clamp(b, c),
         a.sign(),
         a.hypot(b),
