@@ -49,9 +49,22 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
         number(timing.wall_seconds),
         record.provenance.device
     ));
+    lines.extend(again(&record.global));
     let names = files.iter().map(|file| file.display().to_string());
     lines.push(format!("files           {}", names.collect::<Vec<_>>().join("\n                ")));
     lines.join("\n") + "\n"
+}
+
+/// That many pairs were decided in f64 and not in f32, since that is what takes the time.
+fn again(global: &GlobalRecord) -> Option<String> {
+    let many = 10 * global.f64_reruns > global.draws;
+    many.then(|| {
+        format!(
+            "in f64          {} of {} pairs of the certified set, one at a time: f32 does not tell on which side of 0 \
+             their margins are",
+            global.f64_reruns, global.draws
+        )
+    })
 }
 
 /// What may be the matter where perturbed starts fail under controls that are not theirs.

@@ -13,6 +13,7 @@ pub mod contest;
 pub mod ddpg;
 #[cfg(feature = "train")]
 pub mod device;
+mod doubts;
 pub mod environments;
 pub mod gae;
 #[cfg(feature = "train")]

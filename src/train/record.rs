@@ -42,23 +42,6 @@ pub struct TrainRecord {
 }
 
 impl TrainRecord {
-    /// That nothing was learned, with what may help, where a policy is no better than the untrained one.
-    pub fn idle(&self) -> Option<String> {
-        let learns_policy = !matches!(self.origin.method, Method::Value | Method::ActionValue);
-        let other = match self.origin.method {
-            Method::Ppo => "analytic",
-            _ => "ppo",
-        };
-        (learns_policy && self.best == 0 && self.total > 0).then(|| {
-            format!(
-                "no score was better than that of the untrained policy, which is the one kept; where rollouts end \
-                 far from what the task asks, nothing pulls them back: try `--set train.method={other}`, a \
-                 constraint that also holds in what must not run away, starts nearer to the target \
-                 (`train.starts`), or a shorter horizon"
-            )
-        })
-    }
-
     /// The curve, one row per score.
     pub fn table(&self) -> Table {
         let curve = &self.curve;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::checkpoint::{Checkpoint, RunProgress};
+use super::doubts::doubts;
 use super::record::{CurvePoint, NetworkRecord, Origin, TRAIN_SCHEMA, TrainRecord};
 use crate::error::{Error, Result};
 use crate::files::{Claim, MANIFEST, json, make_way};
@@ -215,7 +216,7 @@ impl Run<'_> {
             notes: Vec::new(),
             events: Vec::new(),
         };
-        record.notes = record.idle().into_iter().collect();
+        record.notes = doubts(&record);
         Ok(Trained { record, files })
     }
 }
