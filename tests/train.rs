@@ -244,6 +244,7 @@ fn short(
         physics_sha256: String::new(),
         backend: backend.name().to_owned(),
         device: backend.device(),
+        networks: None,
     };
     let mut learner = learner(&system, &backend, &config, network, None);
     let TrainSettings { interval, patience, analytic, .. } = settings(&config);

@@ -91,6 +91,7 @@ fn trained(
         physics_sha256: String::new(),
         backend: String::new(),
         device: String::new(),
+        networks: None,
     };
     let TrainSettings { method, interval, patience, .. } = *settings(config);
     let origin = Origin { method, provenance };

@@ -60,6 +60,10 @@ impl PreparedPlanning<'_> {
 pub(super) struct Prepared<'a>(&'a Gpu);
 
 impl Prepared<'_> {
+    pub(super) fn networks(&self) -> Option<String> {
+        match *self.0 {}
+    }
+
     pub(super) fn reach_avoid(
         &self,
         _task: &ReachAvoidTask<'_>,

@@ -51,6 +51,15 @@ impl Program<'_> {
         &self.plant
     }
 
+    /// How an adapter runs the plant's networks, in words: fused into its rollouts, or in layers and why. None
+    /// without a network and on the CPU, which has one way.
+    pub fn networks(&self) -> Option<String> {
+        match &self.prepared {
+            Prepared::Cpu(..) => None,
+            Prepared::Gpu(prepared) => prepared.networks(),
+        }
+    }
+
     /// The measure by the model's task, or its sign, of each start of `task`; sent to `sink` in order.
     ///
     /// # Errors

@@ -40,12 +40,14 @@ pub(super) struct Answer<'a> {
     file: Option<&'a FileRecord>,
     backend: &'a str,
     device: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    networks: Option<&'a str>,
     events: &'a [Event],
 }
 
 /// What is printed and stored of a search.
 pub(super) fn answer<'a>(found: &'a Search<'a>) -> Answer<'a> {
-    let Provenance { backend, device, .. } = &found.provenance;
+    let Provenance { backend, device, networks, .. } = &found.provenance;
     Answer {
         record: found.record,
         within: found.within,
@@ -54,6 +56,7 @@ pub(super) fn answer<'a>(found: &'a Search<'a>) -> Answer<'a> {
         file: found.file,
         backend,
         device,
+        networks: networks.as_deref(),
         events: &found.events,
     }
 }

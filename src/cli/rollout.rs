@@ -50,6 +50,9 @@ struct Summary {
     measures: String,
     backend: String,
     device: String,
+    /// How an adapter ran networks, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    networks: Option<String>,
     events: Vec<Event>,
     /// What the samples do not tell.
     notes: Vec<String>,
@@ -99,7 +102,7 @@ impl Rollout<'_> {
         let mut tally = MeasureTally::new(Keep::Counts);
         tally.add(0, measures)?;
         let done = Done { task, notes: vec![replayed::NOTE.to_owned()], begun, tally };
-        Ok(self.summary(done, ["cpu".to_owned(), "the host, in f64".to_owned()], Vec::new()))
+        Ok(self.summary(done, RanOn::host()))
     }
 
     fn roll_out(self, plant: &Plant) -> Result<Summary> {
@@ -131,13 +134,12 @@ impl Rollout<'_> {
         }
         writer.publish()?;
         devices::note_events(self.global, &backend);
-        let ran_on = [backend.name().to_owned(), backend.device()];
         let done = Done { task: plant.model.task, notes, begun, tally };
-        Ok(self.summary(done, ran_on, backend.events()))
+        Ok(self.summary(done, RanOn::program(&program)))
     }
 
     /// What is reported of rollouts that are done.
-    fn summary(self, done: Done, [backend, device]: [String; 2], events: Vec<Event>) -> Summary {
+    fn summary(self, done: Done, on: RanOn) -> Summary {
         let Done { task, notes, begun, tally } = done;
         let MeasureCounts { starts, successes, non_finite, .. } = *tally.counts();
         let (low, high) = interval(successes, starts, BETA);
@@ -150,12 +152,40 @@ impl Rollout<'_> {
             task,
             gamma: self.spec.gamma,
             measures: self.measures.display().to_string(),
-            backend,
-            device,
-            events,
+            backend: on.backend,
+            device: on.device,
+            networks: on.networks,
+            events: on.events,
             notes,
             wall_seconds: begun.elapsed().as_secs_f64(),
         }
+    }
+}
+
+/// Who rolled out.
+struct RanOn {
+    backend: String,
+    device: String,
+    networks: Option<String>,
+    events: Vec<Event>,
+}
+
+impl RanOn {
+    /// The backend of `program`.
+    fn program(program: &Program<'_>) -> Self {
+        let backend = program.backend();
+        Self {
+            backend: backend.name().to_owned(),
+            device: backend.device(),
+            networks: program.networks(),
+            events: backend.events(),
+        }
+    }
+
+    /// Nobody but the host.
+    fn host() -> Self {
+        let (backend, device) = ("cpu".to_owned(), "the host, in f64".to_owned());
+        Self { backend, device, networks: None, events: Vec::new() }
     }
 }
 

@@ -49,6 +49,8 @@ pub(super) fn text(record: &Record, files: &[PathBuf]) -> String {
         number(timing.wall_seconds),
         record.provenance.device
     ));
+    let networks = record.provenance.networks.as_ref();
+    lines.extend(networks.map(|words| format!("networks        {words}")));
     lines.extend(again(&record.global));
     let names = files.iter().map(|file| file.display().to_string());
     lines.push(format!("files           {}", names.collect::<Vec<_>>().join("\n                ")));

@@ -27,6 +27,7 @@ pub(super) fn provenance(
         physics_sha256: sha256([planning.model.text().as_bytes()]),
         backend: backend.name().to_owned(),
         device: backend.device(),
+        networks: None,
     }
 }
 

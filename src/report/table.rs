@@ -102,7 +102,8 @@ fn setting(record: &Record) -> String {
         ("threads", record.timing.threads.to_string()),
         ("rollouts", count(record.timing.rollouts)),
     ];
-    pairs("Setting", &task.into_iter().chain(rows).collect::<Vec<_>>())
+    let networks = record.provenance.networks.clone().map(|words| ("networks", words));
+    pairs("Setting", &task.into_iter().chain(rows).chain(networks).collect::<Vec<_>>())
 }
 
 fn constants(record: &Record) -> String {

@@ -25,6 +25,7 @@ pub(crate) fn provenance(
         physics_sha256,
         backend: backend.name().to_owned(),
         device: backend.device(),
+        networks: program.networks(),
     }
 }
 

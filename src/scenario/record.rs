@@ -163,6 +163,9 @@ pub struct Provenance {
     pub backend: String,
     /// Processor or adapter.
     pub device: String,
+    /// How an adapter ran networks, in words; none without a network, on the CPU, and in older records.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub networks: Option<String>,
 }
 
 /// Names and default boxes of a system.

@@ -87,7 +87,7 @@ fn both(program: &Program<'_>, task: &ReachAvoidTask<'_>) -> [MeasureCounts; 2] 
 }
 
 /// Failures that halve the chunks, down to the smallest.
-fn halved(gpu: Gpu, times: u64) -> Gpu {
+pub(crate) fn halved(gpu: Gpu, times: u64) -> Gpu {
     let once = |submission| Injection { fault: Fault::OutOfMemory, submission, repeats: false };
     gpu.with_failures((0..times).map(once).collect())
 }

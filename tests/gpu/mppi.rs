@@ -18,6 +18,7 @@ use reachcast::rollout::{
 };
 use reachcast::system::{DoubleIntegrator, System};
 
+use crate::counts::halved;
 use crate::oracle::{differences, truth};
 use crate::{gpu, random_network};
 
@@ -310,6 +311,24 @@ fn chunks_of_samples_and_of_problems() {
     chunked(5, 6_000, Some(&value));
     chunked(1, 300_000, None);
     chunked(280, 1_000, None);
+}
+
+/// A plan whose workgroups take several rounds of samples has the same bits in parts of any size.
+#[test]
+fn failures_change_no_bits_of_plans() {
+    let system = DoubleIntegrator::default();
+    let spec = MppiSpec::new(MppiSettings::new(&system.controls(), 140_001, 2)).expect("settings");
+    let planning = Planning::of::<_, _, 2, 1, 3>(&system, quadratic(), spec);
+    let problems = [integrator_problem(1, 2)];
+    let task = MppiTask { costs: CostQuery::Summary, ..task(&problems) };
+    let mut found = Vec::new();
+    for halvings in [0, 1, 6, 12] {
+        let Some(gpu) = gpu() else { return };
+        let backend = Backend::Gpu(halved(gpu, halvings));
+        found.push(improve(&backend, &planning, &task));
+        assert_eq!(backend.events().len() as u64, halvings);
+    }
+    assert!(found.windows(2).all(|pair| pair[0] == pair[1]), "{found:?}");
 }
 
 #[test]

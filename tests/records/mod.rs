@@ -230,6 +230,7 @@ fn provenance(policy: &str) -> Provenance {
             .to_owned(),
         backend: "cpu".to_owned(),
         device: "16 lanes of f32, AVX-512".to_owned(),
+        networks: None,
     }
 }
 

@@ -20,6 +20,7 @@ fn record() -> TrainRecord {
         physics_sha256: words("bbb222"),
         backend: words("cpu"),
         device: words("device-x"),
+        networks: None,
     };
     let point = |iteration, loss, score| CurvePoint { iteration, loss, scores: vec![score, 0.5] };
     TrainRecord {

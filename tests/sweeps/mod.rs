@@ -115,6 +115,7 @@ fn provenance() -> Provenance {
         physics_sha256: "89efba76".repeat(8),
         backend: "cpu".to_owned(),
         device: "a test machine".to_owned(),
+        networks: None,
     }
 }
 

@@ -29,8 +29,8 @@ const PLANS: usize = 16;
 /// device that is lost is opened again, once. After that, and where a driver refuses what it is
 /// given, the rest is for the CPU if that was allowed, and an error if not.
 pub struct Gpu {
-    adapter: Adapter,
-    setup: Setup,
+    pub(super) adapter: Adapter,
+    pub(super) setup: Setup,
     state: Mutex<State>,
     pub(super) fallback: Option<Cpu>,
     events: Mutex<Vec<Event>>,

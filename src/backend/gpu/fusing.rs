@@ -117,19 +117,42 @@ fn fitting(adapter: &Adapter, mlp: &Mlp, form: Form) -> Option<Fused> {
     })
 }
 
-/// Why `mlp` does not run inside of rollouts on `adapter`.
+/// The refusal of `mlp` inside of rollouts on `adapter`.
 fn does_not_fuse(adapter: &Adapter, mlp: &Mlp) -> Error {
+    Error::Device(format!(
+        "the network does not fuse: {}; run it in layers",
+        obstacle(adapter, mlp)
+    ))
+}
+
+/// Why `mlp` does not run inside of rollouts on `adapter`.
+fn obstacle(adapter: &Adapter, mlp: &Mlp) -> String {
     if mlp.has_norm() {
-        let problem = "a network with a norm behind a layer does not fuse, since that needs all sums of the layer \
-                       at once; run it in layers";
-        return Error::Device(problem.to_owned());
+        return "a norm behind a layer needs all sums of the layer at once".to_owned();
     }
     let widest = mlp.widths().into_iter().max().unwrap_or(0);
-    Error::Device(format!(
-        "a network of {widest} neurons per layer does not fuse: at most {FUSED_WIDTH}, and {} has {} \
-         bytes of workgroup memory and {} threads in a workgroup; run it in layers",
+    format!(
+        "it has {widest} neurons per layer, at most {FUSED_WIDTH} do, and {} has {} bytes of workgroup memory and \
+         {} threads in a workgroup",
         adapter.name, adapter.max_workgroup_bytes, adapter.max_workgroup_threads
-    ))
+    )
+}
+
+/// How rollouts on `adapter` run `network`, in words.
+///
+/// # Errors
+/// Those of [`Forms::new`].
+pub(super) fn words(adapter: &Adapter, network: &Mlp, wanted: NetworkKernels) -> Result<String> {
+    if !Forms::new(adapter, Some(network), wanted)?.0.is_empty() {
+        return Ok("fused: rollouts run the network themselves".to_owned());
+    }
+    let fits = Forms::new(adapter, Some(network), NetworkKernels::Fused).is_ok();
+    let reason = match (fits, wanted) {
+        (false, _) => obstacle(adapter, network),
+        (true, NetworkKernels::Layered) => "as asked for".to_owned(),
+        (true, _) => "which a software adapter does faster".to_owned(),
+    };
+    Ok(format!("in layers, a dispatch for each of a step: {reason}"))
 }
 
 /// Loop iterations of a thread for one step of `sides` trajectories that runs the network itself.
@@ -177,6 +200,24 @@ pub(super) mod tests {
         assert!(!fuses(&[12, 64, 3], usual, Software, Chosen));
         assert!(fuses(&[12, 64, 3], usual, Software, NetworkKernels::Fused));
         assert!(!fuses(&[12, 64, 3], usual, Discrete, Layered));
+    }
+
+    #[test]
+    fn how_a_network_runs_is_said_with_the_reason() {
+        use NetworkKernels::{Chosen, Fused, Layered};
+        let said = |network: &Mlp, kind, wanted| {
+            words(&Adapter { kind, ..Adapter::made_up(1 << 27) }, network, wanted)
+                .unwrap_or_default()
+        };
+        let (narrow, wide) = (network(&[12, 64, 3]), network(&[12, 200, 3]));
+        let hardware = AdapterKind::Discrete;
+        assert!(said(&narrow, hardware, Chosen).starts_with("fused"));
+        assert!(said(&narrow, AdapterKind::Software, Fused).starts_with("fused"));
+        assert!(
+            said(&narrow, AdapterKind::Software, Chosen).ends_with("software adapter does faster")
+        );
+        assert!(said(&narrow, hardware, Layered).ends_with("as asked for"));
+        assert!(said(&wide, hardware, Chosen).contains("200 neurons per layer"));
     }
 
     #[test]

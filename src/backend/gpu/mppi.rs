@@ -34,7 +34,8 @@ pub(super) fn tally(
     let problems = task.problems.len().next_power_of_two();
     let size = source.size(problems, samples.end - samples.start);
     let chunking = MppiChunking::new(&opened.device.adapter, attempt.limit, &size)?;
-    attempt.columns.set(u64::from(chunking.stride));
+    // A block is not halved: what is left of the limit is.
+    attempt.columns.set(u64::from(chunking.stride).min(attempt.limit.columns));
     let mut space = program.take(&flight, PlanShape { chunking, costs: task.costs })?;
     let mut delivery = Delivery { source, chunking, tallies: Vec::new(), sink };
     for problems in task.problems.chunks(chunking.problems as usize) {

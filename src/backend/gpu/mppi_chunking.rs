@@ -46,6 +46,8 @@ pub(super) struct Size<'a> {
     pub(super) rows: u32,
     /// Samples of each problem.
     pub(super) samples: u32,
+    /// Samples of a whole plan, of which those may be a range.
+    pub(super) whole: u32,
     /// Problems.
     pub(super) problems: usize,
     /// Operations of the formulas for one step of one sample.
@@ -120,16 +122,16 @@ impl MppiChunking {
         if columns == 0 || problems == 0 || parameters.max(cells) > binding {
             return Err(too_large(adapter, binding));
         }
-        let unit = u64::from(WORKGROUP);
-        let samples = u64::from(size.samples).min(columns);
-        let problems = problems.min(columns / samples.next_multiple_of(unit)).max(1);
-        let rounds = rounds(samples as u32);
-        // The padding of whole rounds may not fit any more: one problem less, or single rounds.
-        let width = samples.next_multiple_of(unit * u64::from(rounds));
-        let (problems, width, rounds) = match columns / width {
-            0 => (1, samples.next_multiple_of(unit), 1),
-            fitting => (problems.min(fitting), width, rounds),
-        };
+        let rounds = rounds(size.whole);
+        let block = u64::from(WORKGROUP * rounds);
+        let whole = u64::from(size.samples).next_multiple_of(block);
+        // A part of the samples is whole blocks, one at least whatever the time: blocks decide the bits.
+        let width = whole.min((columns / block).max(1) * block);
+        if width > fitting_columns(size, binding) {
+            return Err(too_large(adapter, binding));
+        }
+        let samples = u64::from(size.samples).min(width);
+        let problems = problems.min(columns / width).max(1);
         let stride = (problems * width).next_multiple_of(COLUMN_UNIT);
         // Rollout and update take every step once each.
         let timely = limit.pieces(stride * size.step_flops());
@@ -162,12 +164,17 @@ impl MppiChunking {
 fn most_columns(size: &Size<'_>, binding: u64, limit: Limit) -> u64 {
     let networked = size.networks.iter().any(Option::is_some);
     let cap = if networked { NETWORK_COLUMNS } else { FORMULA_COLUMNS };
+    let timely = limit.pieces(size.step_flops()).max(COLUMN_UNIT);
+    let fitting = fitting_columns(size, binding);
+    fitting.min(cap).min(timely).min(limit.columns) / COLUMN_UNIT * COLUMN_UNIT
+}
+
+/// Columns that the memory holds.
+fn fitting_columns(size: &Size<'_>, binding: u64) -> u64 {
     let parts = column_bytes(size);
     let largest = parts.iter().copied().max().unwrap_or(1);
     // A quarter of the memory is the problems'.
-    let fitting = (binding / largest).min(MEMORY_BYTES / 4 * 3 / parts.iter().sum::<u64>());
-    let timely = limit.pieces(size.step_flops()).max(COLUMN_UNIT);
-    fitting.min(cap).min(timely).min(limit.columns) / COLUMN_UNIT * COLUMN_UNIT
+    (binding / largest).min(MEMORY_BYTES / 4 * 3 / parts.iter().sum::<u64>())
 }
 
 /// Bytes that each buffer holds per column: states, costs, correlated noise, partials of single
@@ -196,8 +203,8 @@ fn problem_bytes(size: &Size<'_>) -> u64 {
     size.parts(1)[1..].iter().sum()
 }
 
-/// Samples of each thread of the update: a function of the samples alone, so that a plan does not
-/// depend on the problems beside it.
+/// Samples of each thread of the update: a function of the samples of a whole plan alone, so that its bits depend
+/// neither on the problems beside it nor on how its samples are cut up.
 fn rounds(samples: u32) -> u32 {
     let groups = samples.div_ceil(WORKGROUP);
     let most = (groups / BUSY_GROUPS).max(1);
@@ -286,6 +293,7 @@ mod tests {
             horizon,
             rows: horizon,
             samples,
+            whole: samples,
             problems,
             flops,
             networks,
@@ -375,11 +383,20 @@ mod tests {
 
     /// A chunking must not depend on the problems beside it, nor its bits on how partials are cut.
     #[test]
-    fn rounds_depend_on_the_samples_alone() {
-        for (samples, rounds) in [(500, 1), (65_536, 1), (200_000, 3), (1_000_000, 4)] {
+    fn rounds_depend_on_the_samples_of_a_plan_alone() {
+        for (samples, rounds) in [(500, 1), (65_536, 1), (200_000, 3), (1_000_000, 15)] {
             for problems in [1, 500] {
-                let chunking = planned(&Adapter::made_up(1 << 27), &size(3, 20, samples, problems));
-                assert_eq!(chunking.expect("a chunking").rounds, rounds, "{samples} x {problems}");
+                for columns in [FORMULA_COLUMNS, 4096, 64] {
+                    let limit = Limit { columns, ..Limit::default() };
+                    let size = size(3, 20, samples, problems);
+                    let adapter = Adapter::made_up(1 << 27);
+                    let chunking = MppiChunking::new(&adapter, limit, &size).expect("it fits");
+                    assert_eq!(chunking.rounds, rounds, "{samples} x {problems}, {columns}");
+                    // A part ends where a block does.
+                    let block = WORKGROUP * rounds;
+                    let whole = chunking.samples == samples || chunking.samples % block == 0;
+                    assert!(whole, "{chunking:?}");
+                }
             }
         }
     }

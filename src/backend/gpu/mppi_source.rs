@@ -65,6 +65,7 @@ impl PlanSource {
             horizon: spec.settings().horizon,
             rows: cost.rows(spec.horizon()) as u32,
             samples,
+            whole: spec.settings().samples,
             problems,
             flops: self.flops,
             networks: self.networks(),

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::adapter::Gpu;
+use super::fusing;
 use super::job::Subject;
 use super::recover;
 use super::source::Source;
@@ -57,6 +58,18 @@ impl Prepared<'_> {
         sink: PairsSink<'_>,
     ) -> Result<Vec<Farthest>> {
         recover::deviation(self.gpu, self.subject(), &self.plant, task, sink)
+    }
+
+    /// See [`crate::backend::Program::networks`].
+    pub(in crate::backend) fn networks(&self) -> Option<String> {
+        if self.source.text.chain().is_some() {
+            return Some(
+                "in layers, a dispatch for each of a step: formulas call networks".to_owned(),
+            );
+        }
+        let network = self.source.network.as_ref()?;
+        let (adapter, wanted) = (&self.gpu.adapter, self.gpu.setup.networks);
+        fusing::words(adapter, network, wanted).ok()
     }
 
     /// What calls roll out.

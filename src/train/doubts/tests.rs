@@ -18,6 +18,7 @@ fn record(method: Method, shares: &[f64], best: usize) -> TrainRecord {
         physics_sha256: word(),
         backend: word(),
         device: word(),
+        networks: None,
     };
     let point = |(i, share): (usize, &f64)| CurvePoint {
         iteration: 10 * i as u64,
