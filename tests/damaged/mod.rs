@@ -1,8 +1,10 @@
 //! Damaged and hostile files of the other readers: models, parameters, texts, safetensors and larger graphs.
 
+mod followed;
 mod formats;
 mod graphs;
 mod hostile;
+mod made;
 
 use std::path::Path;
 
