@@ -5,6 +5,7 @@ mod formats;
 mod graphs;
 mod hostile;
 mod made;
+mod refusals;
 
 use std::path::Path;
 
