@@ -1,8 +1,11 @@
 //! Damaged and hostile files of the other readers: models, parameters, texts, safetensors and larger graphs.
 
+mod followed;
 mod formats;
 mod graphs;
 mod hostile;
+mod made;
+mod refusals;
 
 use std::path::Path;
 

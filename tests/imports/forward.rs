@@ -75,6 +75,7 @@ fn outputs_are_those_of_the_libraries() {
         "affine.onnx",
         "halves.onnx",
         "image.onnx",
+        "plain.onnx",
     ] {
         close(name, &plain);
     }
@@ -91,6 +92,18 @@ fn outputs_are_those_of_the_libraries() {
     far("rsl_rl.pt", &named(&["model_state_dict.actor"]));
     far("omnisafe.pt", &named(&["pi.mean"]));
     far("cleanrl_sac.pt", &named(&["fc1", "fc2", "fc_mean"]));
+}
+
+#[test]
+fn both_ways_of_exporting_give_the_same() {
+    let passes = read_npz(&path("forward.npz")).unwrap();
+    for name in ["units", "smooth", "limited", "layer_norm", "plain"] {
+        let [plain, dynamo] = [format!("{name}.onnx"), format!("{name}_dynamo.onnx")]
+            .map(|file| imported(&file, &Request::default()).network);
+        let worst = difference(&dynamo, &passes, &format!("{name}.onnx"));
+        assert!(worst <= TOLERANCE, "{name}: {worst:e}");
+        assert_eq!(dynamo, plain, "{name}");
+    }
 }
 
 #[test]

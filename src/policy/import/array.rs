@@ -22,6 +22,11 @@ impl Array {
         fills.then(|| Self { shape, numbers: numbers.to_vec(), whole: false })
     }
 
+    /// The same numbers, if they fill this shape.
+    pub(super) fn filling(&self, shape: Vec<usize>) -> Option<Self> {
+        Self::new(shape, &self.numbers).map(|array| array.integers(self.whole))
+    }
+
     /// One number.
     pub(super) fn number(number: f64) -> Self {
         Self { shape: Vec::new(), numbers: vec![number], whole: false }
@@ -98,7 +103,7 @@ impl Array {
             let rest = shape.iter().try_fold(1, |n: usize, &length| n.checked_mul(length))?;
             shape[free] = self.numbers.len().checked_div(rest)?;
         }
-        Self::new(shape, &self.numbers).map(|array| array.integers(self.whole))
+        self.filling(shape)
     }
 
     /// The same with its dimensions in another order; turned around if none is given.

@@ -4,6 +4,10 @@ use super::array::Array;
 use super::kind::Cast;
 use crate::policy::onnx::Node;
 
+/// Kinds of numbers that a cast may lead to.
+pub(super) const FLOATS: [i64; 2] = [1, 11];
+const INTEGERS: [i64; 2] = [6, 7];
+
 /// What the operation `node` gives for constants; `None` for an input that is left out.
 ///
 /// # Errors
@@ -15,10 +19,15 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
     let input = |i: usize| inputs.get(i).copied().flatten();
     let first = input(0).ok_or("an input is missing")?;
     let found = match (node.operation.as_str(), input(1)) {
-        ("Identity" | "Cast" | "Dropout", _) => Some(first.clone()),
+        ("Identity" | "Dropout", _) => Some(first.clone()),
+        ("Cast", _) => Some(as_kind(first, node.integer("to").unwrap_or_default())?),
         ("Add", Some(other)) => first.with(other, |a, b| a + b),
         ("Sub", Some(other)) => first.with(other, |a, b| a - b),
         ("Mul", Some(other)) => first.with(other, |a, b| a * b),
+        ("Div", Some(other)) if first.whole && other.whole && other.numbers.contains(&0.0) => {
+            return Err("of integers by 0".to_owned());
+        }
+        // Towards 0, as ONNX has it.
         ("Div", Some(other)) if first.whole && other.whole => {
             first.with(other, |a, b| (a / b).trunc())
         }
@@ -50,6 +59,18 @@ pub(super) fn folded(node: &Node, inputs: &[Option<&Array>], cast: Cast) -> Resu
     found.ok_or_else(|| format!("the shapes of `{}` do not go together", node.inputs.join("`, `")))
 }
 
+/// The numbers as another kind: integers are cut off towards 0, floats of 32 and 64 bits stay.
+fn as_kind(array: &Array, kind: i64) -> Result<Array, String> {
+    match kind {
+        _ if INTEGERS.contains(&kind) => Ok(array.each(f64::trunc).integers(true)),
+        _ if FLOATS.contains(&kind) => Ok(array.clone().integers(false)),
+        _ => {
+            Err("of constants to another kind than floats and integers of 32 and 64 bits"
+                .to_owned())
+        }
+    }
+}
+
 /// `f` of all of them.
 fn every(inputs: &[Option<&Array>], f: fn(f64, f64) -> f64) -> Option<Array> {
     let mut all = inputs.iter().flatten();
@@ -77,7 +98,7 @@ fn flat(array: &Array, axis: i64) -> Option<Array> {
     let axis = usize::try_from(if axis < 0 { axis + rank } else { axis }).ok()?;
     let rows: usize = array.shape.get(..axis)?.iter().product();
     let columns: usize = array.shape.get(axis..)?.iter().product();
-    Array::new(vec![rows, columns], &array.numbers)
+    array.filling(vec![rows, columns])
 }
 
 /// Dimensions of length 1 put in or taken out.
@@ -85,7 +106,7 @@ fn ones(array: &Array, axes: Option<&[i64]>, insert: bool) -> Option<Array> {
     let mut shape = array.shape.clone();
     let Some(axes) = axes else {
         shape.retain(|&length| length != 1 || insert);
-        return Array::new(shape, &array.numbers);
+        return array.filling(shape);
     };
     let rank = (shape.len() + if insert { axes.len() } else { 0 }) as i64;
     let place = |&axis: &i64| usize::try_from(if axis < 0 { axis + rank } else { axis }).ok();
@@ -98,5 +119,5 @@ fn ones(array: &Array, axes: Option<&[i64]>, insert: bool) -> Option<Array> {
             _ => return None,
         }
     }
-    Array::new(shape, &array.numbers)
+    array.filling(shape)
 }

@@ -24,6 +24,17 @@ pub(super) enum Step {
     Activation(Activation),
 }
 
+impl Step {
+    /// Leaves these of its numbers, in this order; it is none that takes them together.
+    fn select(&mut self, rows: &[usize]) {
+        match self {
+            Self::Linear(linear) => *linear = linear.selected(rows),
+            Self::Map(map) => *map = map.selected(rows),
+            Self::Norm { .. } | Self::Activation(_) => {}
+        }
+    }
+}
+
 /// A network on the way to a policy.
 #[derive(Debug, Default)]
 pub(super) struct Draft {
@@ -114,26 +125,23 @@ impl Draft {
     /// Leaves these of the numbers that come out, in this order.
     ///
     /// # Errors
-    /// A sentence about numbers that there are not, or that others have gone into.
+    /// A sentence about numbers that there are not.
     pub(super) fn select(&mut self, rows: &[usize]) -> Result<(), String> {
         let width = self.width().ok_or("a part of an input of unknown width")?;
         if let Some(row) = rows.iter().find(|row| **row >= width) {
             return Err(format!("number {row} (from 0) of {width}"));
         }
-        for step in self.steps.iter_mut().rev() {
-            match step {
-                Step::Linear(linear) => {
-                    *linear = linear.selected(rows);
-                    return Ok(());
-                }
-                Step::Map(map) => *map = map.selected(rows),
-                Step::Activation(_) => {}
-                Step::Norm { .. } => {
-                    return Err("a part of what is normalised as a whole".to_owned());
-                }
-            }
+        if rows.iter().copied().eq(0..width) {
+            return Ok(());
         }
-        Err("a part of the input alone".to_owned())
+        let layer = self.steps.iter().rposition(|step| matches!(step, Step::Linear(_)));
+        let each = |step: &Step| matches!(step, Step::Map(_) | Step::Activation(_));
+        match layer.filter(|&layer| self.steps[layer + 1..].iter().all(each)) {
+            Some(layer) => self.steps[layer..].iter_mut().for_each(|step| step.select(rows)),
+            // The layer that comes next takes it in.
+            None => return self.push(Step::Linear(Linear::selection(rows, width))),
+        }
+        Ok(())
     }
 
     /// Refuses a step of another width than what comes before it.

@@ -118,13 +118,32 @@ impl Expression {
         Self { steps: None, values, is_clipped }.known()
     }
 
+    /// It where `beta` times it is at most `limit`, and `beyond` elsewhere: a softplus with the threshold beyond
+    /// which it is its input, if the difference is none that counts.
+    pub(super) fn up_to(&self, scaled: &Self, limit: f64, beyond: &Self) -> Option<Self> {
+        let (own, before) = (self.steps()?, beyond.steps()?);
+        let (Each::Activation(Activation::Softplus { beta }), inner) = own.split_last()? else {
+            return None;
+        };
+        let beta = f64::from(*beta);
+        let stretched = match scaled.steps()?.strip_prefix(before)? {
+            [] => 1.0,
+            [Each::Affine { scale, shift: 0.0 }] => *scale,
+            _ => return None,
+        };
+        // What softplus has more than its input, at the threshold.
+        let excess = (-limit).exp().ln_1p() / beta;
+        let is_nothing = excess <= DIFFERENCE * (limit / beta).max(1.0);
+        (inner == before && stretched as f32 == beta as f32 && is_nothing).then(|| self.clone())
+    }
+
     /// The same as the activation that its values are those of, if there is one.
     fn known(mut self) -> Self {
         if self.is_clipped {
             return self;
         }
         let inputs = seen();
-        let is = |activation: &&Activation| {
+        let is = |activation: &Activation| {
             inputs.iter().zip(self.values.iter()).all(|(&x, value)| {
                 let expected: f64 = activation.apply(x);
                 let near = (value - expected).abs() <= DIFFERENCE * expected.abs().max(1.0);
@@ -132,8 +151,12 @@ impl Expression {
                 near || (x.abs() > OVERFLOW && !value.is_finite())
             })
         };
-        if let Some(activation) = WRITTEN_OUT.iter().find(is) {
-            self.steps = Some(vec![Each::Activation(*activation)]);
+        // A softplus is ln(2) / beta at 0.
+        let beta = (std::f64::consts::LN_2 / self.values[0]) as f32;
+        let softplus = Activation::Softplus { beta };
+        let softplus = softplus.check().is_ok().then_some(softplus);
+        if let Some(activation) = WRITTEN_OUT.into_iter().chain(softplus).find(is) {
+            self.steps = Some(vec![Each::Activation(activation)]);
         }
         self
     }

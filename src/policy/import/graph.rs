@@ -52,8 +52,10 @@ pub(super) fn read(bytes: &[u8], asked: &[String], cast: Cast) -> Result<Importe
         run.node(node).map_err(|problem| told(graph, &place(node), problem))?;
     }
     let last = run.value(output).map_err(|problem| told(graph, "the output", problem))?;
-    let Some(Value::Number(last)) = last else {
-        return Err(format!("the output `{output}` does not depend on the input"));
+    let last = match last {
+        Some(Value::Number(last)) => last,
+        Some(Value::Above(..)) => return Err(format!("the output `{output}` is true or false")),
+        _ => return Err(format!("the output `{output}` does not depend on the input")),
     };
     let Run { mut walk, .. } = run;
     if !last.form.is_in_order() {
@@ -141,6 +143,9 @@ fn told(graph: &Graph, place: &str, problem: Problem) -> String {
     match problem {
         Problem::Stale(name) => branches(graph, &name),
         Problem::Words(problem) => format!("{place}: {problem}"),
+        Problem::Foreign => {
+            format!("{place}, which is not ONNX's own; export with operators of ONNX alone")
+        }
         Problem::Unknown => {
             format!("{place}; what a dense network may have is {}", OPERATIONS.join(", "))
         }
@@ -151,14 +156,19 @@ fn told(graph: &Graph, place: &str, problem: Problem) -> String {
 fn branches(graph: &Graph, name: &str) -> String {
     let users = graph.nodes.iter().filter(|node| node.inputs.iter().any(|input| input == name));
     let users: Vec<&str> = users.map(|node| node.operation.as_str()).collect();
-    format!("`{name}` branches into {}; a plain network does not", users.join(", "))
+    format!(
+        "`{name}` branches into {}: a skip connection, or parts side by side, which a network of layers one after \
+         the other does not have. Formulas of a model may join networks: export each part by itself, and call \
+         it as net('FILE', ...)[0] in the formula of the policy",
+        users.join(", ")
+    )
 }
 
 impl<'g> Run<'g> {
     /// The operation `node`.
     fn node(&mut self, node: &'g Node) -> Result<(), Problem> {
         if !node.is_standard() {
-            return Err(Problem::Unknown);
+            return Err(Problem::Foreign);
         }
         let inputs =
             node.inputs.iter().map(|name| self.value(name)).collect::<Result<Vec<_>, _>>()?;

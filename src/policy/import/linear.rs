@@ -39,6 +39,13 @@ impl Linear {
         Ok(Self { weight, bias: map.shift.clone(), inputs: width })
     }
 
+    /// These of `inputs` numbers, in this order.
+    pub(super) fn selection(rows: &[usize], inputs: usize) -> Self {
+        let mut weight = vec![0.0; rows.len() * inputs];
+        rows.iter().enumerate().for_each(|(i, &row)| weight[i * inputs + row] = 1.0);
+        Self::new(weight, inputs)
+    }
+
     /// Rows of `W`.
     pub(super) fn outputs(&self) -> usize {
         self.bias.len()

@@ -2,6 +2,7 @@
 
 use super::arrange;
 use super::array::Array;
+use super::constants::FLOATS;
 use super::draft::Step;
 use super::elementwise::{Each, erf};
 use super::map::Map;
@@ -12,7 +13,7 @@ use crate::policy::Activation;
 use crate::policy::onnx::Node;
 
 /// The operations that are followed.
-pub(super) const OPERATIONS: [&str; 45] = [
+pub(super) const OPERATIONS: [&str; 47] = [
     "Gemm",
     "MatMul",
     "Conv (over the whole input)",
@@ -58,9 +59,9 @@ pub(super) const OPERATIONS: [&str; 45] = [
     "Split",
     "Slice",
     "Gather",
+    "Greater (of a constant, before Where)",
+    "Where (of a softplus and its input)",
 ];
-/// Kinds of numbers that a cast may lead to.
-const FLOATS: [i64; 2] = [1, 11];
 /// The constants of SELU as ONNX has them.
 const SELU: [f32; 2] = [1.673_263_2, 1.050_701];
 
@@ -77,16 +78,18 @@ pub(super) fn apply(
     let mut inputs = inputs.into_iter();
     let first = inputs.next().flatten().ok_or("an input is missing")?;
     let rest: Vec<Option<Value>> = inputs.collect();
-    let known = OPERATIONS.iter().any(|name| name.split(' ').next() == Some(operation));
     let number = match first {
         Value::Number(number) if operation == "Shape" => return lengths(node, &number),
         Value::Number(number) => number,
         Value::Sizes => return sizes(&rest),
+        Value::Above(scaled, limit) if operation == "Where" => {
+            return softplus(&scaled, limit, rest).map(|value| vec![value]);
+        }
+        Value::Above(..) => {
+            return Err("of what is true or false, which `Where` alone takes".into());
+        }
         Value::Constant(constant) => return from_constant(walk, node, constant, rest),
     };
-    if !known {
-        return Err(Problem::Unknown);
-    }
     let one = |value: Result<Value, Problem>| value.map(|value| vec![value]);
     match operation {
         "Identity" | "Dropout" => Ok(vec![Value::Number(number)]),
@@ -102,6 +105,10 @@ pub(super) fn apply(
         "Conv" => one(convolution(walk, node, number, &rest)),
         "Max" | "Min" => one(extreme(walk, node, number, rest)),
         "Add" | "Sub" | "Mul" | "Div" | "Pow" => one(binary(walk, node, number, &rest)),
+        "Greater" => match constant(&rest, 0)?.uniform() {
+            Some(limit) => Ok(vec![Value::Above(number.beside(constant(&rest, 0)?)?, limit)]),
+            None => Err("with limits that differ".into()),
+        },
         "PRelu" => one(leaky(number, constant(&rest, 0)?)),
         "Clip" => one(clip(walk, node, number, &rest)),
         "BatchNormalization" => one(batch_norm(walk, node, number, &rest)),
@@ -148,6 +155,23 @@ fn from_constant(
         _ => Err("of a constant and a value, in this order".into()),
     };
     value.map(|value| vec![value])
+}
+
+/// `Where` of a softplus that is its input beyond a threshold, as PyTorch has it.
+fn softplus(scaled: &Number, limit: f64, rest: Vec<Option<Value>>) -> Result<Value, Problem> {
+    let [Some(Value::Number(beyond)), Some(Value::Number(number))] = rest.as_slice() else {
+        return Err("that picks no two values of the network".into());
+    };
+    let alike = |other: &Number| other.rows == number.rows && other.form == number.form;
+    let found = number.expression.up_to(&scaled.expression, limit, &beyond.expression);
+    match found.filter(|_| alike(scaled) && alike(beyond)) {
+        Some(expression) => Ok(Value::Number(Number { expression, ..number.clone() })),
+        None => Err(format!(
+            "that is no softplus beside its input, or one whose threshold, {limit}, is so low that it jumps there; \
+             nn.Softplus has 20"
+        )
+        .into()),
+    }
 }
 
 /// The lengths of a value.
@@ -259,7 +283,7 @@ fn extreme(
                 let joint = limit.as_ref().map_or(Some(other.clone()), |a| a.with(&other, pick));
                 limit = Some(joint.ok_or("of constants whose shapes do not go together")?);
             }
-            Value::Sizes => return Err("of lengths and a value".into()),
+            Value::Sizes | Value::Above(..) => return Err("of values of different kinds".into()),
         }
     }
     match limit {

@@ -14,6 +14,8 @@ pub(super) enum Value {
     Sizes,
     /// What the network has made of the input so far.
     Number(Number),
+    /// Whether a number is above a limit.
+    Above(Number, f64),
 }
 
 /// What the network has made of the input so far: an expression of what a step gave.
@@ -50,6 +52,8 @@ pub(super) struct Walk {
 pub(super) enum Problem {
     /// Its value has been gone on from by another one.
     Stale(String),
+    /// It is none of ONNX.
+    Foreign,
     /// No dense network has it.
     Unknown,
     /// In words.
@@ -89,7 +93,7 @@ impl Walk {
 
     /// Whether the network has gone on from something else since.
     pub(super) fn is_stale(&self, value: &Value) -> bool {
-        matches!(value, Value::Number(number) if number.at != self.at)
+        matches!(value, Value::Number(number) | Value::Above(number, _) if number.at != self.at)
     }
 
     /// Adds what was done with each number to the network, of `width` numbers where it does not know it.

@@ -1,0 +1,163 @@
+//! Operations of graphs that are followed: those that PyTorch writes softplus with, integers, and parts of the input.
+
+use super::made::{
+    WEIGHTS, attribute, graph, is, layer, node, node_with, outcome, places, refused, square, sums,
+    tensor,
+};
+
+/// What no graph of 4 inputs is refused for: a layer, and then these operations.
+fn after(texts: &[&str]) -> Vec<Vec<u8>> {
+    [vec![layer("x", "s")], texts.iter().map(|text| node(text)).collect()].concat()
+}
+
+/// The weights, and constants of one number.
+fn with(constants: &[(&str, f32)]) -> Vec<Vec<u8>> {
+    let constants = constants.iter().map(|(name, value)| tensor(name, &[], &[*value]));
+    [square()].into_iter().chain(constants).collect()
+}
+
+#[test]
+fn a_softplus_with_a_threshold_is_one() {
+    let named = |texts: &[&str], constants: &[(&str, f32)]| {
+        let network = outcome(&graph(&[0, 4], &after(texts), &with(constants)));
+        network.unwrap_or_else(|error| panic!("{error}")).output().name()
+    };
+    let whole = ["Softplus s -> p", "Greater s t -> g", "Where g s p -> y"];
+    assert_eq!(named(&whole, &[("t", 20.0)]), "softplus");
+    let scaled = ["Mul s b -> m", "Softplus m -> p", "Div p b -> d", "Greater m t -> g"];
+    let scaled = [&scaled[..], &["Where g s d -> y"]].concat();
+    assert_eq!(named(&scaled, &[("t", 20.0), ("b", 3.0)]), "softplus(3)");
+    let written = ["Mul s b -> m", "Exp m -> e", "Add e one -> a", "Log a -> l", "Div l b -> d"];
+    let written = [&written[..], &["Greater m t -> g", "Where g s d -> y"]].concat();
+    assert_eq!(named(&written, &[("t", 20.0), ("b", 3.0), ("one", 1.0)]), "softplus(3)");
+}
+
+#[test]
+fn lookalikes_of_a_softplus_with_a_threshold_are_refused() {
+    let not = |texts: &[&str], constants: &[(&str, f32)]| {
+        let words = ["`Where`", "no softplus", "nn.Softplus has 20"];
+        refused(&words, &[0, 4], &after(texts), &with(constants));
+    };
+    let whole = ["Softplus s -> p", "Greater s t -> g", "Where g s p -> y"];
+    for limit in [10.0, 0.0, -20.0, f32::NEG_INFINITY] {
+        not(&whole, &[("t", limit)]);
+    }
+    let t = [("t", 20.0), ("b", 3.0), ("c", 2.0)];
+    // Its input and itself the wrong way round, another input, other factors, and one that is no softplus.
+    not(&["Softplus s -> p", "Greater s t -> g", "Where g p s -> y"], &t);
+    not(&["Softplus s -> p", "Neg s -> n", "Greater s t -> g", "Where g n p -> y"], &t);
+    not(&["Softplus s -> p", "Mul s b -> m", "Greater m t -> g", "Where g s p -> y"], &t);
+    let other =
+        ["Mul s b -> m", "Mul s c -> k", "Softplus m -> p", "Div p b -> d", "Greater k t -> g"];
+    not(&[&other[..], &["Where g s d -> y"]].concat(), &t);
+    not(&["Sigmoid s -> p", "Greater s t -> g", "Where g s p -> y"], &t);
+    not(&["Softplus s -> p", "Neg s -> n", "Greater n t -> g", "Where g s p -> y"], &t);
+    let moved = ["Softplus s -> p", "Add s b -> a", "Greater a t -> g", "Where g s p -> y"];
+    not(&moved, &t);
+}
+
+#[test]
+fn what_is_true_or_false_goes_nowhere_else() {
+    let t = with(&[("t", 20.0)]);
+    refused(&["`Neg`", "true or false"], &[0, 4], &after(&["Greater s t -> g", "Neg g -> y"]), &t);
+    let both = after(&["Softplus s -> p", "Greater s p -> g", "Where g s p -> y"]);
+    refused(&["`Greater`", "both depend"], &[0, 4], &both, &t);
+    let picked = after(&["Greater s t -> g", "Where g s t -> y"]);
+    refused(&["`Where`", "no two values"], &[0, 4], &picked, &t);
+    let greatest = after(&["Greater s t -> g", "Max s g -> y"]);
+    refused(&["`Max`", "different kinds"], &[0, 4], &greatest, &t);
+    let differ = [square(), tensor("t", &[4], &[20.0, 20.0, 21.0, 20.0])];
+    let limits = after(&["Softplus s -> p", "Greater s t -> g", "Where g s p -> y"]);
+    refused(&["`Greater`", "limits that differ"], &[0, 4], &limits, &differ);
+    refused(&["output", "true or false"], &[0, 4], &after(&["Greater s t -> y"]), &t);
+    let numberless = with(&[("t", f32::NAN)]);
+    refused(&["`Greater`"], &[0, 4], &limits, &numberless);
+    // A comparison of what the network has gone on from, as any other value.
+    let stale =
+        [after(&["Greater s t -> g"]), vec![layer("s", "q")], vec![node("Where g q q -> y")]];
+    refused(&["`g` branches into"], &[0, 4], &stale.concat(), &t);
+}
+
+/// What a slice from 0 up to `end`, an integer that operations make, leaves of `W x`.
+fn sliced(width: usize, operations: &[Vec<u8>], numbers: &[(&str, i64)]) {
+    let constants = numbers.iter().map(|(name, number)| places(name, &[1], &[*number]));
+    let tensors = [square(), places("zero", &[1], &[0]), places("one", &[1], &[1])];
+    let tensors = tensors.into_iter().chain(constants).collect::<Vec<_>>();
+    let nodes =
+        [vec![layer("x", "s")], operations.to_vec(), vec![node("Slice s zero end one -> y")]];
+    is(|x| sums(x)[..width].to_vec(), &[0, 4], &nodes.concat(), &tensors);
+}
+
+#[test]
+fn integers_are_divided_as_integers() {
+    sliced(3, &[node("Div a b -> end")], &[("a", 7), ("b", 2)]);
+    sliced(1, &[node("Div a b -> end")], &[("a", -7), ("b", 2)]);
+    let chain = ["Div a b -> c", "Mul c b -> end"].map(node);
+    sliced(2, &chain, &[("a", 3), ("b", 2)]);
+    // They stay integers in other dimensions, and behind a cast.
+    let scalar = || [node("Squeeze a one0 -> c"), node("Unsqueeze c one0 -> d")];
+    let numbers = [("a", 7), ("b", 2), ("one0", 0)];
+    let after =
+        |more: &[&str]| [scalar().to_vec(), more.iter().map(|text| node(text)).collect()].concat();
+    sliced(
+        3,
+        &after(&[
+            "Div d b -> e",
+            "Mul e b -> f",
+            "Sub f b -> g",
+            "Div g b -> h",
+            "Add h one -> end",
+        ]),
+        &numbers,
+    );
+    let cast = node_with("Cast q -> end", &[attribute("to", 7)]);
+    let real = node_with("Cast a -> r", &[attribute("to", 1)]);
+    sliced(3, &[real, node("Div r b -> q"), cast], &[("a", 7), ("b", 2)]);
+    let by_zero = [layer("x", "s"), node("Div a b -> end"), node("Slice s b end one -> y")];
+    let tensors =
+        [square(), places("a", &[1], &[4]), places("b", &[1], &[0]), places("one", &[1], &[1])];
+    refused(&["`Div`", "by 0"], &[0, 4], &by_zero, &tensors);
+    let half = [node_with("Cast W -> h", &[attribute("to", 10)]), node("MatMul x h -> y")];
+    refused(&["`Cast`", "32 and 64 bits"], &[0, 4], &half, &[square()]);
+}
+
+#[test]
+fn parts_of_the_input_go_into_the_layer_behind() {
+    let picked = |x: &[f32]| sums(&[x[3], x[0], x[2], x[1]]);
+    let order = || places("i", &[4], &[3, 0, 2, -3]);
+    let gather = || node_with("Gather x i -> p", &[attribute("axis", 1)]);
+    is(picked, &[0, 4], &[gather(), layer("p", "y")], &[square(), order()]);
+    let network =
+        outcome(&graph(&[0, 4], &[gather(), layer("p", "y")], &[square(), order()])).unwrap();
+    assert_eq!(network.widths(), [4, 4], "a layer of its own");
+    // Behind an activation, and in an order of what a norm gives.
+    let curved = |x: &[f32]| picked(&x.iter().map(|x| x.tanh()).collect::<Vec<f32>>());
+    let nodes = [
+        node("Tanh x -> t"),
+        node_with("Gather t i -> p", &[attribute("axis", 1)]),
+        layer("p", "y"),
+    ];
+    is(curved, &[0, 4], &nodes, &[square(), order()]);
+    let some = |x: &[f32]| WEIGHTS[..8].chunks(2).map(|w| w[0] * x[1] + w[1] * x[2]).collect();
+    let slice = [node("Slice x from to one -> p"), node("MatMul p V -> y")];
+    let turned: Vec<f32> = (0..2).flat_map(|j| (0..4).map(move |i| WEIGHTS[2 * i + j])).collect();
+    let bounds = [places("from", &[1], &[1]), places("to", &[1], &[3]), places("one", &[1], &[1])];
+    let tensors = [vec![tensor("V", &[2, 4], &turned)], bounds.to_vec()].concat();
+    is(some, &[0, 4], &slice, &tensors);
+    refused(
+        &["`Gather`", "a part that is not there"],
+        &[0, 4],
+        &[gather(), layer("p", "y")],
+        &[square(), places("i", &[4], &[0, 1, 2, 4])],
+    );
+}
+
+#[test]
+fn what_branches_and_foreign_operators_have_a_way_out() {
+    let skip = [layer("x", "s"), node("Relu s -> r"), layer("r", "t"), node("Add r t -> y")];
+    let words = ["`r` branches into Gemm, Add", "skip connection", "net('FILE', ...)[0]"];
+    refused(&words, &[0, 4], &skip, &[square()]);
+    let foreign = [node("Gelu s -> y"), super::made::field(7, b"com.microsoft")].concat();
+    let message = outcome(&graph(&[0, 4], &[layer("x", "s"), foreign], &[square()])).unwrap_err();
+    assert!(message.contains("operators of ONNX alone") && !message.contains("Gemm"), "{message}");
+}
