@@ -7,9 +7,9 @@ mod damaged;
 
 use std::path::Path;
 
-use checkpoint::{bytes, import, pickle, refused_bytes, replaced, rewritten, with_pickle};
+use checkpoint::{bytes, import, pickle, refused_bytes, replaced, rewritten, stated, with_pickle};
+use rand::SeedableRng;
 use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 use reachcast::policy::Mlp;
 use reachcast::policy::import::Request;
 
@@ -21,7 +21,8 @@ const ONNX: &str = "damaged.onnx";
 
 /// The network of these bytes, or the refusal, which has to be one of wrong input.
 fn outcome(name: &str, content: &[u8]) -> Result<Mlp, String> {
-    let found = import(Path::new(name), content, &Request::default());
+    let request = if name == PTH { stated() } else { Request::default() };
+    let found = import(Path::new(name), content, &request);
     found.map(|found| found.network).map_err(|error| {
         assert_eq!(error.exit_code(), 2, "{error}");
         error.to_string()
@@ -111,7 +112,7 @@ fn plain_numbers_beside_a_network_are_not_dropped() {
         assert_eq!(found.left_out, [key]);
     }
     let counted = with_pickle(GOOD, &with_item("epoch", b"K\x07"));
-    let found = import(PTH.as_ref(), &counted, &Request::default()).unwrap();
+    let found = import(PTH.as_ref(), &counted, &stated()).unwrap();
     assert_eq!(found.left_out, ["epoch"]);
 }
 
@@ -272,18 +273,7 @@ fn changed_bits_of_a_checkpoint_are_refused_or_change_nothing() {
 fn changed_bytes_of_pickles_and_graphs_crash_nothing() {
     let mut draw = StdRng::seed_from_u64(1);
     let mut outcomes = [0, 0];
-    let mut damage = |whole: &[u8]| {
-        let mut changed = whole.to_vec();
-        for _ in 0..draw.random_range(1..=4) {
-            let at = draw.random_range(0..changed.len());
-            changed[at] = match draw.random_range(0..3) {
-                0 => draw.random(),
-                1 => changed[at] ^ 1 << draw.random_range(0..8),
-                _ => whole[draw.random_range(0..whole.len())],
-            };
-        }
-        changed
-    };
+    let mut damage = |whole: &[u8]| checkpoint::damaged(whole, &mut draw);
     let whole = pickle("tianshou.pth");
     let request = Request { networks: vec!["critic_old".to_owned()], ..Request::default() };
     for _ in 0..2_000 {

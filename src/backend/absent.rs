@@ -25,6 +25,10 @@ pub(super) fn any() -> Result<Gpu> {
 }
 
 impl Gpu {
+    pub(super) fn name(&self) -> &'static str {
+        match *self {}
+    }
+
     pub(super) fn device(&self) -> String {
         match *self {}
     }

@@ -39,11 +39,11 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// `cpu` or `gpu`.
+    /// `cpu` or `gpu`, whoever gave results; `gpu` where both did.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Cpu(_) => "cpu",
-            Self::Gpu(_) => "gpu",
+            Self::Gpu(gpu) => gpu.name(),
         }
     }
 

@@ -62,6 +62,9 @@ struct Import {
     left_out: Vec<String>,
     /// The library or format whose layout the file has.
     layout: Option<String>,
+    /// Whether something of the file may act on what the policy is given or gives.
+    #[serde(skip)]
+    may_bear: bool,
     /// What else was made of the file, and what its library does that is not in it.
     notes: Vec<String>,
     widths: Vec<usize>,
@@ -96,6 +99,8 @@ pub(super) fn import(global: &Global, asked: &ImportArguments) -> Result<Outcome
         out: out.display().to_string(),
         layers: found.layers,
         left_out: found.left_out,
+        // Nothing around layers that are named is looked at; else what may act is refused.
+        may_bear: !asked.network.is_empty(),
         layout: found.layout,
         notes: found.notes,
         widths: network.widths(),
@@ -186,22 +191,22 @@ fn import_text(import: &Import) -> String {
         inputs.as_deref().unwrap_or("not named; --config or --state-order names them"),
         import.digest,
         import.notes.iter().map(|note| format!("note        {note}\n")).collect::<String>(),
-        left_out(&import.left_out),
+        left_out(&import.left_out, import.may_bear),
     )
 }
 
 /// What of the file is no part of the network; nothing if all is.
-fn left_out(names: &[String]) -> String {
+fn left_out(names: &[String], may_bear: bool) -> String {
     if names.is_empty() {
         return String::new();
     }
-    format!(
-        "left out    {}\n\
-         note: these tensors of the file are no part of the policy; if some of them act on its \
-         inputs or outputs (statistics that normalise observations do), it is another policy \
-         without them\n",
-        grouped(names).join(", ")
-    )
+    let listed = format!("left out    {}\n", grouped(names).join(", "));
+    if !may_bear {
+        return listed;
+    }
+    listed
+        + "note: these tensors of the file are no part of the policy; if some of them act on its inputs or outputs \
+           (statistics that normalise observations do), it is another policy without them\n"
 }
 
 /// All names, those that begin alike together where there are many.

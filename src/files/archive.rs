@@ -1,7 +1,9 @@
-//! Zip archives whose entries are stored as they are, read without trusting a length in them.
+//! Zip archives whose entries are stored as they are, or are texts that are compressed, read without trusting a length
+//! in them.
 
 use std::io::{Read, Seek};
 
+use miniz_oxide::inflate::decompress_to_vec_with_limit;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
@@ -46,5 +48,27 @@ impl<R: Read + Seek> Archive<R> {
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(|e| e.to_string())?;
         Ok(bytes)
+    }
+
+    /// Content of the entry number `index`, at most `most` bytes, which may be compressed.
+    ///
+    /// # Errors
+    /// A sentence about an entry that is damaged, larger, or compressed by another method than deflate.
+    pub(crate) fn inflated(&mut self, index: usize, most: usize) -> Result<Vec<u8>, String> {
+        if self
+            .zip
+            .by_index_raw(index)
+            .is_ok_and(|file| file.compression() == CompressionMethod::Stored)
+        {
+            return self.read(index);
+        }
+        let mut file = self.zip.by_index_raw(index).map_err(|e| e.to_string())?;
+        if file.compression() != CompressionMethod::DEFLATE || file.compressed_size() > self.size {
+            return Err("compressed by a method that is not read, or damaged".to_owned());
+        }
+        let mut packed = Vec::new();
+        file.read_to_end(&mut packed).map_err(|e| e.to_string())?;
+        decompress_to_vec_with_limit(&packed, most)
+            .map_err(|_| format!("damaged, or more than {most} bytes"))
     }
 }

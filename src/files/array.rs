@@ -105,6 +105,18 @@ pub(super) fn header(descr: &str, shape: &[u64]) -> Vec<u8> {
     bytes
 }
 
+/// The elements with the last index the fastest, where it was the first.
+#[cfg(feature = "cli")]
+pub(super) fn by_rows<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
+    let (mut places, mut stride) = (vec![0], 1);
+    for &length in shape {
+        let row = |start: usize| (0..length).map(move |i| start + i * stride);
+        places = places.into_iter().flat_map(row).collect();
+        stride *= length;
+    }
+    places.into_iter().map(|place| values[place]).collect()
+}
+
 /// The bytes of a .npy file with the f32 `values`, row by row, in the shape `[rows, columns]`.
 pub fn npy_bytes(values: &[f32], [rows, columns]: [usize; 2]) -> Vec<u8> {
     debug_assert_eq!(values.len(), rows * columns);

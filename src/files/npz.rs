@@ -9,7 +9,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::archive::Archive;
-use super::array::{NpyHeader, header};
+use super::array::{NpyHeader, by_rows, header};
 use crate::digest::sha256;
 use crate::error::{Error, Result};
 
@@ -121,6 +121,17 @@ impl Data {
             _ => return None,
         })
     }
+
+    /// The same elements of an array of this shape, the first index of which ran fastest.
+    fn by_rows(self, shape: &[usize]) -> Self {
+        match self {
+            Self::F32(values) => Self::F32(by_rows(&values, shape)),
+            Self::F64(values) => Self::F64(by_rows(&values, shape)),
+            Self::U8(values) => Self::U8(by_rows(&values, shape)),
+            Self::U32(values) => Self::U32(by_rows(&values, shape)),
+            Self::U64(values) => Self::U64(by_rows(&values, shape)),
+        }
+    }
 }
 
 /// The elements of `N` bytes each.
@@ -228,11 +239,6 @@ pub(crate) fn npy_array_bytes(array: &Array) -> Vec<u8> {
 /// The array of a .npy file in memory.
 fn parse(mut bytes: &[u8]) -> std::result::Result<Array, String> {
     let NpyHeader { descr, fortran_order, shape } = NpyHeader::read(&mut bytes)?;
-    if fortran_order && shape.len() > 1 {
-        return Err(
-            "column-major order, where rows one after the other are expected; in NumPy: numpy.ascontiguousarray(x, dtype=\"<f4\")".to_owned()
-        );
-    }
     let data = Data::parse(&descr, bytes).ok_or_else(|| {
         format!(
             "{} bytes are no array of type `{descr}`: little-endian numbers of 32 or 64 bits are expected; in NumPy: \
@@ -241,9 +247,13 @@ fn parse(mut bytes: &[u8]) -> std::result::Result<Array, String> {
         )
     })?;
     let elements = shape.iter().try_fold(1, |n: u64, &length| n.checked_mul(length));
-    let whole = shape.iter().map(|&length| usize::try_from(length).ok()).collect();
+    let whole =
+        shape.iter().map(|&length| usize::try_from(length).ok()).collect::<Option<Vec<_>>>();
     match (elements, whole) {
-        (Some(n), Some(shape)) if n == data.len() as u64 => Ok(Array { shape, data }),
+        (Some(n), Some(shape)) if n == data.len() as u64 => {
+            let data = if fortran_order { data.by_rows(&shape) } else { data };
+            Ok(Array { shape, data })
+        }
         _ => Err(format!("{} elements do not fill the shape {shape:?}", data.len())),
     }
 }
@@ -365,13 +375,26 @@ mod tests {
         assert!(problem("<f4", &[u64::MAX], 8).contains("do not fill"));
         assert!(with_entry("x.txt", b"").unwrap_err().to_string().contains("x.txt"));
         assert!(with_entry("x.npy", b"\x93NUM").unwrap_err().to_string().contains("x.npy"));
-        let fortran =
-            String::from_utf8_lossy(&header("<f4", &[1, 1])[10..]).replace("False", "True ");
-        let mut content = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-        content.extend(fortran.as_bytes());
-        content.extend([0; 4]);
-        let error = with_entry("x.npy", &content).unwrap_err().to_string();
-        assert!(error.contains("column-major"), "{error}");
+    }
+
+    #[test]
+    fn arrays_by_columns_come_back_by_rows() {
+        let by_columns = |shape: &[u64], values: &[u8]| {
+            let text = header("|u1", shape);
+            let text = String::from_utf8_lossy(&text[10..]).replace("False", "True ");
+            let mut content = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+            content.extend(text.as_bytes());
+            content.extend(values);
+            parse(&content).unwrap()
+        };
+        // [[1, 2, 3], [4, 5, 6]].
+        let two = by_columns(&[2, 3], &[1, 4, 2, 5, 3, 6]);
+        assert_eq!(two, array(&[2, 3], Data::U8(vec![1, 2, 3, 4, 5, 6])));
+        // Its number i, j, k is 4 i + 2 j + k.
+        let three = by_columns(&[2, 2, 2], &[0, 4, 2, 6, 1, 5, 3, 7]);
+        assert_eq!(three, array(&[2, 2, 2], Data::U8((0..8).collect())));
+        assert_eq!(by_columns(&[3], &[7, 8, 9]), array(&[3], Data::U8(vec![7, 8, 9])));
+        assert!(by_columns(&[0, 3], &[]).data.is_empty());
     }
 
     #[test]

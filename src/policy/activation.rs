@@ -16,6 +16,17 @@ const LOWEST: f32 = -40.0;
 const LOWEST_NORMAL: f32 = -9.0;
 /// The same where a factor is a bare exponential, which f32 still has at -103.
 const LOWEST_EXPONENT: f32 = -105.0;
+/// What other programs call some of them.
+const OTHER_NAMES: [(&str, &str); 8] = [
+    ("swish", "silu"),
+    ("linear", "identity"),
+    ("none", "identity"),
+    ("logistic", "sigmoid"),
+    ("lrelu", "leaky_relu"),
+    ("htanh", "hardtanh"),
+    ("geluapproximate", "gelu_tanh"),
+    ("clip", "hardtanh"),
+];
 /// Beyond it 1 makes no difference.
 const FAR: f32 = 1e30;
 
@@ -298,7 +309,9 @@ impl FromStr for Activation {
         let (word, rest) =
             text.split_once('(').map_or((text, None), |(word, rest)| (word, Some(rest)));
         let kind = Self::ALL.into_iter().find(|kind| kind.word() == word.trim());
-        let kind = kind.ok_or_else(|| format!("`{text}` is none of {}", Self::words()))?;
+        let meant = || nearest(word).map_or(String::new(), |kind| format!("; `{kind}` is meant?"));
+        let kind =
+            kind.ok_or_else(|| format!("`{text}` is none of {}{}", Self::words(), meant()))?;
         let Some(rest) = rest else { return Ok(kind) };
         let takes = kind.parameters().len();
         let problem = || format!("`{text}`: `{word}` takes {takes} numbers in brackets");
@@ -308,6 +321,15 @@ impl FromStr for Activation {
         let found = kind.with(&numbers).ok_or_else(problem)?;
         found.check().map(|()| found)
     }
+}
+
+/// The word that another spelling or another name of an activation stands for.
+fn nearest(word: &str) -> Option<&'static str> {
+    let plain = |text: &str| text.trim().to_lowercase().replace(['_', '-', ' '], "");
+    let word = plain(word);
+    let other = OTHER_NAMES.iter().find(|(name, _)| *name == word).map(|(_, known)| *known);
+    let mut words = Activation::ALL.iter().map(|kind| kind.word());
+    other.or_else(|| words.find(|known| plain(known) == word))
 }
 
 #[cfg(test)]

@@ -54,7 +54,8 @@ impl Mlp {
 
 /// `layer` with the factors of `map` in its weights; none where that is not exact.
 fn folded(map: &Rescale, layer: &Layer, end: End) -> Option<Layer> {
-    let plain = map.is_affine() && map.shift.iter().all(|shift| *shift == 0.0);
+    let unmoved = map.shift.iter().all(|shift| *shift == 0.0) && !map.is_centered();
+    let plain = map.is_affine() && unmoved;
     let bare = layer.norm.is_none() && layer.activation == Activation::Identity;
     if !plain || (matches!(end, End::Outputs) && !bare) {
         return None;

@@ -106,6 +106,7 @@ impl Writer {
     /// Adds a map called `name`; what does nothing is left out.
     fn map(&mut self, name: &str, map: &Rescale) {
         let parts = [
+            ("Sub", "center", &map.center, 0.0),
             ("Mul", "scale", &map.scale, 1.0),
             ("Add", "shift", &map.shift, 0.0),
             ("Max", "low", &map.low, f32::NEG_INFINITY),

@@ -2,7 +2,8 @@
 //!
 //! f32 tensors: `layers.{i}.weight` `[out, in]` and `layers.{i}.bias` `[out]` of each layer; `layers.{i}.norm.weight`
 //! and `layers.{i}.norm.bias` `[out]` of one with a LayerNorm; `input.scale`, `input.shift`, `input.low` and
-//! `input.high` `[in]` of a map of the inputs, `output.scale` and so on `[out]` of one of the outputs.
+//! `input.high` `[in]` of a map of the inputs, and `input.center` where it has one; `output.scale` and so on `[out]` of
+//! one of the outputs.
 //!
 //! Metadata: `activation` of the hidden layers and `output`, that of the last layer; where the hidden layers differ,
 //! `activations` in their place, a word for each layer with spaces between; `layers.{i}.norm.epsilon`, a number;
@@ -24,8 +25,9 @@ use crate::files::{RECORD_BYTES, read};
 const ENTRIES: [&str; 5] = ["activation", "output", "activations", "state_order", "format"];
 /// Bytes of the length of the header.
 const LENGTH: usize = 8;
-/// The tensors of a map.
+/// The tensors of a map, and one that it may have.
 const MAP: [&str; 4] = ["scale", "shift", "low", "high"];
+const CENTER: &str = "center";
 
 impl Mlp {
     /// Reads a safetensors file.
@@ -127,7 +129,8 @@ impl Mlp {
         let maps = ends.into_iter().filter_map(|(end, map)| Some((end, map?)));
         layers.chain(maps.flat_map(|(end, map)| {
             let name = move |kind| format!("{end}.{kind}");
-            map.tensors().map(|(kind, values)| (name(kind), vec![values.len()], values.as_slice()))
+            map.tensors()
+                .map(move |(kind, values)| (name(kind), vec![values.len()], values.as_slice()))
         }))
     }
 }
@@ -146,7 +149,8 @@ fn is_known(name: &str, count: usize) -> bool {
         let kinds = ["weight", "bias", "norm.weight", "norm.bias"];
         i < count && kinds.iter().any(|kind| *name == format!("layers.{i}.{kind}"))
     };
-    let of_map = |(end, kind)| ["input", "output"].contains(&end) && MAP.contains(&kind);
+    let of_map =
+        |(end, kind)| ["input", "output"].contains(&end) && (MAP.contains(&kind) || kind == CENTER);
     number_of(name).is_some_and(of_layer) || name.split_once('.').is_some_and(of_map)
 }
 
@@ -243,10 +247,11 @@ impl File<'_> {
         Ok(Some(Norm { scale, shift, epsilon }))
     }
 
-    /// The map at `end`: all four tensors, or none.
+    /// The map at `end`: four tensors, and a center, or none of them.
     fn map(&self, end: &str) -> std::result::Result<Option<Rescale>, String> {
         let name = |kind: &str| format!("{end}.{kind}");
-        if !MAP.iter().any(|kind| self.tensors.tensor(&name(kind)).is_ok()) {
+        let has = |kind: &str| self.tensors.tensor(&name(kind)).is_ok();
+        if !MAP.into_iter().any(has) && !has(CENTER) {
             return Ok(None);
         }
         let (scale, shape) = self.numbers(&name("scale"))?;
@@ -256,7 +261,9 @@ impl File<'_> {
             ));
         };
         let vector = |kind: &str| self.vector(&name(kind), count);
+        let center = if has(CENTER) { vector(CENTER)? } else { vec![0.0; count] };
         Ok(Some(Rescale {
+            center,
             scale,
             shift: vector("shift")?,
             low: vector("low")?,
@@ -299,7 +306,7 @@ impl File<'_> {
         };
         Err(format!(
             "tensor `{first}`: {problem}; a policy file has layers.{{i}}.weight and layers.{{i}}.bias, i = 0, 1, ..., \
-             layers.{{i}}.norm.weight and .bias, and scale, shift, low and high of input and output"
+             layers.{{i}}.norm.weight and .bias, and scale, shift, low, high and center of input and output"
         ))
     }
 

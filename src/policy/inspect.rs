@@ -165,7 +165,9 @@ fn normed(norm: &Norm, sums: &[Interval]) -> Vec<Interval> {
 /// The range of each number behind a map.
 fn mapped(map: &Rescale, x: &[Interval]) -> Vec<Interval> {
     let each = x.iter().enumerate().map(|(i, &x)| {
-        let moved = Interval::point(map.scale[i].into()) * x + Interval::point(map.shift[i].into());
+        let [center, scale, shift] =
+            [&map.center, &map.scale, &map.shift].map(|values| Interval::point(values[i].into()));
+        let moved = scale * (x - center) + shift;
         let (low, high) = (f64::from(map.low[i]), f64::from(map.high[i]));
         Interval::new(moved.low.clamp(low, high), moved.high.clamp(low, high))
     });

@@ -36,10 +36,13 @@ pub struct Norm {
     pub epsilon: f32,
 }
 
-/// An affine map of each number at an end of a network, and a clip behind it: `scale x + shift` within `low`
-/// and `high`, which are infinite where there is no limit.
+/// An affine map of each number at an end of a network, and a clip behind it: `scale (x - center) + shift` within
+/// `low` and `high`, which are infinite where there is no limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rescale {
+    /// What is taken away first, 0 in most maps: of numbers far from 0, a difference keeps digits that a sum of
+    /// products loses.
+    pub center: Vec<f32>,
     /// Factors.
     pub scale: Vec<f32>,
     /// Summands.
@@ -153,7 +156,13 @@ impl Rescale {
     /// `scale x + shift` without limits.
     pub fn affine(scale: Vec<f32>, shift: Vec<f32>) -> Self {
         let count = scale.len();
-        Self { scale, shift, low: vec![f32::NEG_INFINITY; count], high: vec![f32::INFINITY; count] }
+        Self {
+            center: vec![0.0; count],
+            scale,
+            shift,
+            low: vec![f32::NEG_INFINITY; count],
+            high: vec![f32::INFINITY; count],
+        }
     }
 
     /// The map of `x`.
@@ -164,7 +173,9 @@ impl Rescale {
     /// Of number `i`; what does nothing is left out.
     fn at<R: Real>(&self, i: usize, x: R) -> R {
         let (scale, shift) = (self.scale[i], self.shift[i]);
-        let scaled = if scale == 1.0 { x } else { R::lit(scale) * x };
+        let center = self.center[i];
+        let apart = if center == 0.0 { x } else { x - R::lit(center) };
+        let scaled = if scale == 1.0 { apart } else { R::lit(scale) * apart };
         let moved = if shift == 0.0 { scaled } else { scaled + R::lit(shift) };
         let (low, high) = (R::lit(self.low[i]), R::lit(self.high[i]));
         match (self.low[i].is_finite(), self.high[i].is_finite()) {
@@ -185,15 +196,27 @@ impl Rescale {
         self.scale.iter().fold(0.0, |most, scale| most.max(f64::from(*scale).abs()))
     }
 
-    /// Its tensors by name.
-    pub(super) fn tensors(&self) -> [(&'static str, &Vec<f32>); 4] {
-        [("scale", &self.scale), ("shift", &self.shift), ("low", &self.low), ("high", &self.high)]
+    /// Whether it takes something away first.
+    pub(super) fn is_centered(&self) -> bool {
+        self.center.iter().any(|center| *center != 0.0)
+    }
+
+    /// Its tensors by name; the center where there is one.
+    pub(super) fn tensors(&self) -> impl Iterator<Item = (&'static str, &Vec<f32>)> {
+        let center = self.is_centered().then_some(("center", &self.center));
+        let others = [
+            ("scale", &self.scale),
+            ("shift", &self.shift),
+            ("low", &self.low),
+            ("high", &self.high),
+        ];
+        others.into_iter().chain(center)
     }
 
     /// Refuses a map at `end`, of another size than `count`, with numbers that are not finite, or without room
     /// between limits.
     pub(super) fn validate(&self, end: &str, count: usize) -> Result<(), String> {
-        for (kind, values) in self.tensors() {
+        for (kind, values) in self.tensors().chain([("center", &self.center)]) {
             if values.len() != count {
                 return Err(format!(
                     "{end}.{kind} has {} entries, the network has {count} {end}s",
@@ -201,6 +224,7 @@ impl Rescale {
                 ));
             }
         }
+        all_finite(&format!("{end}.center"), &self.center)?;
         all_finite(&format!("{end}.scale"), &self.scale)?;
         all_finite(&format!("{end}.shift"), &self.shift)?;
         let wrong =

@@ -189,8 +189,11 @@ impl Mlp {
         let layers = self.layers.iter();
         let norm = |layer: &Layer| layer.norm.as_ref().map(|norm| norm.epsilon);
         let layers: Vec<_> = layers.map(|layer| (layer.activation, norm(layer))).collect();
-        let maps = [self.input.is_some(), self.output.is_some()];
-        format!("{widths:?} {layers:?} {:?} {maps:?}", self.hidden)
+        let maps = [&self.input, &self.output];
+        let centered = maps.map(|map| map.as_ref().is_some_and(|map| map.is_centered()));
+        let maps = maps.map(|map| map.is_some());
+        let centers = if centered == [false; 2] { String::new() } else { format!(" {centered:?}") };
+        format!("{widths:?} {layers:?} {:?} {maps:?}{centers}", self.hidden)
     }
 
     /// The bytes of all numbers: layer by layer weights, biases and those of the norm, then the maps.

@@ -170,7 +170,8 @@ fn total(all: &[Affine]) -> Affine {
 fn mapped(map: &Rescale, x: &[Affine], symbols: &mut Symbols) -> Vec<Affine> {
     let each = x.iter().enumerate().map(|(i, x)| {
         let number = |value: f32| f64::from(value);
-        let moved = Affine::combination(&[(number(map.scale[i]), x)], number(map.shift[i]));
+        let apart = Affine::combination(&[(1.0, x)], -number(map.center[i]));
+        let moved = Affine::combination(&[(number(map.scale[i]), &apart)], number(map.shift[i]));
         let limits = [map.low[i], map.high[i]].map(|limit| Affine::constant(number(limit)));
         choice::clamp(&moved, [&limits[0], &limits[1]], symbols)
     });

@@ -6,6 +6,9 @@
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
+use rand::RngExt;
+use rand::rngs::StdRng;
+use reachcast::policy::Activation;
 use reachcast::policy::import::{Imported, Request, from_bytes};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
@@ -18,6 +21,26 @@ pub(crate) fn path(name: &str) -> PathBuf {
 /// Its content.
 pub(crate) fn bytes(name: &str) -> Vec<u8> {
     std::fs::read(path(name)).unwrap()
+}
+
+/// A request that states what a plain checkpoint does not say: `relu` between its layers, and `tanh` at the end.
+pub(crate) fn stated() -> Request {
+    let (activation, output) = (Some(Activation::Relu), Some(Activation::Tanh));
+    Request { activation, output, ..Request::default() }
+}
+
+/// `content` with up to four bytes changed at random: to others, by a bit, or to bytes of other places.
+pub(crate) fn damaged(content: &[u8], draw: &mut StdRng) -> Vec<u8> {
+    let mut changed = content.to_vec();
+    for _ in 0..draw.random_range(1..=4) {
+        let at = draw.random_range(0..changed.len());
+        changed[at] = match draw.random_range(0..3) {
+            0 => draw.random(),
+            1 => changed[at] ^ 1 << draw.random_range(0..8),
+            _ => content[draw.random_range(0..content.len())],
+        };
+    }
+    changed
 }
 
 /// Imports `content` as the file `name`.

@@ -6,11 +6,13 @@ use reachcast::policy::import::{Origin, Request, from_bytes};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, serialize};
 
+use crate::checkpoint::stated;
+
 /// Layers by their names, from 4 numbers to 2, each with so many outputs.
-type Layers<'a> = &'a [(&'a str, [usize; 2])];
+pub(super) type Layers<'a> = &'a [(&'a str, [usize; 2])];
 
 /// A safetensors file of these layers, and of tensors of one number.
-fn file(layers: Layers<'_>, others: &[&str]) -> Vec<u8> {
+pub(super) fn file(layers: Layers<'_>, others: &[&str]) -> Vec<u8> {
     let mut numbers: BTreeMap<String, (Vec<usize>, Vec<u8>)> = BTreeMap::new();
     let bytes =
         |count: usize| (0..count).flat_map(|i| ((i as f32 * 0.7).sin()).to_le_bytes()).collect();
@@ -126,7 +128,7 @@ fn what_may_act_on_a_network_is_not_dropped() {
         );
     }
     let content = file(&layers, &["log_std", "optimizer.lr", "epoch"]);
-    let found = from_bytes("x.safetensors".as_ref(), &content, &Request::default()).unwrap();
+    let found = from_bytes("x.safetensors".as_ref(), &content, &stated()).unwrap();
     assert_eq!(found.left_out, ["epoch", "log_std", "optimizer.lr"]);
     // What is a policy file is none to be imported.
     let own = found.network.to_bytes();
@@ -139,7 +141,8 @@ fn what_may_act_on_a_network_is_not_dropped() {
 fn an_order_that_the_names_do_not_say_is_asked_for() {
     let chain = |names: [&'static str; 3], networks: &[&str]| {
         let content = file(&names.map(|name| (name, [4, 4])), &[]);
-        from_bytes("x.safetensors".as_ref(), &content, &super::named(networks))
+        let networks = super::named(networks).networks;
+        from_bytes("x.safetensors".as_ref(), &content, &Request { networks, ..stated() })
     };
     let refusal = |names| chain(names, &[]).unwrap_err().to_string();
     let error = refusal(["fc1", "log_std", "mean"]);
@@ -177,7 +180,7 @@ fn told(metadata: &[(&str, &str)], integers: &[&str]) -> Vec<u8> {
 
 #[test]
 fn what_a_file_says_beside_its_tensors_is_not_dropped() {
-    let read = |content: &[u8]| from_bytes("x.safetensors".as_ref(), content, &Request::default());
+    let read = |content: &[u8]| from_bytes("x.safetensors".as_ref(), content, &stated());
     let refusal = |content: &[u8]| read(content).unwrap_err().to_string();
     let error = refusal(&told(&[("obs_mean", "[0.1, 0.2]"), ("action_scale", "2.0")], &[]));
     assert!(error.contains("`action_scale`, `obs_mean` may act on"), "{error}");

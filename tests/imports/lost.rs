@@ -3,6 +3,7 @@
 use reachcast::policy::import::Request;
 
 use super::{imported, named, refusal};
+use crate::checkpoint::stated;
 
 #[test]
 fn recurrences_are_refused_unless_the_dense_layers_are_asked_for() {
@@ -26,7 +27,7 @@ fn heads_are_named() {
 
 #[test]
 fn what_is_left_out_is_named_one_by_one() {
-    let left_out = |name: &str| imported(name, &Request::default()).left_out;
+    let left_out = |name: &str| imported(name, &stated()).left_out;
     let lightning = left_out("lightning.ckpt");
     let callback = "callbacks.best (pytorch_lightning.callbacks.model_checkpoint.ModelCheckpoint)";
     assert!(lightning.contains(&callback.to_owned()), "{lightning:?}");

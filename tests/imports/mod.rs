@@ -1,5 +1,6 @@
 //! Policies of the libraries of the field: what comes out of each file is what its library makes of it.
 
+mod doubt;
 mod forward;
 mod layouts;
 mod lost;

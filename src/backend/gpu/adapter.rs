@@ -183,9 +183,21 @@ impl Gpu {
         &self.adapter
     }
 
-    /// The adapter in words: name, interface, kind and driver.
+    /// The adapter in words: name, interface, kind and driver; where the CPU has taken over, the CPU too, and alone
+    /// if no result came from the adapter.
     pub fn device(&self) -> String {
-        self.adapter.to_string()
+        let (on_cpu, served) = (self.state().on_cpu, self.state().served);
+        match self.fallback.as_ref().filter(|_| on_cpu) {
+            Some(cpu) if served => format!("{}; then {}", self.adapter, cpu.device()),
+            Some(cpu) => cpu.device(),
+            None => self.adapter.to_string(),
+        }
+    }
+
+    /// `gpu`, or `cpu` where all results came from there.
+    pub(in crate::backend) fn name(&self) -> &'static str {
+        let state = self.state();
+        if state.on_cpu && !state.served { "cpu" } else { "gpu" }
     }
 }
 

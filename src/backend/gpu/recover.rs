@@ -151,8 +151,12 @@ impl Gpu {
             if let Some(cpu) = self.fallback.as_ref().filter(|_| on_cpu) {
                 return run(Runner::Cpu(cpu), &delivered);
             }
-            let attempt = Attempt::new(limit);
-            match run(Runner::Adapter(&opened, &attempt), &delivered) {
+            let (attempt, before) = (Attempt::new(limit), delivered.next.get());
+            let outcome = run(Runner::Adapter(&opened, &attempt), &delivered);
+            if outcome.is_ok() || delivered.next.get() > before {
+                self.state().served = true;
+            }
+            match outcome {
                 Err(error) if !delivered.refused.get() => {
                     let Failure { fault, problem } = self.survivable(error)?;
                     let columns = attempt.columns.get();

@@ -14,12 +14,14 @@ pub(super) struct State {
     pub(super) reopened: bool,
     /// Whether everything goes to the CPU from now on.
     pub(super) on_cpu: bool,
+    /// Whether results came from the adapter.
+    pub(super) served: bool,
 }
 
 impl State {
     pub(super) fn new(opened: Opened) -> Self {
-        let (reopened, on_cpu) = (false, false);
-        Self { opened: Arc::new(opened), limit: Limit::default(), reopened, on_cpu }
+        let (reopened, on_cpu, served) = (false, false, false);
+        Self { opened: Arc::new(opened), limit: Limit::default(), reopened, on_cpu, served }
     }
 
     /// The device and what is kept on it.

@@ -38,6 +38,12 @@ impl<'a> Entries<'a> {
         &self.names
     }
 
+    /// The names of the entries of the folder that begin with `start`, without the folder.
+    pub(super) fn within(&self, start: &str) -> Vec<String> {
+        let own = self.names.iter().filter_map(|entry| entry.strip_prefix(&self.folder));
+        own.filter(|name| name.starts_with(start)).map(str::to_owned).collect()
+    }
+
     /// Whether there is an entry `name`.
     pub(super) fn has(&self, name: &str) -> bool {
         self.index(name).is_some()
@@ -50,6 +56,15 @@ impl<'a> Entries<'a> {
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, String> {
         let index = self.index(name).ok_or_else(|| format!("no entry `{name}`"))?;
         self.archive.read(index).map_err(|problem| format!("entry `{name}`: {problem}"))
+    }
+
+    /// Content of the entry `name`, at most `most` bytes, which may be compressed.
+    ///
+    /// # Errors
+    /// As [`Entries::read`].
+    pub(super) fn inflated(&mut self, name: &str, most: usize) -> Result<Vec<u8>, String> {
+        let index = self.index(name).ok_or_else(|| format!("no entry `{name}`"))?;
+        self.archive.inflated(index, most).map_err(|problem| format!("entry `{name}`: {problem}"))
     }
 
     /// Number of the entry `name`.

@@ -90,6 +90,13 @@ pub(super) fn is_harmless(Name { module, name }: Name<'_>) -> Result<(), String>
     let first = module.split('.').next().unwrap_or_default();
     let builtin = matches!(first, "builtins" | "__builtin__") && !BUILTINS.contains(&name);
     let loader = LOADERS.contains(&name);
+    if builtin && name == "getattr" {
+        return Err(format!(
+            "names `{module}.{name}`, with which objects of Python are made, as policy.save() of stable-baselines3 and \
+             torch.save(module, FILE) write them; nothing was executed. Save the model, model.save(FILE), or tensors alone: \
+             torch.save(model.policy.state_dict(), FILE)"
+        ));
+    }
     match builtin || loader || HOSTILE.contains(&first) {
         true => Err(format!(
             "names `{module}.{name}`, which runs programs, or reads or writes files; nothing was executed, and the file is not to be trusted"

@@ -3,7 +3,7 @@
 use super::archive::Entries;
 use super::pickle;
 use super::source::Source;
-use super::{collect, legacy};
+use super::{collect, legacy, script};
 
 /// Longest pickle beside its storages, bytes: some 100,000 tensors.
 const LONGEST: usize = 1 << 24;
@@ -30,7 +30,8 @@ pub(super) fn open(mut entries: Entries<'_>) -> Result<Source<'_>, String> {
                     state dict before it is compiled: torch.save(module.state_dict(), FILE)"
             .to_owned());
     }
-    Ok(Source { entries: Some(entries), ..source })
+    let script = if compiled { Some(script::read(&mut entries)?) } else { None };
+    Ok(Source { entries: Some(entries), script, ..source })
 }
 
 /// The tensors of a pickle that is a file of its own: JAX's, or PyTorch's before 1.6.

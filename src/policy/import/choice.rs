@@ -3,14 +3,16 @@
 use std::collections::HashSet;
 
 use super::bearing::{is_memory, is_parametrized};
+use super::dense::{Dense, Order};
 use super::draft::{Draft, MOST_LAYERS, Step};
 use super::kind::Cast;
-use super::layers::{self, Dense, Order};
+use super::layers;
 use super::layouts::{self, Layout, Recognised};
 use super::linear::Linear;
 use super::lost;
 use super::map::Map;
 use super::names::{split, under};
+use super::order;
 use super::request::{Hints, Imported, Origin, Request};
 use super::source::{Source, Tensor};
 use super::statistics;
@@ -68,6 +70,7 @@ pub(super) fn policy(
     let dicts = choice.layers.iter().map(|layer| layer.weight.dict).collect();
     lost::refuse_unmade(&source, &dicts)?;
     let mut made = Made::default();
+    choice.check_script(&source, request, &mut made)?;
     choice.add_statistics(&mut source, &mut made)?;
     choice.add_layers(&mut source, &mut made, request, hints)?;
     if !choice.by_name {
@@ -78,6 +81,9 @@ pub(super) fn policy(
         let beside = choice.layout.map_or(Vec::new(), |layout| layout.beside(&choice.outer));
         lost::refuse(&source, &made.used, &beside, &own)?;
     }
+    let network = made.draft.network()?;
+    // Last, since what is asked for is of no use to a file that is refused for another reason.
+    choice.check_stated(request, hints)?;
     let origin = |stated: bool, hinted: bool| match (stated, hinted, choice.layout) {
         (true, ..) => Origin::Stated,
         (_, true, _) => Origin::File,
@@ -85,7 +91,7 @@ pub(super) fn policy(
         _ => Origin::Default,
     };
     Ok(Imported {
-        network: made.draft.network()?,
+        network,
         left_out: lost::left_out(&source, &made.used),
         layers: choice.layers.into_iter().map(|layer| layer.name).collect(),
         layout: choice.layout.map(|layout| layout.name.to_owned()),
@@ -112,6 +118,7 @@ impl Choice {
         layers::check(&layers)?;
         if !by_name && recognised.is_none() {
             layers::check_order(&layers)?;
+            order::check(&layers)?;
         }
         if layers.len() > MOST_LAYERS {
             return Err(format!("{} layers; a network has at most {MOST_LAYERS}", layers.len()));
@@ -127,14 +134,83 @@ impl Choice {
         })
     }
 
+    /// Refuses a compiled module whose code does more than these layers, unless what lies between them is stated.
+    fn check_script(
+        &self,
+        source: &Source<'_>,
+        request: &Request,
+        made: &mut Made,
+    ) -> Result<(), String> {
+        let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
+        let beyond = source.script.as_ref().and_then(|script| script.beyond(&names));
+        let Some(beyond) = beyond else { return Ok(()) };
+        match (request.activation, request.output) {
+            (Some(_), Some(_)) => {
+                made.notes.push(format!("not in it: the code of the module does more: {beyond}"));
+                Ok(())
+            }
+            _ => Err(format!(
+                "the code of this TorchScript module does more than its layers one after the other: {beyond}. An ONNX \
+                 export keeps it: torch.onnx.export(module, torch.zeros(1, INPUTS), 'policy.onnx'), of the module \
+                 before it is compiled; --activation and --output, both stated, import its layers in a row without it"
+            )),
+        }
+    }
+
+    /// Refuses layers of which nobody says what lies between them: neither the file, nor a layout, nor the request.
+    fn check_stated(&self, request: &Request, hints: &Hints) -> Result<(), String> {
+        if self.layout.is_some() || self.by_name {
+            return match &hints.unsaid {
+                Some(unsaid) if request.activation.is_none() => Err(unsaid.clone()),
+                _ => Ok(()),
+            };
+        }
+        self.refuse_doubled()?;
+        let hidden = self.layers.len() > 1 && request.activation.or(hints.activation).is_none();
+        let single = self.layers.len() == 1 && request.output.or(hints.output).is_none();
+        let (flag, what) = match (hidden, single) {
+            (true, _) => ("--activation", "lies between the layers"),
+            (_, true) => ("--output", "follows its one layer"),
+            _ => return Ok(()),
+        };
+        Err(format!(
+            "the file does not say what {what}, and its names are those of no library that is known; state it: {flag} with \
+             one of {}{}",
+            Activation::words(),
+            if hidden {
+                ", and --output what follows the last layer (`tanh` if it is not stated)"
+            } else {
+                ""
+            }
+        ))
+    }
+
+    /// Refuses an actor of pytorch_sac that stands alone, whose last layer gives deviations, too.
+    fn refuse_doubled(&self) -> Result<(), String> {
+        let Some(last) = self.layers.last() else { return Ok(()) };
+        let module = split(&last.name).0;
+        let width = last.weight.shape[usize::from(last.order == Order::InOut)];
+        match split(module).1 == "trunk" && width.is_multiple_of(2) {
+            true => Err(format!(
+                "`{module}` is what pytorch_sac calls its actor, whose last layer gives means and as many deviations: of \
+                 {width} outputs, the first {} would be the policy, and the file does not say it. Save the agent with its \
+                 critic (`actor.` and `critic.` before the names), or export the means to ONNX; --network {module} \
+                 imports all outputs",
+                width / 2
+            )),
+            false => Ok(()),
+        }
+    }
+
     /// Adds the map that normalises what the network is given, where the file has its statistics.
     fn add_statistics(&self, source: &mut Source<'_>, made: &mut Made) -> Result<(), String> {
-        if self.by_name {
-            return Ok(());
-        }
-        if let Some(normaliser) = statistics::find(source, self.inputs)? {
+        let Some(layout) = self.layout.filter(|_| !self.by_name) else { return Ok(()) };
+        if let Some(normaliser) = statistics::find(source, layout.name, self.inputs)? {
             made.draft.push(Step::Map(normaliser.map))?;
-            made.notes.push(format!("the inputs are normalised by `{}` first", normaliser.module));
+            made.notes.push(format!(
+                "the inputs are normalised by `{}` first, as {} does: {}",
+                normaliser.module, layout.name, normaliser.words
+            ));
             made.used.extend(normaliser.names);
         }
         Ok(())
@@ -155,15 +231,42 @@ impl Choice {
         for (i, layer) in self.layers.iter().enumerate() {
             let is_last = i + 1 == self.layers.len();
             let mut linear = linear(source, layer, request.cast)?;
-            if is_last && !self.by_name && self.layout.is_some_and(|layout| layout.doubled) {
-                made.notes.push(halve(&mut linear, &layer.name)?);
+            if is_last && self.layout.is_some_and(|layout| layout.doubled) {
+                made.notes.push(match self.by_name {
+                    false => halve(&mut linear, &layer.name)?,
+                    true => format!(
+                        "`{}` gives means and as many deviations, and all of them are outputs here",
+                        layer.name
+                    ),
+                });
             }
             made.draft.push(Step::Linear(linear))?;
+            self.add_clip(layer, made, hints)?;
             made.draft.push(Step::Activation(if is_last { behind } else { hidden }))?;
             let bias = layer.bias.iter().map(|bias| bias.name.clone());
             made.used.extend(bias.chain([layer.weight.name.clone()]));
         }
         Ok(())
+    }
+
+    /// Adds the limits that the layout has behind a layer.
+    fn add_clip(&self, layer: &Chosen, made: &mut Made, hints: &Hints) -> Result<(), String> {
+        let clipped = self.layout.and_then(|layout| layout.clipped);
+        let Some((_, usual)) = clipped.filter(|(name, _)| under(&self.outer, name) == layer.name)
+        else {
+            return Ok(());
+        };
+        let limit = hints.clip.unwrap_or(usual);
+        let what = format!("the sums of `{}` stay within {limit} (clip_mean)", layer.name);
+        if self.by_name {
+            made.notes.push(format!("not in it: {what}"));
+            return Ok(());
+        }
+        let source =
+            if hints.clip.is_some() { "`data` says" } else { "the library does by default" };
+        made.notes.push(format!("{what}, as {source}"));
+        let clip = Activation::Hardtanh { low: -limit as f32, high: limit as f32 };
+        made.draft.push(Step::Activation(clip))
     }
 
     /// What is behind the last layer where nobody says it.

@@ -119,7 +119,8 @@ impl<'b> Walk<'_, 'b, '_> {
                 Value::Text(text) if text.len() > LONGEST_KEY => {
                     return Err(format!("a key of {} bytes", text.len()));
                 }
-                Value::Text(text) => text.to_owned(),
+                // Haiku joins the names of modules so.
+                Value::Text(text) => text.replace('/', "."),
                 Value::Int(number) => number.to_string(),
                 _ => "?".to_owned(),
             };
@@ -136,8 +137,23 @@ impl<'b> Walk<'_, 'b, '_> {
             self.found.plain.push(path.join("."));
             return Ok(());
         }
+        if let [weight, bias] = items
+            && self.is_layer(*weight, *bias)
+        {
+            self.within("w".to_owned(), *weight, path)?;
+            return self.within("b".to_owned(), *bias, path);
+        }
         let mut numbered = items.iter().enumerate();
         numbered.try_for_each(|(i, item)| self.within(i.to_string(), *item, path))
+    }
+
+    /// Whether two values are a weight `[inputs, outputs]` and its bias, as programs over arrays keep them in pairs.
+    fn is_layer(&self, weight: Value<'_>, bias: Value<'_>) -> bool {
+        let (Value::Tensor(weight), Value::Tensor(bias)) = (weight, bias) else { return false };
+        let [weight, bias] = [weight, bias].map(|number| &self.pickle.tensors[number]);
+        let of_arrays = matches!(weight.storage.place, value::Place::Bytes(_));
+        let fits = matches!((&weight.shape[..], &bias.shape[..]), ([_, outputs], [count]) if outputs == count);
+        of_arrays && fits
     }
 
     /// Adds what lies under `key`.

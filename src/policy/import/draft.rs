@@ -8,6 +8,10 @@ use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
 pub(super) const MOST_LAYERS: usize = 64;
 /// Most weights of a network of more layers, and of layers that are made for an operation alone.
 const MOST_WEIGHTS: usize = 1 << 24;
+/// Summand of an input from which on a sum of products loses more than a millionth.
+const FAR: f64 = 4.0;
+/// Share of a summand in f64 that is nothing but rounding.
+const SAME: f64 = 1e-14;
 /// Most numbers between two layers that a layer of its own is made for.
 const WIDEST: usize = 4096;
 
@@ -207,7 +211,7 @@ impl Draft {
         };
         for (at_input, map) in [(true, input), (false, output)] {
             if let Some(Step::Map(map)) = map {
-                let map = rescale(&map);
+                let map = if at_input { centered(&map) } else { rescale(&map) };
                 network = network.and_then(|network| match at_input {
                     true => network.with_input(map),
                     false => network.with_output(map),
@@ -296,5 +300,20 @@ fn layer(stage: Stage) -> Layer {
 fn rescale(map: &Map) -> Rescale {
     let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect();
     let Map { scale, shift, low, high } = map;
-    Rescale { scale: narrow(scale), shift: narrow(shift), low: narrow(low), high: narrow(high) }
+    let affine = Rescale::affine(narrow(scale), narrow(shift));
+    Rescale { low: narrow(low), high: narrow(high), ..affine }
+}
+
+/// The map of inputs in f32: where products and summands far above 1 nearly cancel, as those of observations far from 0
+/// do, the difference comes first, if what is taken away is an f32 number.
+fn centered(map: &Map) -> Rescale {
+    let mut plain = rescale(map);
+    for (i, (&scale, &shift)) in map.scale.iter().zip(&map.shift).enumerate() {
+        let center = (-shift / scale) as f32;
+        let rest = scale * f64::from(center) + shift;
+        if shift.abs() > FAR && center.is_finite() && rest.abs() < SAME * shift.abs() {
+            (plain.center[i], plain.shift[i]) = (center, 0.0);
+        }
+    }
+    plain
 }

@@ -37,9 +37,12 @@ pub(super) fn open(bytes: &[u8]) -> Result<Source<'_>, String> {
     }
     source.plain.sort_unstable();
     source.said.sort_unstable();
+    // Haiku joins the names of modules by slashes.
+    let dotted = file.names().iter().any(|name| name.contains('.'));
     for (name, view) in file.iter() {
         let kind = Kind::of_safetensors(view.dtype());
-        let tensor = Tensor::plain(name.to_owned(), view.shape().to_vec(), kind, source.runs.len());
+        let name = if dotted { name.to_owned() } else { name.replace('/', ".") };
+        let tensor = Tensor::plain(name, view.shape().to_vec(), kind, source.runs.len());
         source.tensors.push(tensor);
         source.runs.push(view.data().to_vec());
     }

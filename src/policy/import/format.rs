@@ -46,11 +46,18 @@ const OTHERS: [(&[u8], &str, &str); 12] = [
 ];
 const KERAS: &str =
     "convert it to ONNX: python -m tf2onnx.convert --keras FILE --output policy.onnx";
-const MATLAB: &str = "export the network to ONNX in MATLAB: exportONNXNetwork(net, 'policy.onnx'); or save its weights as \
-                      safetensors in Python: safetensors.numpy.save_file({'0.weight': scipy.io.loadmat(FILE)['W1'], \
-                      '0.bias': scipy.io.loadmat(FILE)['b1'].ravel()}, 'policy.safetensors')";
+const MATLAB: &str = "export the network to ONNX in MATLAB: exportONNXNetwork(net, 'policy.onnx'); or save its weights, \
+                      [out, in], as safetensors in Python: safetensors.numpy.save_file({'0.weight': \
+                      numpy.ascontiguousarray(scipy.io.loadmat(FILE)['W1'], 'f4'), '0.bias': \
+                      scipy.io.loadmat(FILE)['b1'].ravel().astype('f4')}, 'policy.safetensors'); a weight [in, out] goes \
+                      under '0.kernel'";
 const NUMPY: &str = "save all arrays of the network as safetensors: safetensors.numpy.save_file({'0.weight': w0, \
-                     '0.bias': b0}, 'policy.safetensors')";
+                     '0.bias': b0}, 'policy.safetensors'), each w [out, in]; one that is [in, out] goes under '0.kernel'";
+/// A file in an archive of arrays that `policy export` writes.
+const EXPORTED: &[u8] = b"layers.0.weight.npy";
+/// The refusal of such an archive.
+pub(super) const OWN_ARRAYS: &str = "the arrays of a policy file, as `reachcast policy export` writes them for other programs \
+                                     (.npz); use the policy file, or export it with --to onnx, which is imported again";
 const HTML: &str = "download it again, from the address of the raw file";
 const FLAX: &str = "write its parameters as safetensors: p = flax.serialization.msgpack_restore(open(FILE, 'rb').read()); \
                     safetensors.flax.save_file(flax.traverse_util.flatten_dict(p, sep='.'), 'policy.safetensors')";
@@ -68,11 +75,15 @@ impl Format {
             return Err(format!("{what}; {remedy}"));
         }
         Ok(match bytes {
+            [b'P', b'K', 3, 4, ..] if ending == "npz" && has(bytes, EXPORTED) => {
+                return Err(OWN_ARRAYS.to_owned());
+            }
             [b'P', b'K', 3, 4, ..] if ending == "npz" => {
                 return Err(format!("NumPy arrays (.npz); {NUMPY}"));
             }
             [b'P', b'K', 3, 4, ..] => Self::Archive,
             _ if ending == "onnx" => Self::Graph,
+            _ if ending == "mat" => return Err(format!("a MATLAB file of version 4; {MATLAB}")),
             // The length of its header may begin like a pickle.
             _ if is_safetensors(bytes) => Self::Safetensors,
             [0x80, 2..=5, ..] => Self::Pickle,
@@ -86,6 +97,11 @@ impl Format {
             _ => return Err(unknown(bytes)),
         })
     }
+}
+
+/// Whether `bytes` hold a text.
+fn has(bytes: &[u8], text: &[u8]) -> bool {
+    bytes.windows(text.len()).any(|window| window == text)
 }
 
 /// Whether `bytes` begin with the length of a header in JSON that may be in them.

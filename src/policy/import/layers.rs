@@ -3,65 +3,16 @@
 use std::collections::{HashMap, HashSet};
 
 use super::bearing::{Bearing, Known, gives_deviations, is_parametrized};
+use super::dense::{Dense, Order};
 use super::names::{compare, holds, is_head, numbered, split, starts_with};
 use super::source::{Source, Tensor};
+use super::{norms, order};
 
-/// The modules of a tianshou actor or critic that hold its layers: a body and a head.
-const TIANSHOU: [&str; 2] = ["preprocess.model.model", "last.model"];
 /// What the weights and biases of a library are called, and how the weights lie.
 const PARTS: [(&str, &str, Order); 3] =
     [("weight", "bias", Order::OutIn), ("kernel", "bias", Order::InOut), ("w", "b", Order::InOut)];
 /// Most networks that a message lists.
 const MOST_LISTED: usize = 40;
-
-/// How a weight lies in its tensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
-    /// `[outputs, inputs]`, as PyTorch has it.
-    OutIn,
-    /// `[inputs, outputs]`, as JAX has it.
-    InOut,
-}
-
-/// A dense layer of a file.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Dense<'a> {
-    /// What its tensors are called before `.weight` and `.bias`.
-    pub(super) name: &'a str,
-    /// Two dimensions.
-    pub(super) weight: &'a Tensor,
-    /// How the weight lies.
-    pub(super) order: Order,
-    /// `[outputs]`, where it has one.
-    pub(super) bias: Option<&'a Tensor>,
-}
-
-impl<'a> Dense<'a> {
-    /// Numbers that it takes.
-    pub(super) fn inputs(&self) -> usize {
-        self.weight.shape[usize::from(self.order == Order::OutIn)]
-    }
-
-    /// Numbers that it gives.
-    pub(super) fn outputs(&self) -> usize {
-        self.weight.shape[usize::from(self.order == Order::InOut)]
-    }
-
-    /// The network that the layer belongs to: what its name has before the layer's own part.
-    fn network(&self) -> &'a str {
-        module(self.name)
-    }
-}
-
-/// What a layer's name has before its own part.
-pub(super) fn module(layer: &str) -> &str {
-    let module = split(layer).0;
-    let tianshou = TIANSHOU.iter().find_map(|part| module.strip_suffix(part));
-    match tianshou {
-        Some(before) if before.is_empty() || before.ends_with('.') => before.trim_end_matches('.'),
-        _ => module,
-    }
-}
 
 /// The dense layers of a file: weights of two dimensions, with their biases.
 pub(super) fn dense<'a>(source: &'a Source<'_>) -> Vec<Dense<'a>> {
@@ -108,7 +59,11 @@ pub(super) fn named<'a>(
                 let listing = listing(&networks(layers));
                 Err(format!("no dense layer under `{prefix}`; it has the networks:{listing}"))
             }
-            1 => Ok(in_order(chosen)),
+            1 => {
+                let chosen = in_order(chosen);
+                // A library's own names are in order; of others, nothing but numbers and widths says it.
+                order::check(&chosen).map(|()| chosen)
+            }
             _ => {
                 let listing = listing(&several);
                 Err(format!("`{prefix}` may be one of several networks; name one:{listing}"))
@@ -155,6 +110,10 @@ fn pick<'a>(
     let others: Vec<&Tensor> = source.tensors.iter().filter(bears).collect();
     if let Some(tensor) = others.iter().find(|tensor| is_parametrized(&tensor.name)) {
         return Err(parametrized(&tensor.name));
+    }
+    let norm = others.iter().find_map(|tensor| norms::refusal(source, tensor));
+    if let Some(norm) = norm.filter(|_| !chosen.is_empty()) {
+        return Err(norm);
     }
     match others.first() {
         Some(Tensor { name, shape, .. }) if !chosen.is_empty() => Err(format!(
@@ -273,7 +232,8 @@ fn listing(networks: &[(&str, Vec<Dense<'_>>)]) -> String {
 /// A sentence that names the two tensors that do not go together.
 pub(super) fn check(layers: &[Dense<'_>]) -> Result<(), String> {
     layers.iter().try_for_each(check_bias)?;
-    layers.windows(2).try_for_each(|pair| check_pair(&pair[0], &pair[1]))
+    let pairs = layers.windows(2).try_for_each(|pair| check_pair(&pair[0], &pair[1]));
+    pairs.map_err(|problem| format!("{problem}{}", order::remedy(layers)))
 }
 
 /// Refuses a bias that is not one number per output.

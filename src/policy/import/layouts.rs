@@ -1,6 +1,7 @@
 //! The layouts of libraries: what their networks are called, and what lies between and around the layers.
 
-use super::layers::{Dense, in_order};
+use super::dense::Dense;
+use super::layers::in_order;
 use super::names::{around, split, starts_with, under};
 use super::source::Source;
 use crate::policy::Activation;
@@ -20,6 +21,8 @@ pub(super) struct Layout {
     pub(super) hidden: Activation,
     /// Behind the last layer, unless something else is stated.
     pub(super) last: Activation,
+    /// A layer whose sums stay within a limit and its negative, and the limit that the library has by default.
+    pub(super) clipped: Option<(&'static str, f64)>,
     /// Factors of what comes out, and what is added then.
     pub(super) scaled: Option<[&'static str; 2]>,
     /// Whether the last layer also gives deviations, in its second half.
@@ -49,6 +52,7 @@ const PLAIN: Layout = Layout {
     beside: &[],
     hidden: Activation::Relu,
     last: Activation::Tanh,
+    clipped: None,
     scaled: None,
     doubled: false,
     refusal: None,
@@ -63,7 +67,7 @@ const LIMITS: Option<&str> =
 const GAUSSIAN: (Activation, Activation) = (Activation::Tanh, Activation::Identity);
 
 /// The layouts, those with more parts first.
-const LAYOUTS: [Layout; 22] = [
+const LAYOUTS: [Layout; 23] = [
     Layout {
         name: "Brax",
         body: &["1.params.hidden_"],
@@ -93,6 +97,8 @@ const LAYOUTS: [Layout; 22] = [
         name: "stable-baselines3 (SAC)",
         body: &["actor.latent_pi", "actor.mu"],
         marks: &["actor.log_std"],
+        // With exploration that depends on the state, the means go through a Hardtanh, which has no tensor.
+        clipped: Some(("actor.mu.0", 2.0)),
         ..PLAIN
     },
     Layout {
@@ -112,8 +118,17 @@ const LAYOUTS: [Layout; 22] = [
     },
     Layout {
         name: "rsl_rl",
+        body: &["model_state_dict.actor"],
+        marks: &["model_state_dict.critic", "model_state_dict.std|model_state_dict.log_std"],
+        hidden: ELU,
+        last: Activation::Identity,
+        ..PLAIN
+    },
+    // Actors beside a critic and a `log_std` are anybody's.
+    Layout {
+        name: "rsl_rl",
         body: &["actor"],
-        marks: &["critic", "std|log_std"],
+        marks: &["critic", "std"],
         hidden: ELU,
         last: Activation::Identity,
         ..PLAIN

@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 
 use super::bearing::{Bearing, Known, is_parametrized};
-use super::layers;
 use super::names::{split, starts_with};
 use super::source::{Source, Tensor, Unmade};
+use super::{dense, layers, norms};
 
 /// Names that a refusal lists.
 const LISTED: usize = 6;
@@ -49,6 +49,9 @@ pub(super) fn refuse(
     };
     let remedy = remedy(own);
     let (memory, unknown) = (of(Bearing::Memory), of(Bearing::Unknown));
+    let tensors = unknown.iter().filter_map(|name| source.tensor(name));
+    let norm = tensors.filter_map(|tensor| norms::refusal(source, tensor)).next();
+    let norm = norm.map_or(String::new(), |norm| format!(". {norm}"));
     match (memory.is_empty(), unknown.is_empty()) {
         (false, _) => Err(format!(
             "recurrent layers: {}; a network with a memory is no dense one. To import the dense layers alone, \
@@ -60,7 +63,8 @@ pub(super) fn refuse(
             Err(layers::parametrized(name.copied().unwrap_or_default()))
         }
         (_, false) => Err(format!(
-            "{} may act on what the network is given or gives, and would be lost; to import it without: {remedy}",
+            "{} may act on what the network is given or gives, and would be lost; to import it without: {remedy}; an ONNX \
+             export of the whole policy keeps it{norm}",
             listed(&unknown)
         )),
         _ => Ok(()),
@@ -69,7 +73,7 @@ pub(super) fn refuse(
 
 /// How the layers `own` are had alone.
 fn remedy(own: &[&str]) -> String {
-    let module = layers::module(own.first().copied().unwrap_or_default());
+    let module = dense::module(own.first().copied().unwrap_or_default());
     match module {
         "" => format!("--network {}", own.join(",")),
         module => format!("--network {module}"),

@@ -11,6 +11,7 @@ mod checkpoint;
 mod choice;
 mod collect;
 mod constants;
+mod dense;
 mod draft;
 mod elementwise;
 mod foreign;
@@ -26,13 +27,16 @@ mod lost;
 mod map;
 mod names;
 mod nnet;
+mod norms;
 mod onnx;
 mod operations;
+mod order;
 mod parts;
 mod pickle;
 mod polar;
 mod request;
 mod sb3;
+mod script;
 mod source;
 mod statistics;
 mod text;
@@ -55,8 +59,9 @@ use source::Source;
 ///
 /// A checkpoint is a state dict, or containers with state dicts in them; where the layout of a library is
 /// recognised, its layers, normalisers and defaults are taken. Else the layers of the only network are taken to
-/// be applied one after the other, with `relu` between them and `tanh` at the end (nothing at the end of a
-/// `critic`), unless the request states otherwise. A graph or a text says what lies between its layers.
+/// be applied one after the other, with what the request states between them and at the end. Of layers that the
+/// request names, what it does not state is `relu` between them and `tanh` at the end (nothing at the end of a
+/// `critic`). A graph or a text says what lies between its layers.
 ///
 /// # Errors
 /// [`Error::File`] saying what is damaged, not supported or not clear, and what to do;

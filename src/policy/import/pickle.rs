@@ -18,6 +18,9 @@ const DEEPEST: usize = 1 << 16;
 const LONGEST_KEY: usize = 32;
 /// The newest protocol.
 const NEWEST: u8 = 5;
+/// What is wrong with a module that PyTorch before 1.6 saved with its code.
+const WHOLE_MODULE: &str = "a whole module, which a program would have to make; nothing was executed. Save tensors alone: \
+                            torch.save(module.state_dict(), FILE)";
 /// What is wrong where an instruction finds too little on the stack.
 const EMPTY: &str = "a value is needed where there is none";
 
@@ -300,6 +303,7 @@ impl<'a> Machine<'a> {
         let tuple = self.pop_tuple()?;
         let (kind, key) = match calls::head(&self.pickle, tuple).as_slice() {
             &[Value::Text("storage"), Value::Name(kind), Value::Text(key), ..] => (kind, key),
+            &[Value::Text("module"), ..] => return Err(WHOLE_MODULE.to_owned()),
             _ => return Err("a reference to something else than a storage".to_owned()),
         };
         let known = Kind::of_storage(kind.name).filter(|_| kind.module == "torch");

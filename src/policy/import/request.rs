@@ -60,6 +60,10 @@ pub(super) struct Hints {
     pub(super) activation: Option<Activation>,
     /// Activation of the last layer.
     pub(super) output: Option<Activation>,
+    /// Limit of what goes into the last activation, where the library has one.
+    pub(super) clip: Option<f64>,
+    /// Why it is not known what lies between the layers, unless that is stated.
+    pub(super) unsaid: Option<String>,
     /// What the output goes through then; of one number if it is the same for all.
     pub(super) output_map: Option<Map>,
     /// Why the layers are no policy, unless they are asked for by name.

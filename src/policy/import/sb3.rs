@@ -5,6 +5,7 @@
 use serde_json::Value;
 
 use super::archive::Entries;
+use super::format::OWN_ARRAYS;
 use super::map::Map;
 use super::request::Hints;
 use crate::policy::Activation;
@@ -40,9 +41,13 @@ pub(super) fn open(mut entries: Entries<'_>) -> Result<Model, String> {
 fn other(names: &[String]) -> String {
     let all = |ending: &str| !names.is_empty() && names.iter().all(|name| name.ends_with(ending));
     let has = |name: &str| names.iter().any(|entry| entry == name);
+    if all(".npy") && has("layers.0.weight.npy") {
+        return OWN_ARRAYS.to_owned();
+    }
     if all(".npy") {
         return "NumPy arrays (.npz); save them as safetensors: \
-                safetensors.numpy.save_file(dict(numpy.load(FILE)), 'policy.safetensors')"
+                safetensors.numpy.save_file(dict(numpy.load(FILE)), 'policy.safetensors'), with the weights [out, in] under \
+                names like `0.weight`, or [in, out] under `0.kernel`, and biases under `0.bias`"
             .to_owned();
     }
     if has("config.json") && has("model.weights.h5") {
@@ -65,7 +70,12 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
     let data: Value =
         serde_json::from_slice(data).map_err(|e| format!("entry `data`: no JSON ({e})"))?;
     let kwargs = &data["policy_kwargs"];
-    let mut hints = Hints { activation: activation(kwargs)?, ..Hints::default() };
+    let mut hints = Hints::default();
+    match activation(kwargs) {
+        Ok(known) => hints.activation = known,
+        Err(unsaid) => hints.unsaid = Some(unsaid),
+    }
+    hints.clip = number(&kwargs["clip_mean"])?;
     hints.refusal = own_classes(&data);
     // With exploration that depends on the state, PPO may bound its actions as SAC does.
     let squashed =
@@ -76,6 +86,18 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
     let is_off_policy = data.get("replay_buffer_class").is_some();
     actions(&data["action_space"], squashed || is_off_policy, &mut hints);
     Ok(hints)
+}
+
+/// A number, or its text; none if there is none.
+fn number(value: &Value) -> Result<Option<f64>, String> {
+    let number = match value {
+        Value::Null => return Ok(None),
+        Value::String(text) => text.trim().parse().ok(),
+        other => other.as_f64(),
+    };
+    let positive = number.filter(|number| number.is_finite() && *number > 0.0);
+    let problem = || format!("`data` has the clip_mean {value}, which is no number above 0");
+    positive.map(Some).ok_or_else(problem)
 }
 
 /// The refusal of a model with a class of its own, which may do anything with observations and actions.
@@ -120,7 +142,8 @@ fn activation(kwargs: &Value) -> Result<Option<Activation>, String> {
         "Identity" => Activation::Identity,
         _ => {
             return Err(format!(
-                "`data` has the activation `{class}`, which is none that is known"
+                "`data` has the activation `{class}`, which is none that is known: --activation states which it is, one of {}",
+                Activation::words()
             ));
         }
     }))

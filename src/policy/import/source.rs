@@ -2,6 +2,7 @@
 
 use super::archive::Entries;
 use super::kind::{Cast, FloatReader, Kind};
+use super::script::Script;
 
 /// A file with named tensors.
 #[derive(Debug, Default)]
@@ -14,6 +15,8 @@ pub(super) struct Source<'a> {
     pub(super) said: Vec<String>,
     /// What in it is no tensor, and was not made.
     pub(super) unmade: Vec<Unmade>,
+    /// What the code beside the tensors does, of a compiled module.
+    pub(super) script: Option<Script>,
     /// Numbers that are entries of an archive.
     pub(super) entries: Option<Entries<'a>>,
     /// Numbers that lie in the file itself.
