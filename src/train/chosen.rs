@@ -2,6 +2,7 @@
 
 use crate::formula::{Expr, Graph, record};
 use crate::model::{Controller, Law, Model, Plant};
+use crate::policy::Mlp;
 use crate::real::Real;
 use crate::system::Axis;
 
@@ -85,7 +86,7 @@ impl Chosen<'_> {
     }
 
     /// How many numbers `network` says.
-    fn outputs(&self, network: &crate::policy::Mlp) -> usize {
+    fn outputs(&self, network: &Mlp) -> usize {
         network.widths().last().copied().unwrap_or(0)
     }
 }

@@ -1,14 +1,13 @@
 //! Every kind of task on every backend: measures, signs, pairs and distances; and kernels that break a rule.
 
 use reachcast::backend::Backend;
-use reachcast::backend::gpu::Gpu;
 use reachcast::model::{Plant, Task};
 use reachcast::rollout::{
     DeviationTask, Keep, PairControl, Pairs, Query, ReachAvoidTask, Tightening,
 };
 use reachcast::train::chosen::chosen_first;
 
-use crate::common::{adapter, backends};
+use crate::common::backends;
 use crate::mathematics::{
     BAND, BETWEEN, CONSTRAINT, Case, ELLIPSE, HORIZON, POLICY, STARTS, SUBSTEPS, TARGET, cases,
     fine, fine_after, fine_pair, is_edge, looked, losses, pairs, plant, spec, starts,
@@ -199,32 +198,8 @@ fn a_first_control_that_is_given_is_the_first_of_its_rollout_alone() {
     }
 }
 
-/// Requires that a kernel in which `old` is replaced by `new` is noticed.
-fn caught(old: &'static str, new: &'static str) {
-    let Some(gpu) = adapter() else { return };
-    let seen = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
-    let found = seen.clone();
-    let gpu: Gpu = gpu.with_shader_edit(move |text| {
-        found.fetch_or(text.contains(old), std::sync::atomic::Ordering::Relaxed);
-        text.replace(old, new)
-    });
-    let problem = agree(&Backend::Gpu(gpu)).expect_err("a broken rule is noticed");
-    assert!(seen.load(std::sync::atomic::Ordering::Relaxed), "no kernel has `{old}`");
-    println!("{problem}");
-}
-
-macro_rules! mutants {
-    ($($name:ident: $old:expr => $new:expr;)*) => {
-        $(
-            #[test]
-            fn $name() {
-                caught($old, $new);
-            }
-        )*
-    };
-}
-
 mutants! {
+    agree;
     a_point_left_out: "point < POINTS; point += 1u" => "point + 1u < POINTS; point += 1u";
     points_with_the_row_of_their_sample: "schedule[2u * t + 1u]" => "schedule[2u * t]";
     points_with_the_row_of_the_next_sample: "schedule[2u * t + 1u]" => "schedule[2u * t + 2u]";

@@ -1,6 +1,10 @@
 //! Points inside a period against brute force over fine trajectories: on every backend, in f64, and through the
 //! commands.
 
+#[path = "../mutants/mod.rs"]
+#[macro_use]
+mod mutants;
+
 mod backends;
 mod cli;
 #[path = "../command/mod.rs"]

@@ -6,7 +6,7 @@ use reachcast::backend::Backend;
 use reachcast::backend::gpu::NetworkKernels;
 use reachcast::formula::{Expr, Scalar, record};
 use reachcast::model::{Controller, Law, Model, Plant};
-use reachcast::policy::{Activation, Layer, Mlp, Norm, Rescale};
+use reachcast::policy::{Activation, Layer, Mlp, Norm, Policy, Rescale};
 use reachcast::race::DroneRace;
 use reachcast::real::Real;
 use reachcast::rollout::{NON_FINITE, Query, ReachAvoidTask, RolloutSpec, Tightening};
@@ -126,6 +126,16 @@ fn networks() -> Vec<(&'static str, Mlp)> {
         ("equal widths", layered(&[12, 64, 64, 3], &mixed, false)),
         ("maps", mapped(wide.clone())),
         (
+            "a map around a center",
+            wide.clone()
+                .with_input(Rescale {
+                    center: (0..12).map(|i| 0.25 * i as f32 - 1.5).collect(),
+                    high: vec![1.2; 12],
+                    ..Rescale::affine(vec![0.9; 12], vec![0.05; 12])
+                })
+                .expect("a map"),
+        ),
+        (
             "moved maps",
             wide.with_input(Rescale::affine(vec![0.5; 12], vec![0.0; 12])).expect("a map"),
         ),
@@ -226,17 +236,72 @@ fn failing() -> Vec<(String, Mlp)> {
         high: vec![high],
         ..Rescale::affine(vec![1.0], vec![0.0])
     };
-    for (low, high) in [(-1.0, 1.0), (-1.0, f32::INFINITY), (f32::NEG_INFINITY, 1.0)] {
+    for (low, high) in LIMITS {
         let nan = overflowing(Activation::Identity, last(Activation::Identity));
         cases
             .push((format!("clip {low} {high}"), nan.with_output(clip(low, high)).expect("a map")));
     }
+    let nan = overflowing(Activation::Identity, last(Activation::Identity));
+    let map = Rescale { center: vec![0.5], ..Rescale::affine(vec![2.0], vec![0.25]) };
+    cases.push(("output map".to_owned(), nan.with_output(map).expect("a map")));
     cases
 }
 
+/// Limits of maps, one of them open or none.
+const LIMITS: [(f32, f32); 3] = [(-1.0, 1.0), (-1.0, f32::INFINITY), (f32::NEG_INFINITY, 1.0)];
+
 /// What `mlp` makes of the two states.
 fn outcome(backend: &Backend, mlp: &Mlp) -> Vec<f32> {
-    shown(backend, mlp.clone(), &[[4.0, -5.0], [0.0, -5.0]])
+    shown(backend, mlp.clone(), &SEEN)
+}
+
+/// A first state that networks of [`failing`] come to a NaN for, and one for which they do not.
+const SEEN: [[f32; 2]; 2] = [[4.0, -5.0], [0.0, -5.0]];
+
+/// Plants whose network sees a NaN for the first of [`SEEN`], behind a map of the inputs.
+fn blinded() -> Vec<(String, Plant)> {
+    let model = Arc::new(Model::of(Shown));
+    let observe = record(model.inputs(), |x| {
+        let apart = x[0] - Expr::lit(4.0);
+        vec![apart / apart]
+    });
+    let plant = |(low, high)| {
+        let input =
+            Rescale { low: vec![low], high: vec![high], ..Rescale::affine(vec![1.0], vec![0.5]) };
+        let layers = vec![Layer::dense(vec![1.0], vec![0.0])];
+        let network = Mlp::from_layers(layers).and_then(|mlp| mlp.with_input(input));
+        let (network, observe) = (Arc::new(network.expect("a network")), Some(observe.clone()));
+        let law = Law::Network { observe, network, act: None };
+        let controller = Controller::new("blinded", law);
+        (format!("input {low} {high}"), Plant::new(Arc::clone(&model), controller))
+    };
+    let open = (f32::NEG_INFINITY, f32::INFINITY);
+    LIMITS.into_iter().chain([open]).map(plant).collect()
+}
+
+#[test]
+fn a_nan_that_a_network_is_shown_fails_the_rollout() {
+    let spec = RolloutSpec::new(1, 1.0).expect("a horizon");
+    let backends =
+        [Some(cpu(1)), gpu().map(Backend::Gpu), crate::networks::fusing().map(Backend::Gpu)];
+    for backend in backends.iter().flatten() {
+        for (name, plant) in blinded() {
+            let program = backend.prepare(&plant).expect("it fits");
+            let found = program.measures(&SEEN, &spec).expect("it runs");
+            assert_eq!(found[0], NON_FINITE, "{name} on {}", backend.device());
+            assert!(found[1].is_finite() && found[1] > -5.0, "{name}: {found:?}");
+        }
+    }
+}
+
+/// One state at a time, too: in f32, and in f64, which decides what is near 0.
+#[test]
+fn a_nan_goes_through_every_layer_and_map_of_the_reference() {
+    for (name, mlp) in failing() {
+        let [narrow] = mlp.control([f32::NAN, 0.0]);
+        let [wide] = mlp.control([f64::NAN, 0.0]);
+        assert!(narrow.is_nan() && wide.is_nan(), "{name}: {narrow}, {wide}");
+    }
 }
 
 #[test]
