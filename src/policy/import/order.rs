@@ -15,7 +15,12 @@ const SEVERAL: usize = 2;
 /// # Errors
 /// A sentence with two orders, and the remedy.
 pub(super) fn check(layers: &[Dense<'_>]) -> Result<(), String> {
-    match orders(layers).as_slice() {
+    let search = Search::of(layers);
+    match search.found.as_slice() {
+        _ if search.steps >= MOST_STEPS => Err(format!(
+            "the names of {} layers do not say in which order they are applied; --network names them in theirs",
+            layers.len()
+        )),
         [only] if only.iter().copied().eq(0..layers.len()) => Ok(()),
         [one, ..] => Err(format!(
             "the names of the layers do not say in which order they are applied, and their widths fit in another one \
@@ -29,7 +34,7 @@ pub(super) fn check(layers: &[Dense<'_>]) -> Result<(), String> {
 
 /// What to do where layers do not follow on one another in the order that they have.
 pub(super) fn remedy(layers: &[Dense<'_>]) -> String {
-    match orders(layers).as_slice() {
+    match Search::of(layers).found.as_slice() {
         [only] => format!(
             "; the layers follow on one another in this order: --network {}",
             listed(layers, only)
@@ -50,14 +55,7 @@ fn listed(layers: &[Dense<'_>], order: &[usize]) -> String {
     order.iter().map(|&i| layers[i].name).collect::<Vec<_>>().join(",")
 }
 
-/// The first orders that widths and names allow, those that differ from the file's before it.
-fn orders(layers: &[Dense<'_>]) -> Vec<Vec<usize>> {
-    let mut search = Search { layers, placed: Vec::new(), found: Vec::new(), steps: 0 };
-    search.go();
-    search.found
-}
-
-/// A search for orders.
+/// A search for the first orders that widths and names allow, those that differ from the file's before it.
 struct Search<'s, 'a> {
     layers: &'s [Dense<'a>],
     placed: Vec<usize>,
@@ -65,7 +63,14 @@ struct Search<'s, 'a> {
     steps: usize,
 }
 
-impl Search<'_, '_> {
+impl<'s, 'a> Search<'s, 'a> {
+    /// The search among `layers`, at its end.
+    fn of(layers: &'s [Dense<'a>]) -> Self {
+        let mut search = Self { layers, placed: Vec::new(), found: Vec::new(), steps: 0 };
+        search.go();
+        search
+    }
+
     /// Adds the orders that begin with the layers placed. The last layers of a file are tried first, so that its own
     /// order is the last one found.
     fn go(&mut self) {
