@@ -28,7 +28,10 @@ fn page(starts: &[[f32; 2]]) -> String {
         improvements: vec![Improvement { index: 0, measure: 0.5 }],
         failures: if starts.is_empty() { 0 } else { 30 },
         unconfirmed: 0,
-        starts: starts.iter().map(|x| FailingStart { index: 7, x: x.to_vec(), measure: -0.5 }).collect(),
+        starts: starts
+            .iter()
+            .map(|x| FailingStart { index: 7, x: x.to_vec(), measure: -0.5 })
+            .collect(),
         pairs: Vec::new(),
     };
     let provenance = Provenance {
