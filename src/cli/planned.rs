@@ -10,6 +10,7 @@ use crate::plan::record::{LatencyRecord, SuccessRecord, TermRecord};
 use crate::plan::{Flown, Judged, PlanRecord, Plane, steps_table, trajectories};
 use crate::report::{PlanPage, plan_html};
 use crate::rounding::{complement, interval, lower, number, upper};
+use crate::scenario::bodies_and_shapes;
 
 /// Name of the record.
 const RECORD: &str = "plan.json";
@@ -46,7 +47,10 @@ pub(super) fn stage(
     staged.add(STEPS, &steps_table(model, costs, flown, judged).csv()?)?;
     staged.add(TRAJECTORIES, &trajectories(model, costs, &flown.runs, record.steps)?)?;
     let plane = Plane::new(model, &flown.runs, bounds);
-    let page = PlanPage { record, runs: &flown.runs, judged, plane: plane.as_ref() };
+    let shown = flown.runs.iter().take(PlanPage::DRAWN);
+    let states: Vec<&[Vec<f32>]> = shown.map(|run| &run.states[..]).collect();
+    let drawn = bodies_and_shapes(model, &states);
+    let page = PlanPage { record, runs: &flown.runs, judged, plane: plane.as_ref(), drawn: &drawn };
     staged.add(PAGE, plan_html(&page).as_bytes())?;
     staged.add(RECORD, json(RECORD, record)?.as_bytes())
 }

@@ -23,6 +23,16 @@ struct Corner {
 }
 
 impl Field {
+    /// Whether it is positive anywhere: whether its region is drawn.
+    pub(super) fn is_positive(&self) -> bool {
+        self.values.iter().any(|value| *value > 0.0)
+    }
+
+    /// Whether it changes its sign: whether it has zero lines.
+    pub(super) fn has_zero_lines(&self) -> bool {
+        self.is_positive() && self.values.iter().any(|value| *value <= 0.0)
+    }
+
     fn value(&self, column: usize, row: usize) -> f64 {
         self.values[row * self.x.len() + column]
     }

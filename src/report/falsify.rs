@@ -4,7 +4,7 @@ use super::falsify_figures::{plane, progress};
 use super::figure::Figure;
 use super::shell::{self, Headline, Scripts};
 use super::table::pairs;
-use super::text::{count, escape, interval, number, or_dash};
+use super::text::{capital, count, escape, interval, number, or_dash};
 use crate::backend::Event;
 use crate::rollout::Region;
 use crate::scenario::falsify::{Against, FalsifyRecord, FileRecord};
@@ -44,7 +44,7 @@ pub fn falsify_html(search: &Search<'_>, axes: &[Axis], region: &Region) -> Stri
          <section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <div class=\"tables\">\n{numbers}</div>\n{configuration}</section>\n\
          {adapter}</main>\n{footer}</body>\n</html>\n",
-        head = shell::head("search for failures", "", Scripts::None),
+        head = shell::head(&title(search), "", Scripts::None),
         header = header(search),
         notes = shell::notes(&notes(search)),
         numbers = numbers(search, axes),
@@ -55,6 +55,11 @@ pub fn falsify_html(search: &Search<'_>, axes: &[Axis], region: &Region) -> Stri
             "a second search with this seed on such a machine gives the same page"
         ),
     )
+}
+
+/// What was done, and to which plant.
+fn title(search: &Search<'_>) -> String {
+    format!("search for failures{}", shell::of_plant(&search.provenance))
 }
 
 /// What came of it.
@@ -81,8 +86,9 @@ fn header(search: &Search<'_>) -> String {
     let Provenance { policy, device, seed, version, .. } = &search.provenance;
     let line = format!("{policy}, seed {seed}; {device}; reachcast {version}.");
     format!(
-        "<header>\n<p class=\"brand\">Reachcast search</p>\n<h1>Search for failures</h1>\n\
+        "<header>\n<p class=\"brand\">Reachcast search</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">{}</p>\n<div class=\"cards\">\n{cards}</div>\n</header>\n",
+        escape(&capital(&title(search))),
         escape(&line)
     )
 }

@@ -1,15 +1,16 @@
 //! The figures of a search for failures: how near it came, and the failures in a plane.
 
 use super::figure::{Figure, Swatch, cross};
+use super::places::titled;
 use super::plot::{Labels, Plot, Proportions};
 use super::span::Span;
-use super::text::ordinary;
+use super::text::{count, ordinary};
 use crate::rollout::Region;
 use crate::scenario::falsify::FalsifyRecord;
 use crate::system::Axis;
 
 /// The start with the smallest measure.
-const BEST: &str = "<circle class=\"seen\" r=\"5\"/>";
+const BEST: &str = "<circle class=\"ring\" r=\"8\"/>";
 
 /// The smallest measure so far, start by start.
 pub(super) fn progress(record: &FalsifyRecord) -> Figure {
@@ -70,22 +71,40 @@ pub(super) fn plane(record: &FalsifyRecord, axes: &[Axis], region: &Region) -> O
     let [[left, right], [low, high]] = sides;
     let outline = plot.rectangle([left, low, right, high]);
     plot.path("slice", &outline);
-    best.into_iter().for_each(|point| plot.mark(point, BEST));
     failing.iter().for_each(|point| plot.mark(*point, &cross(4.0)));
-    let [x, y] = states.map(|state| format!("{} ({})", axes[state].name, axes[state].unit));
+    best.into_iter().for_each(|point| plot.mark(point, BEST));
+    let [x, y] = states.map(|state| titled(axes, state));
     let labels = Labels { x: &x, y: &y, whole: false };
     let shown = failing.len();
     Some(Figure {
         id: "plane",
         title: "Failures by two coordinates".to_owned(),
         drawing: Ok(plot.finish(&labels, &format!("{shown} failing starts in a plane"))),
-        legend: vec![
-            (Swatch::Mark(cross(3.6)), "start that fails".to_owned()),
-            (Swatch::Mark(BEST.to_owned()), "smallest measure".to_owned()),
-            (Swatch::Area("slice"), "where starts were looked for".to_owned()),
-        ],
-        caption: "Shadows on the plane of the first two coordinates that vary.".to_owned(),
+        legend: [
+            (shown > 0).then(|| (Swatch::Mark(cross(3.6)), "start that fails".to_owned())),
+            best.map(|_| (Swatch::Mark(BEST.to_owned()), "smallest measure".to_owned())),
+            Some((Swatch::Area("slice"), "where starts were looked for".to_owned())),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
+        caption: format!(
+            "Shadows on the plane of the first two coordinates that vary. {}",
+            drawn(record, shown)
+        ),
     })
+}
+
+/// Which starts are drawn, and which are not.
+fn drawn(record: &FalsifyRecord, shown: usize) -> String {
+    let worst = match (shown as u64) < record.failures {
+        true => {
+            format!("Of {} starts that fail the worst {shown} are drawn", count(record.failures))
+        }
+        false => "All starts that fail are drawn".to_owned(),
+    };
+    let worst = if shown == 0 { "No start fails".to_owned() } else { worst };
+    format!("{worst}; those that pass are not kept.")
 }
 
 /// The ends of a region along a state.

@@ -27,8 +27,7 @@ pub fn html(record: &Record) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{HATCH}{header}<main>\n{statements}{failures}\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Pictures</h2>\n\
-         <div class=\"figures\">\n{value}{certified}{paths}<div class=\"stack\">\n{deviation}{growth}</div>\
-         </div></section>\n{numbers}</main>\n{footer}\
+         <div class=\"figures\">\n{value}{certified}{paths}{deviation}{growth}</div></section>\n{numbers}</main>\n{footer}\
          </body>\n</html>\n",
         head = shell::head(&record.system.name, &palette::rules(), Scripts::None),
         header = header(record),

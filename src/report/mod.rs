@@ -15,6 +15,7 @@ mod figures;
 mod growth;
 mod html;
 pub(crate) mod palette;
+mod places;
 mod plan;
 mod plan_figures;
 mod plan_paths;
@@ -30,6 +31,8 @@ pub(crate) mod sortable;
 pub(crate) mod span;
 pub(crate) mod table;
 pub(crate) mod text;
+pub(crate) mod ticks;
+mod tracks;
 mod train;
 mod words;
 

@@ -6,7 +6,7 @@ use super::plan_paths;
 use super::plan_runs::PlanPage;
 use super::shell::{self, Headline, Scripts};
 use super::table::{pairs, table};
-use super::text::{count, escape, interval, lower, number, or_dash, percents, upper};
+use super::text::{capital, count, escape, interval, lower, number, or_dash, percents, upper};
 use crate::model::Form;
 use crate::plan::PlanRecord;
 use crate::plan::record::{LatencyRecord, RunRecord, SuccessRecord, TermRecord};
@@ -20,7 +20,7 @@ pub fn plan_html(page: &PlanPage<'_>) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n{head}<body>\n{hatch}{header}<main>\n{notes}\
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">The plan in time</h2>\n\
-         <div class=\"gallery\">\n{figures}</div></section>\n\
+         <div class=\"gallery flow\">\n{figures}</div></section>\n\
          <section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
          <div class=\"tables\">\n{narrow}</div>\n{runs}{configuration}</section>\n\
          {adapter}</main>\n{footer}</body>\n</html>\n",
@@ -41,9 +41,7 @@ pub fn plan_html(page: &PlanPage<'_>) -> String {
 
 /// `note` with a capital letter and a full stop; names in quotes stay as they are.
 fn sentence(note: &str) -> String {
-    let mut letters = note.chars();
-    let first = letters.next().map(|first| first.to_uppercase().to_string());
-    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
+    capital(note) + "."
 }
 
 /// What came of the runs.

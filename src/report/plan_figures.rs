@@ -41,9 +41,8 @@ enum Zero {
 
 /// The figures in the order of the page.
 pub(super) fn figures(page: &PlanPage<'_>) -> Vec<Figure> {
-    let mut all = vec![states(page), controls(page), margins(page), terms(page)];
-    all.extend(effective(page));
-    all
+    let first = [states(page), controls(page)];
+    first.into_iter().chain(effective(page)).chain([margins(page), terms(page)]).collect()
 }
 
 fn states(page: &PlanPage<'_>) -> Figure {
@@ -189,20 +188,12 @@ fn figure(
     }
 }
 
-/// A span that is not thinner than what a reader takes for a change.
-fn open(span: Span) -> Span {
-    let least = (0.02 * span.low.abs().max(span.high.abs())).max(1e-6);
-    match span.width() < least {
-        true => Span { low: span.low - 0.5 * least, high: span.high + 0.5 * least },
-        false => span,
-    }
-}
-
 impl Panel {
     fn drawing(&self, id: &str, record: &PlanRecord) -> String {
         let values = self.lines.iter().flat_map(|line| line.points.iter().map(|point| point[1]));
         let zero = (self.zero == Zero::Marked).then_some(0.0);
-        let Some(span) = Span::of(values.chain(self.bounds.iter().copied()).chain(zero)).map(open)
+        let Some(span) =
+            Span::of(values.chain(self.bounds.iter().copied()).chain(zero)).map(Span::opened)
         else {
             return "<p class=\"empty\">No number of it can be drawn.</p>".to_owned();
         };

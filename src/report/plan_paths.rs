@@ -1,95 +1,176 @@
-//! The paths of plans in closed loop in a plane, over the margins there.
+//! The paths of plans in closed loop: of the bodies of the model, or in a plane over the margins there.
 
 use super::contour::Field;
-use super::figure::{Figure, Swatch, cross, dot};
-use super::plan_runs::{PlanPage, class, drawn, legend, shown};
+use super::figure::{Figure, Swatch};
+use super::plan_runs::{PlanPage, drawn, shown};
 use super::plot::{Labels, Plot, Proportions};
 use super::span::Span;
-use super::text::ordinary;
-use crate::plan::{Plane, Trajectory};
+use super::tracks::{self, Run, Scene, Track};
+use crate::model::Form;
+use crate::plan::Plane;
 
-/// The mark at a start.
-const START: &str = "<circle class=\"start body first\" r=\"3.6\"/>";
-
-/// The figure; none of a model that has no plane.
+/// The figure; none of a model with a single state and no bodies.
 pub(super) fn figure(page: &PlanPage<'_>) -> Option<Figure> {
-    let plane = page.plane?;
-    let mut legend = legend(page);
-    let task = &page.record.system.task;
-    let target = (Swatch::Area("target-area target"), "target".to_owned());
-    let violated = (Swatch::Area("hatched constraint"), "constraint violated".to_owned());
-    legend.push((Swatch::Mark(START.to_owned()), "start".to_owned()));
-    legend.extend(task.has_target().then_some(target));
-    legend.extend(task.has_constraint().then_some(violated));
+    if page.plane.is_none() && page.drawn.bodies.is_empty() {
+        return None;
+    }
+    let picture = Picture::new(page);
     Some(Figure {
         id: "paths",
         title: "Paths".to_owned(),
-        drawing: drawing(page, plane),
-        legend,
-        caption: format!(
-            "{} Target and constraint are those of step 0 with the other states as at the first start, and \
-             none was computed where it is grey; a run that did what the task asks ends in a dot, another in a cross.",
-            shown(page.record)
-        ),
+        drawing: picture.drawing(),
+        legend: picture.legend(),
+        caption: picture.caption(),
     })
 }
 
-fn drawing(page: &PlanPage<'_>, plane: &Plane) -> Result<String, String> {
-    let nothing = || "No state of the runs can be drawn.".to_owned();
-    let span = |axis: usize| Span::of(plane.values[axis].iter().copied()).ok_or_else(nothing);
-    let axes = plane.states.map(|state| &page.record.system.states[state]);
-    let shape = match axes[0].unit == axes[1].unit {
-        true => Proportions::Equal,
-        false => Proportions::Free(330.0),
-    };
-    let mut plot = Plot::new("paths-plane", span(0)?, span(1)?, shape);
-    plot.beyond([span(0)?, span(1)?]);
-    margins(&mut plot, page, plane);
-    for (run, judged) in drawn(page) {
-        let line = plot.line(points(run, plane.states));
-        plot.path(class(judged), &line);
-    }
-    for (run, judged) in drawn(page) {
-        let all = points(run, plane.states);
-        all.first().iter().for_each(|point| plot.mark(**point, START));
-        let last = all.iter().rev().find(|point| point.iter().all(|x| ordinary(*x)));
-        let mark = if judged.success() { dot(4.2) } else { cross(4.0) };
-        last.iter().for_each(|point| plot.mark(**point, &mark));
-    }
-    let [x, y] = axes.map(|axis| match axis.unit.is_empty() {
-        true => axis.name.clone(),
-        false => format!("{} ({})", axis.name, axis.unit),
-    });
-    let labels = Labels { x: &x, y: &y, whole: false };
-    Ok(plot.finish(&labels, &format!("Paths of the runs: {y} against {x}")))
+/// The margins behind the paths, positive in the target and where the constraint is violated.
+struct Ground {
+    target: Option<Field>,
+    violated: Option<Field>,
+    spans: [Span; 2],
 }
 
-/// The target as an area, violated constraints hatched, and the zero levels of both margins.
-fn margins(plot: &mut Plot, page: &PlanPage<'_>, plane: &Plane) {
-    let task = &page.record.system.task;
-    let field = |values: &[f64], sign: f64| Field {
-        x: plane.values[0].clone(),
-        y: plane.values[1].clone(),
-        values: values.iter().map(|value| sign * value).collect(),
-    };
-    if task.has_target() {
-        let target = field(&plane.target, 1.0);
-        let area: String = target.region().into_iter().map(|part| plot.polygon(part)).collect();
-        plot.path("target-area", &area);
-        let edge: String = target.zero_lines().into_iter().map(|line| plot.line(line)).collect();
-        plot.path("target", &edge);
+impl Ground {
+    /// Those of `plane` that the task asks for; none without a span.
+    fn new(page: &PlanPage<'_>, plane: &Plane) -> Option<Self> {
+        let task = &page.record.system.task;
+        let field = |values: &[f64], sign: f64| Field {
+            x: plane.values[0].clone(),
+            y: plane.values[1].clone(),
+            values: values.iter().map(|value| sign * value).collect(),
+        };
+        let span = |axis: usize| Span::of(plane.values[axis].iter().copied());
+        Some(Self {
+            target: task.has_target().then(|| field(&plane.target, 1.0)),
+            violated: task.has_constraint().then(|| field(&plane.constraint, -1.0)),
+            spans: [span(0)?, span(1)?],
+        })
     }
-    if task.has_constraint() {
-        let violated = field(&plane.constraint, -1.0);
-        let area: String = violated.region().into_iter().map(|part| plot.polygon(part)).collect();
-        plot.path("hatched", &area);
-        let edge: String = violated.zero_lines().into_iter().map(|line| plot.line(line)).collect();
-        plot.path("constraint", &edge);
+
+    /// The target as an area, violated constraints hatched, and the zero levels of both margins.
+    fn draw(&self, plot: &mut Plot) {
+        plot.beyond(self.spans);
+        let classes = [("target-area", "target"), ("hatched", "constraint")];
+        for (field, (area, edge)) in [&self.target, &self.violated].into_iter().zip(classes) {
+            let Some(field) = field else { continue };
+            let region: String =
+                field.region().into_iter().map(|part| plot.polygon(part)).collect();
+            plot.path(area, &region);
+            let lines: String =
+                field.zero_lines().into_iter().map(|line| plot.line(line)).collect();
+            plot.path(edge, &lines);
+        }
+    }
+
+    fn has_target(&self) -> bool {
+        self.target.as_ref().is_some_and(Field::is_positive)
+    }
+
+    fn is_violated(&self) -> bool {
+        self.violated.as_ref().is_some_and(Field::is_positive)
     }
 }
 
-/// The places of a run in the plane.
-fn points(run: &Trajectory, states: [usize; 2]) -> Vec<[f64; 2]> {
-    let at = |x: &Vec<f32>| states.map(|state| x.get(state).map_or(f64::NAN, |x| f64::from(*x)));
-    run.states.iter().map(at).collect()
+/// The picture with what is said of it.
+struct Picture<'a> {
+    page: &'a PlanPage<'a>,
+    scene: Scene<'a>,
+    tracks: Vec<Track>,
+    ground: Option<Ground>,
+}
+
+impl<'a> Picture<'a> {
+    fn new(page: &'a PlanPage<'a>) -> Self {
+        let system = &page.record.system;
+        let runs = drawn(page);
+        let scene = Scene {
+            states: &system.states,
+            bodies: &system.bodies,
+            plane: page.plane.map_or([0, 1], |plane| plane.states),
+            drawn: Some(page.drawn),
+            runs: runs
+                .map(|(run, judged)| Run { states: &run.states, success: judged.success() })
+                .collect(),
+        };
+        let tracks = scene.tracks();
+        // Margins are known over the plane of two states, and bodies may stand elsewhere.
+        let first = tracks.first().and_then(|track| track.states);
+        let plane = page.plane.filter(|plane| first == Some(plane.states));
+        let ground = plane.and_then(|plane| Ground::new(page, plane));
+        Self { page, scene, tracks, ground }
+    }
+
+    fn legend(&self) -> Vec<(Swatch, String)> {
+        let record = self.page.record;
+        let deed = record.system.task.short_words(Form::Past, record.steps);
+        let mut legend = self.scene.legend(&self.tracks, &deed);
+        if let Some(ground) = &self.ground {
+            let target = (Swatch::Area("target-area target"), "target".to_owned());
+            let violated = (Swatch::Area("hatched constraint"), "constraint violated".to_owned());
+            legend.extend(ground.has_target().then_some(target));
+            legend.extend(ground.is_violated().then_some(violated));
+        }
+        legend.extend(tracks::shape_legend(self.scene.shapes()));
+        legend
+    }
+
+    fn caption(&self) -> String {
+        let record = self.page.record;
+        let words = record.system.task.words(Form::One, record.steps);
+        let mut caption = format!("{} A run succeeds if it {words}.", shown(record));
+        if self.tracks.iter().any(|track| track.size.is_some() || track.joined.is_some()) {
+            caption += " Bodies stand where the first run begins and where it ends.";
+        }
+        caption + &self.ground.as_ref().map_or_else(String::new, |ground| self.behind(ground))
+    }
+
+    /// What is said of the margins behind the paths.
+    fn behind(&self, ground: &Ground) -> String {
+        let mut words =
+            " Target and constraint are those of step 0 with the other states as at the first \
+                         start"
+                .to_owned();
+        if self.frame().is_some_and(|plot| plot.exceeds(ground.spans)) {
+            words += ", and none was computed where it is grey";
+        }
+        words += ".";
+        if ground.target.is_some() && !ground.has_target() {
+            words += " There is no target in this plane: with these other states no place of it is in the \
+                      target.";
+        }
+        words
+    }
+
+    /// The empty plot of what the picture covers.
+    fn frame(&self) -> Option<Plot> {
+        let span = |axis: usize| Some(self.scene.span(&self.tracks, axis)?.widened(0.05));
+        let spans = match &self.ground {
+            Some(ground) => [0, 1].map(|axis| {
+                let shapes = self.scene.shape_span(axis).unwrap_or(ground.spans[axis]);
+                ground.spans[axis].join(shapes)
+            }),
+            None => [span(0)?, span(1)?],
+        };
+        let shape = match self.scene.one_scale(&self.tracks) {
+            true => Proportions::Equal,
+            false => Proportions::Free(330.0),
+        };
+        Some(Plot::new("paths-plane", spans[0], spans[1], shape))
+    }
+
+    fn drawing(&self) -> Result<String, String> {
+        let Self { scene, tracks, ground, .. } = self;
+        let mut plot = self.frame().ok_or("No state of the runs can be drawn.")?;
+        if let Some(ground) = ground {
+            ground.draw(&mut plot);
+        }
+        tracks::draw_shapes(&mut plot, scene.shapes());
+        scene.draw_paths(&mut plot, tracks);
+        tracks::draw_bodies(&mut plot, tracks);
+        scene.draw_marks(&mut plot, tracks);
+        let [x, y] = [0, 1].map(|axis| tracks::label(tracks, axis));
+        let labels = Labels { x: &x, y: &y, whole: false };
+        Ok(plot.finish(&labels, &format!("Paths of the runs: {y} against {x}")))
+    }
 }

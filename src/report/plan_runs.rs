@@ -4,6 +4,7 @@ use super::figure::Swatch;
 use super::text::counted;
 use crate::model::Form;
 use crate::plan::{Judged, PlanRecord, Plane, Trajectory};
+use crate::scenario::drawn_record::DrawnRecord;
 
 /// Runs that are drawn.
 const DRAWN: usize = 20;
@@ -19,6 +20,13 @@ pub struct PlanPage<'a> {
     pub judged: &'a [Judged],
     /// The margins over the plane of the paths, where there is one.
     pub plane: Option<&'a Plane>,
+    /// The bodies of the model along the first [`Self::DRAWN`] runs, and its shapes.
+    pub drawn: &'a DrawnRecord,
+}
+
+impl PlanPage<'_> {
+    /// Runs that are drawn.
+    pub const DRAWN: usize = DRAWN;
 }
 
 /// The runs that are drawn, with what they came to.

@@ -1,21 +1,18 @@
 //! A plot as SVG: scales, axes and marks in the coordinates of the data.
 
-use super::span::{RoundValues, Span};
+use super::span::Span;
 use super::text::{escape, ordinary, shorten};
+use super::ticks::{self, CHARACTER, LINE, Ticks, half, longest, thinned};
 
 /// Width of a plot in its own units, if none is asked for; the page scales it. Narrow, so that
 /// labels stay legible on a phone.
 const WIDTH: f64 = 440.0;
 /// Room above and to the right of the axes.
-const MARGIN: f64 = 14.0;
+pub(crate) const MARGIN: f64 = 14.0;
 /// Room below the axes, for tick labels and the name.
 const FOOT: f64 = 46.0;
 /// Height of the axes, at most, where both have one scale.
 const HIGHEST: f64 = 480.0;
-/// Width of a character of a tick label, at most.
-const CHARACTER: f64 = 7.6;
-/// Height of a tick label, at most.
-const LINE: f64 = 16.2;
 /// Characters that an axis name may take.
 const NAME: usize = 44;
 
@@ -37,9 +34,6 @@ pub(crate) struct Labels<'a> {
     /// Whole numbers only along x, as for steps and rounds.
     pub(crate) whole: bool,
 }
-
-/// Where ticks stand along an axis, ascending, and what they say.
-pub(crate) type Ticks = Vec<(f64, String)>;
 
 /// An axis with ticks of its own, in place of round numbers.
 pub(crate) struct Axis {
@@ -74,8 +68,11 @@ impl Plot {
     /// An empty plot that is `outer` wide with its labels.
     pub(crate) fn across_width(id: &str, x: Span, y: Span, shape: Proportions, outer: f64) -> Self {
         let (mut x, mut y) = (x.widened(0.0), y.widened(0.0));
-        let room = |y: Span, height: f64| room(&round(y, height / 46.0));
-        let (mut width, mut height) = (outer - MARGIN - room(y, 400.0), 0.0);
+        let room = |y: Span, height: f64| room(&ticks::up(y, height));
+        let across = outer - MARGIN - room(y, 400.0);
+        // The label at the right end of the axis has its middle there.
+        let right = MARGIN.max(CHARACTER / 2.0 * longest(&ticks::across(x, across)));
+        let (mut width, mut height) = (across + MARGIN - right, 0.0);
         match shape {
             Proportions::Free(fixed) => height = fixed,
             Proportions::Equal => {
@@ -87,7 +84,7 @@ impl Plot {
             }
         }
         let left = room(y, height);
-        let spare = outer - MARGIN - left - width;
+        let spare = outer - right - left - width;
         Self {
             id: id.to_owned(),
             x,
@@ -109,11 +106,11 @@ impl Plot {
         let [x, y] = axes;
         let left = room(&y.ticks);
         let empty = Self::across_width(id, x.span, y.span, Proportions::Free(height), outer);
-        let width = outer - MARGIN - right - left;
+        let last = x.ticks.last().map_or(0.0, |(_, text)| half(text));
+        let width = outer - left - (MARGIN + right).max(last);
         let mut plot = Self { left, width, ..empty };
         let across = |tick: f64, text: &str| {
-            let half = CHARACTER * text.chars().count() as f64 / 2.0;
-            [plot.across(tick) - half, plot.across(tick) + half + 4.0]
+            [plot.across(tick) - half(text), plot.across(tick) + half(text) + 4.0]
         };
         let up = |tick: f64, _: &str| [-plot.down(tick), LINE - plot.down(tick)];
         // The labels along x keep clear of those along y.
@@ -162,6 +159,14 @@ impl Plot {
     /// Path data of a rectangle between two corners.
     pub(crate) fn rectangle(&self, [x0, y0, x1, y1]: [f64; 4]) -> String {
         self.polygon([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    }
+
+    /// Whether it goes beyond these spans, by as much as is seen.
+    pub(crate) fn exceeds(&self, spans: [Span; 2]) -> bool {
+        let seen = |own: Span, known: Span| {
+            (known.low - own.low).max(own.high - known.high) > 1e-3 * own.width()
+        };
+        seen(self.x, spans[0]) || seen(self.y, spans[1])
     }
 
     /// Covers what lies beyond these spans, of which nothing is known.
@@ -263,7 +268,8 @@ impl Plot {
             let at = self.across(tick);
             let [line, from, to] = [at, MARGIN, MARGIN + self.height + 4.0].map(coordinate);
             axes += &format!("<path class=\"grid\" d=\"M{line} {from}V{to}\"/>");
-            axes += &tick_label([at, MARGIN + self.height + 17.0], "middle", &text);
+            let held = at.min(self.outer - half(&text)).max(half(&text));
+            axes += &tick_label([held, MARGIN + self.height + 17.0], "middle", &text);
         }
         for (tick, text) in self.y_ticks() {
             let at = self.down(tick);
@@ -275,13 +281,12 @@ impl Plot {
     }
 
     fn x_ticks(&self, labels: &Labels) -> Ticks {
-        let parts = (self.width / 52.0).max(1.0);
-        let parts = if labels.whole { parts.min(self.x.width()) } else { parts };
-        self.ticks[0].clone().unwrap_or_else(|| round(self.x, parts.max(1.0)))
+        let round = if labels.whole { ticks::whole } else { ticks::across };
+        self.ticks[0].clone().unwrap_or_else(|| round(self.x, self.width))
     }
 
     fn y_ticks(&self) -> Ticks {
-        self.ticks[1].clone().unwrap_or_else(|| round(self.y, (self.height / 46.0).max(1.0)))
+        self.ticks[1].clone().unwrap_or_else(|| ticks::up(self.y, self.height))
     }
 
     fn names(&self, labels: &Labels) -> String {
@@ -308,19 +313,6 @@ impl Plot {
     }
 }
 
-/// The ticks without the labels that begin before `free`, or before the end of the one before.
-fn thinned(mut ticks: Ticks, mut free: f64, reach: impl Fn(f64, &str) -> [f64; 2]) -> Ticks {
-    for (tick, text) in &mut ticks {
-        let [from, to] = reach(*tick, text);
-        if from < free {
-            text.clear();
-        } else {
-            free = to;
-        }
-    }
-    ticks
-}
-
 /// What stands at a tick; nothing where its label was left out.
 fn tick_label([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
     if text.is_empty() {
@@ -330,33 +322,9 @@ fn tick_label([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
     format!("<text class=\"tick\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>")
 }
 
-/// Ticks at round values, about `parts` of them.
-fn round(span: Span, parts: f64) -> Ticks {
-    let RoundValues { values, decimals } = span.ticks(parts);
-    values.into_iter().map(|tick| (tick, label(tick, decimals))).collect()
-}
-
-/// Characters of the longest label.
-fn longest(ticks: &Ticks) -> f64 {
-    let lengths = ticks.iter().map(|(_, text)| text.chars().count());
-    lengths.max().unwrap_or(1) as f64
-}
-
 /// Room left of the axes for the labels and the name.
 fn room(ticks: &Ticks) -> f64 {
     32.0 + CHARACTER * longest(ticks)
-}
-
-/// A tick's value with a true minus sign.
-pub(crate) fn label(tick: f64, decimals: usize) -> String {
-    // Zero comes out of the multiplication with a sign, now and then.
-    let tick = if tick.abs() < 1e-12 { 0.0 } else { tick };
-    let text = if tick != 0.0 && !(1e-4..1e6).contains(&tick.abs()) {
-        format!("{tick:.1e}")
-    } else {
-        format!("{tick:.decimals$}")
-    };
-    text.replace('-', "−")
 }
 
 /// A coordinate of the drawing, to a hundredth; far points are brought near, outside the axes.

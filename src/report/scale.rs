@@ -1,8 +1,9 @@
 //! From values to places along an axis: linear, or logarithmic.
 
-use super::plot::{Axis, Ticks};
+use super::plot::Axis;
 use super::span::Span;
 use super::text::{minus, number, shorten};
+use super::ticks::Ticks;
 
 /// Share of an axis that is left free at either end.
 const EDGE: f64 = 0.08;

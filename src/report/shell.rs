@@ -26,6 +26,13 @@ pub(crate) const WEAVES: &str = "<svg class=\"defs\" aria-hidden=\"true\"><defs>
     <circle cx=\"1.5\" cy=\"1.5\" r=\"1\"/><circle cx=\"4.5\" cy=\"4.5\" r=\"1\"/></pattern>\
     </defs></svg>\n";
 
+/// ` of ` and the plant that a configuration names; nothing where it names none.
+pub(crate) fn of_plant(provenance: &Provenance) -> String {
+    let named = |place: &str| provenance.config.pointer(place)?.as_str();
+    let name = named("/model/name").or_else(|| named("/system/name"));
+    name.map_or_else(String::new, |name| format!(" of {name}"))
+}
+
 /// Which scripts a page allows to run.
 #[derive(Clone, Copy)]
 pub(crate) enum Scripts {

@@ -2,6 +2,11 @@
 
 use super::text::ordinary;
 
+/// Width, in sizes of its ends, up to which a span is one value: f32 tells no more apart.
+const LONE: f64 = 1e-6;
+/// Width, in sizes of its ends, up to which a span is no change that a reader would see.
+const CHANGE: f64 = 0.02;
+
 /// An interval of data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Span {
@@ -34,12 +39,30 @@ impl Span {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Wider by `share` of its width on each side, and never empty.
+    /// Wider by `share` of its width on each side; around a lone value as wide as that is large, or as 1.
     pub(crate) fn widened(self, share: f64) -> Self {
-        let reach = share * (self.high - self.low);
-        let least = 1e-6 * self.low.abs().max(self.high.abs()).max(1e-3);
-        let reach = reach.max(if self.high - self.low > least { 0.0 } else { least });
+        let size = self.size();
+        let lone = self.width() <= LONE * size;
+        let reach = match lone {
+            true if size > 0.0 => size,
+            true => 1.0,
+            false => share * self.width(),
+        };
         Self { low: self.low - reach, high: self.high + reach }
+    }
+
+    /// Not thinner than what a reader takes for a change.
+    pub(crate) fn opened(self) -> Self {
+        let least = CHANGE * self.size();
+        match self.width() > LONE * self.size() && self.width() < least {
+            true => self.stretched(least),
+            false => self,
+        }
+    }
+
+    /// Size of the larger end.
+    fn size(self) -> f64 {
+        self.low.abs().max(self.high.abs())
     }
 
     /// High end minus low end.
@@ -52,8 +75,15 @@ impl Span {
         self.widened(((width / self.width() - 1.0) / 2.0).max(0.0))
     }
 
-    /// Round values about `parts` to the span.
+    /// Round values about `parts` to the span, and two at least: fewer do not tell how long it is.
     pub(crate) fn ticks(self, parts: f64) -> RoundValues {
+        let finer = [1.0, 1.5, 2.0, 3.0].into_iter().map(|more| self.about(more * parts));
+        let enough = finer.into_iter().find(|found| found.values.len() >= 2);
+        enough.unwrap_or_else(|| self.about(5.0 * parts))
+    }
+
+    /// Round values about `parts` to the span.
+    fn about(self, parts: f64) -> RoundValues {
         let rough = self.width() / parts;
         let power = 10.0_f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]
@@ -84,5 +114,18 @@ mod tests {
         for (tick, expected) in ticks.iter().zip([-2.5, -2.0, -1.5, -1.0, -0.5]) {
             assert!((tick - expected).abs() < 1e-12, "{tick}");
         }
+    }
+
+    #[test]
+    fn a_constant_has_room_of_its_size() {
+        let around = |low, high| {
+            let span = Span { low, high }.opened().widened(0.08);
+            [span.low, span.high]
+        };
+        assert_eq!(around(0.0, 0.0), [-1.0, 1.0]);
+        assert_eq!(around(-1.0, -1.0), [-2.0, 0.0]);
+        assert_eq!(around(0.015, 0.015), [0.0, 0.03]);
+        let [low, high] = around(1.0, 1.001);
+        assert!((0.01..0.03).contains(&(high - low)), "{low} to {high}");
     }
 }

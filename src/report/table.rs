@@ -7,6 +7,16 @@ use crate::scenario::record::{Claim, Record};
 
 /// A table in a box of its own that scrolls; the first row holds headings, cells are text.
 pub(crate) fn table(title: &str, rows: &[Vec<String>]) -> String {
+    let wide = rows.first().is_some_and(|head| head.len() > 3);
+    sized(title, rows, if wide { " wide" } else { "" })
+}
+
+/// A table of numbers across the page: no number is broken.
+pub(crate) fn across_page(title: &str, rows: &[Vec<String>]) -> String {
+    sized(title, rows, " wide")
+}
+
+fn sized(title: &str, rows: &[Vec<String>], wide: &str) -> String {
     let row = |cells: &Vec<String>, head: bool| {
         let cells = cells.iter().enumerate().map(|(index, cell)| {
             let cell = escape(cell);
@@ -22,7 +32,6 @@ pub(crate) fn table(title: &str, rows: &[Vec<String>]) -> String {
         return String::new();
     };
     let body: String = body.iter().map(|cells| row(cells, false)).collect();
-    let wide = if head.len() > 3 { " wide" } else { "" };
     format!(
         "<section class=\"numbers{wide}\"><h3>{title}</h3>\
          <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{title}\">\

@@ -71,6 +71,12 @@ fn common_beginning(texts: &[&str]) -> usize {
     rest.iter().map(shared).min().unwrap_or(0)
 }
 
+/// `text` with a capital letter.
+pub(crate) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// A count with a comma after every third digit.
 pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();

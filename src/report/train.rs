@@ -4,10 +4,14 @@ use super::figure::{Figure, Swatch};
 use super::plot::{Labels, Plot, Proportions};
 use super::shell::{self, Headline, Scripts};
 use super::span::Span;
-use super::table::{pairs, table};
-use super::text::{count, escape, number, or_dash};
+use super::table::{across_page, pairs, table};
+use super::text::{capital, count, escape, number, or_dash, ordinary};
 use crate::train::record::{CurvePoint, TrainRecord};
 
+/// How scores that are shares begin.
+const SHARE: &str = "share";
+/// What a share lies between.
+const SHARES: Span = Span { low: 0.0, high: 1.0 };
 /// Marks the networks that were kept.
 const BEST: &str = "<circle class=\"seen\" r=\"4\"/>";
 
@@ -22,13 +26,14 @@ pub fn train_html(record: &TrainRecord) -> String {
          <section aria-labelledby=\"figures\"><h2 id=\"figures\">Learning curves</h2>\n\
          <div class=\"gallery\">\n{figures}</div></section>\n\
          {notes}{policy}<section aria-labelledby=\"numbers\"><h2 id=\"numbers\">Numbers</h2>\n\
-         <div class=\"tables\">\n{numbers}</div>\n{configuration}</section>\n\
+         <div class=\"tables\">\n{numbers}</div>\n{rows}{configuration}</section>\n\
          {adapter}</main>\n{footer}</body>\n</html>\n",
-        head = shell::head("training", "", Scripts::None),
+        head = shell::head(&format!("training{}", shell::of_plant(provenance)), "", Scripts::None),
         header = header(record),
         notes = shell::notes(&record.notes),
         policy = policy(record),
         numbers = numbers(record),
+        rows = rows(record),
         configuration = shell::configuration(provenance),
         adapter = shell::failures(&record.events),
         footer = shell::footer(provenance, "a second run on such a machine gives the same page"),
@@ -75,7 +80,7 @@ fn header(record: &TrainRecord) -> String {
     format!(
         "<header>\n<p class=\"brand\">Reachcast training</p>\n<h1>{}</h1>\n\
          <p class=\"policy\">{}</p>\n<div class=\"cards\">\n{cards}</div>\n</header>\n",
-        escape(&title(record)),
+        escape(&(title(record) + &shell::of_plant(provenance))),
         escape(&line),
     )
 }
@@ -134,38 +139,40 @@ fn curve(
         None => Err("Nothing of this was measured.".to_owned()),
         Some(values) => {
             let across = Span { low: 0.0, high: done(record).max(1) as f64 };
-            let mut plot = Plot::new(id, across, values.widened(0.08), Proportions::Free(250.0));
+            let up = if is_share(name, values) { SHARES } else { values.opened() };
+            let mut plot = Plot::new(id, across, up.widened(0.08), Proportions::Free(250.0));
             let line = plot.line(points.iter().copied());
             plot.path("bound", &line);
             if let Some(kept) = best(record) {
                 plot.mark(place(kept), BEST);
             }
-            let labels = Labels { x: "iterations", y: name, whole: true };
+            let labels = Labels { x: "iterations", y: short(name), whole: true };
             Ok(plot.finish(&labels, &format!("{name} against the iterations")))
         }
     };
-    let legend = vec![
-        (Swatch::Line("bound"), name.to_owned()),
-        (Swatch::Mark(BEST.to_owned()), "kept".to_owned()),
-    ];
-    Figure { id, title: sentence(name), drawing, legend, caption: caption.to_owned() }
+    let kept = best(record).and_then(read).is_some_and(ordinary);
+    let kept = kept.then(|| (Swatch::Mark(BEST.to_owned()), "kept".to_owned()));
+    let mut legend = Vec::new();
+    if drawing.is_ok() {
+        legend.push((Swatch::Line("bound"), name.to_owned()));
+        legend.extend(kept);
+    }
+    Figure { id, title: capital(name), drawing, legend, caption: caption.to_owned() }
 }
 
-/// `name` with a capital letter.
-fn sentence(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+/// Whether a score is a share: it is called one, and goes no further than one can.
+fn is_share(name: &str, values: Span) -> bool {
+    name.starts_with(SHARE) && values.low >= SHARES.low && values.high <= SHARES.high
 }
 
-/// Every number of the record.
+/// What an axis of `name` is called; the title of the figure has the whole.
+fn short(name: &str) -> &str {
+    name.split([',', '(']).next().filter(|_| !name.starts_with(SHARE)).unwrap_or(SHARE).trim()
+}
+
+/// Every number of the record but the curves.
 fn numbers(record: &TrainRecord) -> String {
     let provenance = &record.origin.provenance;
-    let head = ["iterations", "loss"].into_iter().map(str::to_owned);
-    let mut rows = vec![head.chain(record.scores.iter().cloned()).collect::<Vec<_>>()];
-    rows.extend(record.curve.iter().map(|point| {
-        let cells = [count(point.iteration), or_dash(point.loss.map(number))];
-        cells.into_iter().chain(point.scores.iter().map(|score| number(*score))).collect()
-    }));
     let mut networks = vec![["file", "neurons per layer", "SHA-256"].map(str::to_owned).to_vec()];
     networks.extend(record.networks.iter().map(|network| {
         let widths: Vec<_> = network.widths.iter().map(usize::to_string).collect();
@@ -183,5 +190,16 @@ fn numbers(record: &TrainRecord) -> String {
         ("device", provenance.device.clone()),
         ("version", provenance.version.clone()),
     ];
-    format!("{}{}{}", table("Networks", &networks), pairs("Origin", &origin), table("Curve", &rows))
+    table("Networks", &networks) + &pairs("Origin", &origin)
+}
+
+/// The curves in numbers.
+fn rows(record: &TrainRecord) -> String {
+    let head = ["iterations", "loss"].into_iter().map(str::to_owned);
+    let mut rows = vec![head.chain(record.scores.iter().cloned()).collect::<Vec<_>>()];
+    rows.extend(record.curve.iter().map(|point| {
+        let cells = [count(point.iteration), or_dash(point.loss.map(number))];
+        cells.into_iter().chain(point.scores.iter().map(|score| number(*score))).collect()
+    }));
+    across_page("Curve", &rows)
 }

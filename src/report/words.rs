@@ -1,5 +1,6 @@
 //! Words for what a record stores as numbers and modes.
 
+use super::places::titled;
 use super::text::{interval, lower, upper};
 use crate::rollout::PairControl;
 use crate::scenario::BoxRecord;
@@ -8,11 +9,7 @@ use crate::scenario::settings::{BoundarySearch, DeviationSource, Joint};
 
 /// Name and unit of a state, as `ego_x (m)`.
 pub(crate) fn axis(record: &Record, state: usize) -> String {
-    record
-        .system
-        .states
-        .get(state)
-        .map_or_else(|| format!("state {state}"), |axis| format!("{} ({})", axis.name, axis.unit))
+    titled(&record.system.states, state)
 }
 
 /// Name of a state.

@@ -91,6 +91,7 @@ pub use key_source::Keys;
 pub use origin::{Hashes, hashes};
 #[cfg(feature = "cli")]
 pub(crate) use origin::{provenance, system_record};
+pub use picture::bodies_and_shapes;
 #[cfg(feature = "cli")]
 pub(crate) use spacing::least_perturbation;
 pub use tightened::{Tightened, tightened};

@@ -49,25 +49,35 @@ fn drawn(model: &Model, settings: &Settings, rollouts: &[RolloutRecord]) -> Opti
     if model.native.is_some() {
         return None;
     }
+    let states: Vec<&[Vec<f32>]> = rollouts.iter().map(|rollout| &rollout.states[..]).collect();
+    let ground = plane(model, settings).map(|plane| ground(model, settings, rollouts, plane));
+    Some(DrawnRecord { ground, ..bodies_and_shapes(model, &states) })
+}
+
+/// The bodies of `model` along `runs`, a list of states each, and its shapes.
+pub fn bodies_and_shapes(model: &Model, runs: &[&[Vec<f32>]]) -> DrawnRecord {
+    let along = |body: &PlacedBody, axis| -> Vec<Vec<f32>> {
+        runs.iter().map(|states| path(model, body, states, axis)).collect()
+    };
     let body = |body: &PlacedBody| DrawnBody {
         name: body.name.clone(),
         written: body.written.clone(),
         size: body.size,
         joined: body.joined,
-        right: rollouts.iter().map(|rollout| path(model, body, rollout, 0)).collect(),
-        up: rollouts.iter().map(|rollout| path(model, body, rollout, 1)).collect(),
+        right: along(body, 0),
+        up: along(body, 1),
     };
-    Some(DrawnRecord {
+    DrawnRecord {
         bodies: model.picture.bodies.iter().map(body).collect(),
         shapes: model.picture.shapes.clone(),
-        ground: plane(model, settings).map(|plane| ground(model, settings, rollouts, plane)),
-    })
+        ground: None,
+    }
 }
 
-/// Where `body` is along an axis of the picture in a rollout.
-fn path(model: &Model, body: &PlacedBody, rollout: &RolloutRecord, axis: usize) -> Vec<f32> {
+/// Where `body` is along an axis of the picture in a run.
+fn path(model: &Model, body: &PlacedBody, states: &[Vec<f32>], axis: usize) -> Vec<f32> {
     let place = |(step, x): (u32, &Vec<f32>)| body.at.eval(&model.at_state(x, step))[axis];
-    (0..).zip(&rollout.states).map(place).collect()
+    (0..).zip(states).map(place).collect()
 }
 
 /// The two states that the first body moves along; of a model without bodies, those of the slice.

@@ -20,6 +20,27 @@ fn the_page_is_sound_and_says_what_the_record_says() {
     assert!(planned.page.contains(hash));
 }
 
+/// The bodies of a model are drawn as they are in a certificate, with the shapes around them; a legend has what
+/// is drawn, and a target that the plane has not is said to be missing.
+#[test]
+fn bodies_are_drawn_and_a_missing_target_is_named() {
+    let bodies = "[model.bodies]\nbob = { at = [\"sin(angle)\", \"0\"], size = 0.2 }\n\
+                  [model.shapes]\nwall = { box = [-2.0, -1.0, -1.9, 1.0], kind = \"unsafe\" }\n";
+    let drawn = planned(&format!("{PENDULUM}{bodies}"), &["--backend", "cpu"]).page;
+    assert_sound(&drawn, "bodies");
+    let paths = figure(&drawn, "paths");
+    assert_eq!(paths.matches("class=\"body extent\"").count(), 2, "{paths}");
+    for words in ["right: sin(angle)</text>", "bob, from its start", "wall"] {
+        assert!(paths.contains(words), "no {words} in {paths}");
+    }
+    assert!(!paths.contains("class=\"target-area"), "the plane is not that of two states");
+    let set = ["--set", "model.task.target=-1 - 0 * angle", "--backend", "cpu"];
+    let none = planned(PENDULUM, &set).page;
+    let paths = figure(&none, "paths");
+    assert!(paths.contains("There is no target in this plane") && !paths.contains("target-area"));
+    assert!(paths.contains("A run succeeds if it "));
+}
+
 /// A single state has no plane, and a run that stops at once is shown all the same.
 #[test]
 fn pages_at_the_edge_are_sound() {

@@ -198,6 +198,74 @@ fn the_ball_is_drawn_as_the_plane_cuts_it() {
     assert!(drawn.contains("class=\"shadow\"") && !drawn.contains("class=\"ball"));
 }
 
+/// The ball goes far beyond the slice: the frame holds it with all of its starts.
+#[test]
+fn the_frame_holds_the_ball_and_its_starts() {
+    let mut record = records::double_integrator();
+    let width = record.slice.x.values.last().unwrap() - record.slice.x.values[0];
+    let reach = 4.0 * width;
+    record.growth.outcome = GrowthOutcome::Verified;
+    record.growth.radius = f64::from(reach);
+    let center = record.growth.center.clone().unwrap();
+    for (number, sample) in record.growth.samples.iter_mut().enumerate() {
+        let angle = number as f32;
+        sample.x = vec![center[0] + reach * angle.cos(), center[1] + reach * angle.sin()];
+    }
+    let page = html(&record);
+    let drawn = drawing(&page, "figure-certified");
+    let tag = |start: &str| drawn.split_once(start).unwrap().1.split_once('>').unwrap().0;
+    let value = |tag: &str, name: &str| -> f64 {
+        attributes(tag).iter().find(|(other, _)| *other == name).unwrap().1.parse().unwrap()
+    };
+    let (ball, frame) = (tag("<ellipse class=\"ball\""), tag("<rect class=\"frame\""));
+    for [middle, half, low, length] in [["cx", "rx", "x", "width"], ["cy", "ry", "y", "height"]] {
+        let (middle, half) = (value(ball, middle), value(ball, half));
+        let (low, length) = (value(frame, low), value(frame, length));
+        assert!(middle - half > low && middle + half < low + length, "{ball} in {frame}");
+    }
+    let marks = drawn.matches("class=\"good\"").count() + drawn.matches("\"bad-line\"").count();
+    assert_eq!(marks, record.growth.samples.len());
+    assert!(figure(&page, "figure-certified").contains("The slice ends where it is grey"));
+}
+
+/// Swatches of areas stand beside a drawing that has them, and beside no other.
+#[test]
+fn a_legend_names_what_is_drawn() {
+    let legend = |page: &str, id: &str, class: &str| {
+        let (_, legend) = figure(page, id).split_once("class=\"legend\"").unwrap();
+        legend.contains(&format!("class=\"{class}\""))
+    };
+    let swatches = [("target-area target", "target-area"), ("hatched constraint", "hatched")];
+    let mut seen = [0; 2];
+    for margin in [None, Some(-1.0), Some(1.0)] {
+        for mut record in [records::race(), records::double_integrator()] {
+            if let Some(margin) = margin {
+                fill(&mut record.slice.target_margin, margin);
+                fill(&mut record.slice.constraint_margin, margin);
+            }
+            let page = html(&record);
+            for id in ["figure-certified", "figure-paths"] {
+                for (swatch, area) in swatches {
+                    let drawn = drawing(&page, id).contains(&format!("class=\"{area}\""));
+                    assert_eq!(legend(&page, id, swatch), drawn, "{id}: {swatch}, {margin:?}");
+                    seen[usize::from(drawn)] += 1;
+                }
+            }
+        }
+    }
+    assert!(seen.iter().all(|count| *count > 3), "{seen:?}");
+}
+
+#[test]
+fn it_is_said_where_rollouts_begin() {
+    let record = records::double_integrator();
+    let page = html(&record);
+    let others = record.picture.rollouts.len() - 1;
+    let grown = others.min(record.growth.samples.len());
+    let words = format!("They begin: the first at the state and {grown} at starts drawn from the");
+    assert!(figure(&page, "figure-paths").contains(&words), "{}", figure(&page, "figure-paths"));
+}
+
 #[test]
 fn an_unverified_ball_is_dashed_and_no_boundary_has_none() {
     let mut record = records::double_integrator();

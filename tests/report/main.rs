@@ -9,7 +9,9 @@ mod records;
 #[path = "../sweeps/mod.rs"]
 mod sweeps;
 
+mod axes;
 mod certificate;
+mod falsify;
 mod pictures;
 mod race;
 mod sweep;

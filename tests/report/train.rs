@@ -1,7 +1,8 @@
 //! The page of a run of training as text: every number, escaping, and records at the edge.
 #![allow(clippy::unwrap_used, reason = "a test that fails to set up has failed")]
 
-use crate::page::assert_sound;
+use super::axes::assert_legible;
+use crate::page::{assert_sound, drawing};
 use reachcast::report::train_html;
 use reachcast::scenario::record::Provenance;
 use reachcast::train::record::{CurvePoint, NetworkRecord, Origin, TRAIN_SCHEMA, TrainRecord};
@@ -81,6 +82,28 @@ fn every_number_is_there_and_text_is_escaped() {
     assert_eq!(train_html(&record()), page);
 }
 
+/// A share that never moves has the axis of a share, another score one of its size, and neither a breath's.
+#[test]
+fn scores_that_do_not_move_can_be_read() {
+    let mut constant = record();
+    constant.origin.provenance.config = serde_json::json!({ "model": { "name": "cart" } });
+    constant.curve.iter_mut().for_each(|point| {
+        (point.loss, point.scores) = (Some(0.0), vec![0.0, -1.0]);
+    });
+    let page = train_html(&constant);
+    assert_legible(&page, "constant");
+    assert!(page.contains("<h1>value.safetensors of cart</h1>"), "the plant is named");
+    let ticks = |id: &str| -> Vec<String> {
+        let labels = drawing(&page, id).split("text-anchor=\"end\">").skip(1);
+        labels.map(|text| text.split_once('<').unwrap().0.to_owned()).collect()
+    };
+    assert_eq!(ticks("score"), ["0.0", "0.5", "1.0"]);
+    assert_eq!(ticks("second-score"), ["−2.0", "−1.5", "−1.0", "−0.5", "0.0"]);
+    assert_eq!(ticks("loss"), ["−1.0", "−0.5", "0.0", "0.5", "1.0"]);
+    // The curve in numbers has the width of the page, where no number is broken.
+    assert!(page.contains("<section class=\"numbers wide\"><h3>Curve</h3>"));
+}
+
 #[test]
 fn runs_without_scores_and_numbers_that_are_none() {
     let mut empty = record();
@@ -89,6 +112,7 @@ fn runs_without_scores_and_numbers_that_are_none() {
     let page = train_html(&empty);
     assert_sound(&page, "empty");
     assert!(page.contains("Nothing of this was measured."));
+    assert!(!page.contains("class=\"legend\""), "nothing is drawn");
     let mut broken = record();
     broken.curve[1].scores[0] = f64::NAN;
     broken.curve[2].loss = Some(f64::INFINITY);

@@ -158,6 +158,10 @@ fn caption(
 ) -> String {
     let mut caption = measure.caption.to_owned();
     if let Some(chart) = chart {
+        if chart.over_numbers() && layout.length() > 1 {
+            caption +=
+                " Points alone were computed: lines and areas between them only lead the eye.";
+        }
         if chart.scale.is_log() {
             caption += " The scale of the values is logarithmic.";
         }

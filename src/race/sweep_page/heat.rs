@@ -5,8 +5,9 @@ use super::readings::Measure;
 use crate::report::figure::{Figure, Swatch};
 use crate::report::palette::{self, LEVELS};
 use crate::report::plot::{self, Labels, Plot, coordinate};
-use crate::report::span::{RoundValues, Span};
+use crate::report::span::Span;
 use crate::report::text::shorten;
+use crate::report::ticks;
 
 /// Width of the drawing.
 const WIDTH: f64 = 440.0;
@@ -139,10 +140,9 @@ fn bar(width: f64, limits: Span, label: &str) -> String {
         let (from, wide) = (coordinate((level - 1) as f64 * step), coordinate(step + 0.3));
         bar += &format!("<path class=\"cell p{level}\" d=\"M{from} 4h{wide}v{BAR}h-{wide}Z\"/>");
     }
-    let RoundValues { values, decimals } = limits.ticks(5.0);
-    for value in values {
+    for (value, text) in ticks::round(limits, 5.0) {
         let at = coordinate(width * (value - limits.low) / limits.width());
-        let (text, low) = (plot::label(value, decimals), 4.0 + BAR);
+        let low = 4.0 + BAR;
         bar += &format!(
             "<path class=\"tick-mark\" d=\"M{at} {low}v4\"/>\
              <text class=\"tick\" x=\"{at}\" y=\"{}\" text-anchor=\"middle\">{text}</text>",

@@ -1,7 +1,8 @@
 //! The certified set in the slice, the ball of local growth and its sampled starts.
 
-use super::plane::{entry, margins, no_slice, point, same_unit, slice_states, target_area};
+use super::plane::{margins, no_slice, seen, slice_states, target_area};
 use crate::report::figure::{Figure, Swatch, cross, diamond, dot};
+use crate::report::places::{entry, point, same_unit};
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
@@ -103,22 +104,25 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
         id: "figure-certified",
         title: format!("Certified set, {} and starts", words::grown(record)),
         drawing: grid.map_or_else(|| no_slice(record), |grid| Ok(drawing(grid, ball.as_ref()))),
-        legend: grid.map_or_else(Vec::new, |_| legend(record, ball.as_ref())),
-        caption: caption(record, ball.as_ref()),
+        legend: grid.map_or_else(Vec::new, |grid| legend(grid, ball.as_ref())),
+        caption: caption(record, grid, ball.as_ref()),
     }
 }
 
-fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
+fn legend(grid: &Grid, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
+    let record = grid.record;
     let growth = &record.growth;
     let set = words::grown(record);
     let verified = growth.outcome == GrowthOutcome::Verified;
     let entry = |swatch: Swatch, name: &str| (swatch, name.to_owned());
-    let task = &record.system.task;
+    let (task, seen) = (&record.system.task, seen(grid));
+    let certified = entry(Swatch::Area("certified"), "certified cells: V_check > 0");
     let target = entry(Swatch::Area("target-area target"), "target set in this slice");
     let violated = entry(Swatch::Area("hatched constraint"), "constraint violated");
-    let mut legend = vec![entry(Swatch::Area("certified"), "certified cells: V_check > 0")];
-    legend.extend(task.has_target().then_some(target));
-    legend.extend(task.has_constraint().then_some(violated));
+    let mut legend = Vec::new();
+    legend.extend((positive(record) > 0).then_some(certified));
+    legend.extend((task.has_target() && seen.target).then_some(target));
+    legend.extend((task.has_constraint() && seen.violated).then_some(violated));
     legend.push(entry(Swatch::Mark(diamond()), "state"));
     if let Some(ball) = ball {
         let mark = CENTER.to_owned();
@@ -140,13 +144,15 @@ fn legend(record: &Record, ball: Option<&Ball>) -> Vec<(Swatch, String)> {
     legend
 }
 
-fn caption(record: &Record, ball: Option<&Ball>) -> String {
-    let values = &record.slice.check_margin;
-    if values.is_empty() {
-        return without_slice(record);
-    }
-    let positive = values.iter().filter(|&&value| value > 0.0).count();
-    let mut caption = format!("{positive} of {} cells are certified.", values.len());
+/// Cells that are certified.
+fn positive(record: &Record) -> usize {
+    record.slice.check_margin.iter().filter(|&&value| value > 0.0).count()
+}
+
+fn caption(record: &Record, grid: Option<&Grid>, ball: Option<&Ball>) -> String {
+    let Some(grid) = grid else { return without_slice(record) };
+    let cells = record.slice.check_margin.len();
+    let mut caption = format!("{} of {cells} cells are certified.", positive(record));
     let set = words::grown(record);
     let varied = record.growth.varies.iter().filter(|&&varies| varies).count();
     match (record.growth.outcome, ball) {
@@ -173,6 +179,9 @@ fn caption(record: &Record, ball: Option<&Ball>) -> String {
         }
         (_, None) => caption += &format!(" The centre of the {set} cannot be drawn."),
     }
+    if frame(grid, ball).exceeds(grid.spans()) {
+        caption += " The slice ends where it is grey: no cell and no margin was computed there.";
+    }
     caption
 }
 
@@ -196,26 +205,31 @@ fn spans(grid: &Grid, ball: Option<&Ball>) -> [Span; 2] {
     for axis in 0..2 {
         let starts = record.growth.samples.iter().map(|sample| &sample.x);
         let marks = starts.chain([&record.state.x]).filter_map(|x| entry(x, states[axis]));
-        // Something far off must not shrink the slice to a speck.
-        let (low, high) = (spans[axis].low, spans[axis].high);
-        let near = |value: f64| value.clamp(2.0 * low - high, 2.0 * high - low);
         let circle = ball.map(|ball| {
             let reach = 1.04 * ball.radius * ball.widths[axis];
             [ball.center[axis] - reach, ball.center[axis] + reach]
         });
-        let all = marks.chain(circle.into_iter().flatten()).map(near);
-        spans[axis] = Span::of(all.chain([low, high])).unwrap_or(spans[axis]);
+        let all = marks.chain(circle.into_iter().flatten());
+        spans[axis] = Span::of(all).map_or(spans[axis], |all| all.join(spans[axis]));
     }
     spans
+}
+
+/// The empty plot of what the figure covers.
+fn frame(grid: &Grid, ball: Option<&Ball>) -> Plot {
+    let shape = match same_unit(&grid.record.system.states, slice_states(grid.record)) {
+        true => Proportions::Equal,
+        false => Proportions::Free(330.0),
+    };
+    let [x, y] = spans(grid, ball);
+    Plot::new("certified", x, y, shape)
 }
 
 fn drawing(grid: &Grid, ball: Option<&Ball>) -> String {
     let record = grid.record;
     let states = slice_states(record);
-    let [x, y] = spans(grid, ball);
-    let shape =
-        if same_unit(record, states) { Proportions::Equal } else { Proportions::Free(330.0) };
-    let mut plot = Plot::new("certified", x, y, shape);
+    let mut plot = frame(grid, ball);
+    plot.beyond(grid.spans());
     let [across, up] = grid.spans();
     let slice = plot.rectangle([across.low, up.low, across.high, up.high]);
     plot.path("slice", &slice);
@@ -235,7 +249,7 @@ fn drawing(grid: &Grid, ball: Option<&Ball>) -> String {
     }
     let [x, y] = states.map(|state| words::axis(record, state));
     let labels = Labels { x: &x, y: &y, whole: false };
-    plot.finish(&labels, &format!("Map of the slice. {}", caption(record, ball)))
+    plot.finish(&labels, &format!("Map of the slice. {}", caption(record, Some(grid), ball)))
 }
 
 /// Failures last, so that none hides behind a success.

@@ -1,12 +1,11 @@
 //! Rollouts of a system with one state: the state from step to step.
 
 use crate::report::figure::{cross, dot};
+use crate::report::places::entry;
 use crate::report::plot::{Labels, Plot, Proportions};
 use crate::report::span::Span;
 use crate::report::words;
 use crate::scenario::record::{Record, RolloutRecord};
-
-use super::plane::entry;
 
 /// The only state of a system that has no bodies to show.
 pub(super) fn only_state(record: &Record) -> Option<usize> {

@@ -24,14 +24,14 @@ pub(super) fn figure(record: &Record) -> Figure {
         }
         Some(_) => ["round accepted", "round refused", "nearest failure"],
     };
-    let mut legend = Vec::new();
-    if drawing.is_ok() {
-        legend = vec![
-            (Swatch::Mark(dot(5.0)), accepted.to_owned()),
-            (Swatch::Mark(cross(4.0)), refused.to_owned()),
-            (Swatch::Mark(NEAREST.to_owned()), nearest.to_owned()),
-        ];
-    }
+    let (rounds, allowed) = (&growth.rounds, allowed(record));
+    let drawn = [
+        (dot(5.0), accepted, rounds.iter().any(|round| round.failures <= allowed)),
+        (cross(4.0), refused, rounds.iter().any(|round| round.failures > allowed)),
+        (NEAREST.to_owned(), nearest, rounds.iter().any(|round| round.nearest_failure.is_some())),
+    ];
+    let drawn = drawn.into_iter().filter(|(_, _, drawn)| *drawn);
+    let legend = drawn.map(|(mark, name, _)| (Swatch::Mark(mark), name.to_owned())).collect();
     Figure {
         id: "figure-growth",
         title: "Rounds of local growth".to_owned(),
@@ -41,13 +41,18 @@ pub(super) fn figure(record: &Record) -> Figure {
     }
 }
 
+/// Failures with which a round is accepted.
+fn allowed(record: &Record) -> u64 {
+    record.growth.upward.as_ref().map_or(0, |upward| upward.allowed)
+}
+
 fn drawing(record: &Record) -> String {
     let rounds = &record.growth.rounds;
     let radii = rounds.iter().flat_map(|round| [Some(round.radius), round.nearest_failure]);
     let highest = Span::of(radii.flatten().chain([0.0])).map_or(0.0, |span| span.high);
     let x = Span { low: 0.5, high: rounds.len() as f64 + 0.5 };
     let y = Span { low: 0.0, high: if highest > 0.0 { 1.18 * highest } else { 1.0 } };
-    let allowed = record.growth.upward.as_ref().map_or(0, |upward| upward.allowed);
+    let allowed = allowed(record);
     let mut plot = Plot::new("growth", x, y, Proportions::Free(190.0));
     for (index, round) in rounds.iter().enumerate() {
         let at = index as f64 + 1.0;

@@ -6,7 +6,6 @@ mod deviation;
 mod growth;
 mod paths;
 mod plane;
-mod tracks;
 mod value;
 
 use super::figure::Figure;

@@ -4,7 +4,6 @@ use crate::report::contour::Field;
 use crate::report::plot::Plot;
 use crate::report::slice::Grid;
 use crate::report::span::Span;
-use crate::report::text::ordinary;
 use crate::scenario::drawn_record::GroundRecord;
 use crate::scenario::record::Record;
 
@@ -27,23 +26,6 @@ pub(super) fn lines(plot: &Plot, field: &Field) -> String {
 pub(super) fn region(plot: &Plot, field: &Field) -> String {
     let polygons = field.region();
     polygons.into_iter().map(|polygon| plot.polygon(polygon)).collect()
-}
-
-/// Entry `index` of a state, if it is a number.
-pub(super) fn entry(state: &[f32], index: usize) -> Option<f64> {
-    let value = state.get(index).map(|&value| f64::from(value))?;
-    ordinary(value).then_some(value)
-}
-
-/// Two entries of a state, if both are numbers.
-pub(super) fn point(state: &[f32], [x, y]: [usize; 2]) -> Option<[f64; 2]> {
-    Some([entry(state, x)?, entry(state, y)?])
-}
-
-/// Whether two states of the system have the same unit, so that one scale fits both.
-pub(super) fn same_unit(record: &Record, [x, y]: [usize; 2]) -> bool {
-    let unit = |state: usize| record.system.states.get(state).map(|axis| axis.unit.as_str());
-    unit(x).is_some() && unit(x) == unit(y)
 }
 
 /// The two states that the slice varies.
@@ -77,6 +59,27 @@ fn margins_of(plot: &mut Plot, grid: &Grid, [target, constraint]: [&[f32]; 2]) {
     plot.path("constraint", &data);
     let data = lines(plot, &grid.field(target, 1.0));
     plot.path("target", &data);
+}
+
+/// What of the margins on a grid a reader sees.
+pub(super) struct Seen {
+    /// Whether a target set is there.
+    pub(super) target: bool,
+    /// Whether the constraint is violated somewhere.
+    pub(super) violated: bool,
+}
+
+/// What is seen of the margins of the slice.
+pub(super) fn seen(grid: &Grid) -> Seen {
+    let slice = &grid.record.slice;
+    seen_of(grid, [&slice.target_margin, &slice.constraint_margin])
+}
+
+fn seen_of(grid: &Grid, [target, constraint]: [&[f32]; 2]) -> Seen {
+    Seen {
+        target: grid.field(target, 1.0).is_positive(),
+        violated: grid.field(constraint, -1.0).is_positive(),
+    }
 }
 
 /// Margins that paths are drawn over.
@@ -117,6 +120,16 @@ impl<'a> GroundOf<'a> {
             Self::Picture(grid, ground) => {
                 area_of(plot, grid, &ground.target_margin);
                 margins_of(plot, grid, [&ground.target_margin, &ground.constraint_margin]);
+            }
+        }
+    }
+
+    /// What is seen of them.
+    pub(super) fn seen(&self) -> Seen {
+        match self {
+            Self::Slice(grid) => seen(grid),
+            Self::Picture(grid, ground) => {
+                seen_of(grid, [&ground.target_margin, &ground.constraint_margin])
             }
         }
     }

@@ -1,12 +1,14 @@
 //! The value slice: `V_check` as a heat map with its zero level.
 
-use super::plane::{lines, no_slice, point, same_unit, slice_states};
+use super::plane::{lines, no_slice, slice_states};
 use crate::report::figure::{Figure, Swatch, diamond};
 use crate::report::palette::{self, LEVELS};
-use crate::report::plot::{Labels, Plot, Proportions, coordinate};
+use crate::report::places::{point, same_unit};
+use crate::report::plot::{Labels, MARGIN, Plot, Proportions, coordinate};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
-use crate::report::text::{number, ordinary};
+use crate::report::text::{minus, number, ordinary};
+use crate::report::ticks::half;
 use crate::report::words;
 use crate::scenario::record::Record;
 
@@ -28,11 +30,10 @@ pub(super) fn figure(record: &Record, grid: Option<&Grid>) -> Figure {
             caption,
         };
     };
-    let mut legend = vec![
-        (Swatch::Line("zero"), "V_check = 0: boundary of the certified set".to_owned()),
-        (Swatch::Mark(diamond()), "the state that the slice goes through".to_owned()),
-    ];
     let values = &record.slice.check_margin;
+    let zero = (Swatch::Line("zero"), "V_check = 0: boundary of the certified set".to_owned());
+    let mut legend = Vec::from_iter(grid.field(values, 1.0).has_zero_lines().then_some(zero));
+    legend.push((Swatch::Mark(diamond()), "the state that the slice goes through".to_owned()));
     if values.iter().any(|&value| !ordinary(f64::from(value))) {
         legend.push((Swatch::Area("nf"), "not finite: a failure".to_owned()));
     }
@@ -64,8 +65,11 @@ fn drawing(grid: &Grid) -> String {
         x = x.join(Span::of([across]).unwrap_or(x));
         y = y.join(Span::of([up]).unwrap_or(y));
     }
-    let shape =
-        if same_unit(record, states) { Proportions::Equal } else { Proportions::Free(330.0) };
+    let shape = if same_unit(&record.system.states, states) {
+        Proportions::Equal
+    } else {
+        Proportions::Free(330.0)
+    };
     let mut plot = Plot::new("value", x, y, shape);
     let limit = limit(&record.slice.check_margin);
     for (class, data) in cells(&plot, grid, limit) {
@@ -106,34 +110,42 @@ fn limit(values: &[f32]) -> f64 {
 
 /// The colour bar: steps even in the square root of the value.
 fn bar(width: f64, limit: f64) -> String {
-    let step = width / (2 * LEVELS) as f64;
-    let below = (1..=LEVELS).rev().map(|level| format!("n{level}"));
-    let above = (1..=LEVELS).map(|level| format!("p{level}"));
-    let mut bar = String::new();
-    for (index, class) in below.chain(above).enumerate() {
-        bar += &format!(
-            "<path class=\"cell {class}\" d=\"M{} 4h{}v{BAR}h-{2}Z\"/>",
-            coordinate(index as f64 * step),
-            coordinate(step + 0.3),
-            coordinate(step + 0.3)
-        );
-    }
-    for position in [-1.0, -0.5, 0.0, 0.5, 1.0_f64] {
-        let value = position * position.abs() * limit;
-        let at = coordinate(width * (position + 1.0) / 2.0);
-        let (text, low) = (number(value).replace('-', "−"), 4.0 + BAR);
+    let marks = [-1.0, -0.5, 0.0, 0.5, 1.0_f64].map(|position| {
+        let text = minus(&number(position * position.abs() * limit));
+        (position, text)
+    });
+    // The labels at its ends have their middle there, and no more room than the axes leave.
+    let inset = marks.iter().map(|(_, text)| half(text) - MARGIN).fold(0.0, f64::max);
+    let inner = width - 2.0 * inset;
+    let mut bar = steps(inner);
+    for (position, text) in marks {
+        let at = coordinate(inner * (position + 1.0) / 2.0);
+        let low = 4.0 + BAR;
         bar += &format!(
             "<path class=\"tick-mark\" d=\"M{at} {low}v4\"/>\
              <text class=\"tick\" x=\"{at}\" y=\"{}\" text-anchor=\"middle\">{text}</text>",
             low + 17.0
         );
     }
-    bar + &format!(
-        "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">\
-         V_check (no unit, square-root scale)</text>",
-        coordinate(width / 2.0),
+    format!(
+        "<g transform=\"translate({} 0)\">{bar}<text class=\"name\" x=\"{}\" y=\"{}\" \
+         text-anchor=\"middle\">V_check (no unit, square-root scale)</text></g>",
+        coordinate(inset),
+        coordinate(inner / 2.0),
         4.0 + BAR + 35.0
     )
+}
+
+/// The steps of the colour bar.
+fn steps(width: f64) -> String {
+    let step = width / (2 * LEVELS) as f64;
+    let below = (1..=LEVELS).rev().map(|level| format!("n{level}"));
+    let above = (1..=LEVELS).map(|level| format!("p{level}"));
+    let one = |(index, class): (usize, String)| {
+        let (from, wide) = (coordinate(index as f64 * step), coordinate(step + 0.3));
+        format!("<path class=\"cell {class}\" d=\"M{from} 4h{wide}v{BAR}h-{wide}Z\"/>")
+    };
+    below.chain(above).enumerate().map(one).collect()
 }
 
 fn description(grid: &Grid) -> String {
