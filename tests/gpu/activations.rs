@@ -260,7 +260,7 @@ const SEEN: [[f32; 2]; 2] = [[4.0, -5.0], [0.0, -5.0]];
 
 /// Plants whose network sees a NaN for the first of [`SEEN`], behind a map of the inputs.
 fn blinded() -> Vec<(String, Plant)> {
-    let model = Arc::new(Model::of(Shown));
+    let model = Model::of(Shown);
     let observe = record(model.inputs(), |x| {
         let apart = x[0] - Expr::lit(4.0);
         vec![apart / apart]
@@ -273,7 +273,7 @@ fn blinded() -> Vec<(String, Plant)> {
         let (network, observe) = (Arc::new(network.expect("a network")), Some(observe.clone()));
         let law = Law::Network { observe, network, act: None };
         let controller = Controller::new("blinded", law);
-        (format!("input {low} {high}"), Plant::new(Arc::clone(&model), controller))
+        (format!("input {low} {high}"), Plant::new(model.clone(), controller))
     };
     let open = (f32::NEG_INFINITY, f32::INFINITY);
     LIMITS.into_iter().chain([open]).map(plant).collect()

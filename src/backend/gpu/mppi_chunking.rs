@@ -394,7 +394,8 @@ mod tests {
                     assert_eq!(chunking.rounds, rounds, "{samples} x {problems}, {columns}");
                     // A part ends where a block does.
                     let block = WORKGROUP * rounds;
-                    let whole = chunking.samples == samples || chunking.samples % block == 0;
+                    let whole =
+                        chunking.samples == samples || chunking.samples.is_multiple_of(block);
                     assert!(whole, "{chunking:?}");
                 }
             }

@@ -302,8 +302,8 @@ impl<'a> Machine<'a> {
     fn persistent(&mut self) -> Result<(), String> {
         let tuple = self.pop_tuple()?;
         let (kind, key) = match calls::head(&self.pickle, tuple).as_slice() {
-            &[Value::Text("storage"), Value::Name(kind), Value::Text(key), ..] => (kind, key),
-            &[Value::Text("module"), ..] => return Err(WHOLE_MODULE.to_owned()),
+            [Value::Text("storage"), Value::Name(kind), Value::Text(key), ..] => (*kind, *key),
+            [Value::Text("module"), ..] => return Err(WHOLE_MODULE.to_owned()),
             _ => return Err("a reference to something else than a storage".to_owned()),
         };
         let known = Kind::of_storage(kind.name).filter(|_| kind.module == "torch");
