@@ -261,10 +261,7 @@ const SEEN: [[f32; 2]; 2] = [[4.0, -5.0], [0.0, -5.0]];
 /// Plants whose network sees a NaN for the first of [`SEEN`], behind a map of the inputs.
 fn blinded() -> Vec<(String, Plant)> {
     let model = Model::of(Shown);
-    let observe = record(model.inputs(), |x| {
-        let apart = x[0] - Expr::lit(4.0);
-        vec![apart / apart]
-    });
+    let observe = record(model.inputs(), |x| vec![(Expr::lit(1.0) - x[0]).sqrt()]);
     let plant = |(low, high)| {
         let input =
             Rescale { low: vec![low], high: vec![high], ..Rescale::affine(vec![1.0], vec![0.5]) };
