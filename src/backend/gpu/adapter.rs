@@ -186,9 +186,9 @@ impl Gpu {
     /// The adapter in words: name, interface, kind and driver; where the CPU has taken over, the CPU too, and alone
     /// if no result came from the adapter.
     pub fn device(&self) -> String {
-        let (on_cpu, served) = (self.state().on_cpu, self.state().served);
-        match self.fallback.as_ref().filter(|_| on_cpu) {
-            Some(cpu) if served => format!("{}; then {}", self.adapter, cpu.device()),
+        let state = self.state();
+        match self.fallback.as_ref().filter(|_| state.on_cpu) {
+            Some(cpu) if state.served => format!("{}; then {}", self.adapter, cpu.device()),
             Some(cpu) => cpu.device(),
             None => self.adapter.to_string(),
         }
