@@ -253,6 +253,23 @@ fn an_adapter_that_goes_on_failing_is_left() {
     }
 }
 
+/// Who is named is who computed: the CPU alone where the adapter gave nothing, both where it gave a part.
+#[test]
+fn results_are_of_the_devices_that_computed_them() {
+    let work = Work::Measures(NetworkKernels::Layered);
+    let at_once = vec![onwards(Fault::Validation, 0)];
+    let late = [small_chunks(), vec![onwards(Fault::Validation, LATE)]].concat();
+    for (asked, name) in [(at_once, "cpu"), (late, "gpu")] {
+        let Some((gpu, ..)) = prepared(work) else { return };
+        let (gpu, _, result, _) = failing(gpu, work, &asked);
+        result.expect("the host goes on");
+        let backend = Backend::Gpu(gpu);
+        assert_eq!(backend.name(), name);
+        assert!(backend.device().ends_with(&cpu().device()), "{}", backend.device());
+        assert_eq!(backend.device() == cpu().device(), name == "cpu");
+    }
+}
+
 #[test]
 fn without_a_fallback_the_error_names_the_fault() {
     let work = Work::Measures(NetworkKernels::Layered);
