@@ -152,6 +152,51 @@ fn parts_of_the_input_go_into_the_layer_behind() {
     );
 }
 
+/// Largest difference from f64 of a network that takes `(x - m) / d + t` of numbers far from 0, some of them or all.
+fn far(nodes: &[Vec<u8>], more: &[Vec<u8>], places: &[usize]) -> f32 {
+    let means = [1e6, -300.1, 9000.0, 101_325.0_f32];
+    let some = |numbers: [f32; 4]| -> Vec<f32> { places.iter().map(|&i| numbers[i]).collect() };
+    let (shift, deviation) = (some([0.5, -1.0, 0.25, 2.0]), some([0.05, 2.0, 0.5, 40.0]));
+    let count = places.len() as i64;
+    let own = [("m", some(means)), ("d", deviation.clone()), ("t", shift.clone())];
+    let own = own.iter().map(|(name, numbers)| tensor(name, &[count], numbers));
+    let tensors: Vec<Vec<u8>> = own.chain(more.iter().cloned()).collect();
+    let network = outcome(&graph(&[0, 4], nodes, &tensors)).unwrap();
+    let again = outcome(&reachcast::policy::onnx_bytes(&network)).unwrap();
+    assert_eq!(again.digest(), network.digest(), "written and read");
+    let near = [[0.0625, 1.0, -0.5, 8.0], [-0.125, 0.0, 0.25, -24.0_f32]];
+    let apart = |by: &[f32; 4]| {
+        let x: [f32; 4] = std::array::from_fn(|i| means[i] + by[i]);
+        let found = network.forward(&x);
+        let expected = places.iter().zip(&deviation).zip(&shift).map(|((&i, &d), &t)| {
+            ((f64::from(x[i]) - f64::from(means[i])) / f64::from(d) + f64::from(t)) as f32
+        });
+        found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    near.iter().map(apart).fold(0.0, f32::max)
+}
+
+#[test]
+fn numbers_far_from_zero_keep_their_digits() {
+    let one = |width: usize| {
+        let row = |i: usize| (0..width).map(move |j| if i == j { 1.0 } else { 0.0 });
+        tensor("I", &[width as i64; 2], &(0..width).flat_map(row).collect::<Vec<f32>>())
+    };
+    let normal = ["Sub x m -> a", "Div a d -> b", "Add b t -> c", "MatMul c I -> y"].map(node);
+    assert!(far(&normal, &[one(4)], &[0, 1, 2, 3]) < 2e-6);
+    let part = node_with("Gather x i -> p", &[attribute("axis", 1)]);
+    let some = ["Sub p m -> a", "Div a d -> b", "Add b t -> c", "MatMul c I -> y"].map(node);
+    let nodes = [vec![part], some.to_vec()].concat();
+    assert!(far(&nodes, &[one(2), places("i", &[2], &[3, 0])], &[3, 0]) < 2e-6);
+}
+
+#[test]
+fn a_map_of_nothing_has_no_limits() {
+    let tensors = [square(), tensor("m", &[1], &[7.0]), tensor("z", &[1], &[0.0])];
+    let nodes = [node("Sub x m -> a"), node("Mul a z -> b"), node("Add b m -> c"), layer("c", "y")];
+    is(|_| sums(&[7.0; 4]), &[0, 4], &nodes, &tensors);
+}
+
 #[test]
 fn what_branches_and_foreign_operators_have_a_way_out() {
     let skip = [layer("x", "s"), node("Relu s -> r"), layer("r", "t"), node("Add r t -> y")];

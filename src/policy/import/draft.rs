@@ -10,8 +10,8 @@ pub(super) const MOST_LAYERS: usize = 64;
 const MOST_WEIGHTS: usize = 1 << 24;
 /// Summand of an input from which on a sum of products loses more than a millionth.
 const FAR: f64 = 4.0;
-/// Share of a summand in f64 that is nothing but rounding.
-const SAME: f64 = 1e-14;
+/// Binary digits of a summand that are kept of what is left of it around a center: what f64 rounds is far below.
+const KEPT: i32 = 40;
 /// Most numbers between two layers that a layer of its own is made for.
 const WIDEST: usize = 4096;
 
@@ -79,12 +79,17 @@ impl Draft {
     pub(super) fn push(&mut self, step: Step) -> Result<(), String> {
         self.fits(&step)?;
         let first = self.steps.len() == 1;
+        let selects =
+            matches!(self.steps.as_slice(), [Step::Linear(_)] | [Step::Map(_), Step::Linear(_)]);
         match (self.steps.last_mut(), step) {
             (_, Step::Map(map)) if map.is_identity() => {}
             (_, Step::Activation(Activation::Identity)) => {}
             (Some(Step::Map(last)), Step::Map(map)) => *last = last.then(&map),
             (_, step) if self.as_is => self.steps.push(step),
             (Some(Step::Linear(last)), Step::Linear(next)) => *last = last.then(&next)?,
+            (Some(Step::Linear(last)), Step::Map(map)) if selects && last.places().is_some() => {
+                return self.before_selection(&map);
+            }
             (Some(Step::Linear(last)), Step::Map(map)) if map.is_affine() => last.scaled(&map)?,
             // A map before the first layer is the policy's own, unless nothing is rounded.
             (Some(Step::Map(map)), Step::Linear(mut next))
@@ -102,6 +107,15 @@ impl Draft {
             )),
             false => Ok(()),
         }
+    }
+
+    /// Puts a map behind a part of the inputs in front of it, where numbers far from 0 keep their digits.
+    fn before_selection(&mut self, map: &Map) -> Result<(), String> {
+        let Some(Step::Linear(selection)) = self.steps.pop() else { return Ok(()) };
+        let places = selection.places().unwrap_or_default();
+        self.push(Step::Map(map.scattered(&places, selection.inputs)))?;
+        self.steps.push(Step::Linear(selection));
+        Ok(())
     }
 
     /// Numbers of all steps.
@@ -305,14 +319,16 @@ fn rescale(map: &Map) -> Rescale {
 }
 
 /// The map of inputs in f32: where products and summands far above 1 nearly cancel, as those of observations far from 0
-/// do, the difference comes first, if what is taken away is an f32 number.
+/// do, the difference from the nearest f32 number comes first, and what is left is added then.
 fn centered(map: &Map) -> Rescale {
     let mut plain = rescale(map);
     for (i, (&scale, &shift)) in map.scale.iter().zip(&map.shift).enumerate() {
         let center = (-shift / scale) as f32;
-        let rest = scale * f64::from(center) + shift;
-        if shift.abs() > FAR && center.is_finite() && rest.abs() < SAME * shift.abs() {
-            (plain.center[i], plain.shift[i]) = (center, 0.0);
+        if shift.abs() > FAR && center.is_finite() {
+            // A multiple of it comes out again where the map is written, read and put together anew.
+            let unit = 2_f64.powi(shift.abs().log2().floor() as i32 - KEPT);
+            let rest = ((scale * f64::from(center) + shift) / unit).round() * unit;
+            (plain.center[i], plain.shift[i]) = (center, rest as f32);
         }
     }
     plain

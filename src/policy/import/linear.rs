@@ -1,5 +1,7 @@
 //! Linear layers in f64: products of them, and maps folded into them.
 
+use std::collections::HashSet;
+
 use super::map::Map;
 
 /// Most weights of a product of layers, which is not bounded by the size of a file.
@@ -44,6 +46,18 @@ impl Linear {
         let mut weight = vec![0.0; rows.len() * inputs];
         rows.iter().enumerate().for_each(|(i, &row)| weight[i * inputs + row] = 1.0);
         Self::new(weight, inputs)
+    }
+
+    /// Where each output is one of the inputs as it is, and each input one output at most: these inputs.
+    pub(super) fn places(&self) -> Option<Vec<usize>> {
+        let place = |(row, &bias): (&[f64], &f64)| {
+            let mut others = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+            let (place, &weight) = others.next()?;
+            (weight == 1.0 && bias == 0.0 && others.next().is_none()).then_some(place)
+        };
+        let places = self.rows().zip(&self.bias).map(place).collect::<Option<Vec<usize>>>()?;
+        let distinct: HashSet<&usize> = places.iter().collect();
+        (distinct.len() == places.len()).then_some(places)
     }
 
     /// Rows of `W`.

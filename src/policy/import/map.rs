@@ -49,6 +49,22 @@ impl Map {
         Self { scale: some(scale), shift: some(shift), low: some(low), high: some(high) }
     }
 
+    /// The map of `width` numbers that does this to those at `places`, and nothing to the others.
+    pub(super) fn scattered(&self, places: &[usize], width: usize) -> Self {
+        let spread = |values: &[f64], nothing: f64| {
+            let mut all = vec![nothing; width];
+            places.iter().zip(values).for_each(|(&place, &value)| all[place] = value);
+            all
+        };
+        let Self { scale, shift, low, high } = self;
+        Self {
+            scale: spread(scale, 1.0),
+            shift: spread(shift, 0.0),
+            low: spread(low, f64::NEG_INFINITY),
+            high: spread(high, f64::INFINITY),
+        }
+    }
+
     /// How many numbers it takes.
     pub(super) fn width(&self) -> usize {
         self.scale.len()
@@ -78,9 +94,11 @@ impl Map {
     pub(super) fn then(&self, next: &Self) -> Self {
         let each = |i: usize| {
             let (scale, shift) = (next.scale[i], next.shift[i]);
-            // A limit that is not there stays away, whatever the factor.
-            let end = |end: f64| if scale == 0.0 { shift } else { scale * end + shift };
-            let (a, b) = (end(self.low[i]), end(self.high[i]));
+            // What is 0 times anything has no limits left.
+            let [a, b] = match scale {
+                0.0 => [f64::NEG_INFINITY, f64::INFINITY],
+                _ => [self.low[i], self.high[i]].map(|end| scale * end + shift),
+            };
             let within = |value: f64| value.max(next.low[i]).min(next.high[i]);
             [
                 scale * self.scale[i],
