@@ -62,8 +62,8 @@ fn again(global: &GlobalRecord) -> Option<String> {
     let many = 10 * global.f64_reruns > global.draws;
     many.then(|| {
         format!(
-            "in f64          {} of {} pairs of the certified set, one at a time: f32 does not tell on which side of 0 \
-             their margins are",
+            "in f64          {} of {} pairs of the certified set, one at a time: f32 does not tell on which side of its \
+             edge they are",
             global.f64_reruns, global.draws
         )
     })
