@@ -176,6 +176,8 @@ fn classes_that_are_not_the_usual_ones_are_refused() {
     // A layer of PyTorch whose function was changed, or that has a hook; another function, spelling or name of it.
     let changed = LINEAR.replace("torch.linear(input, weight, bias)", "torch.neg(input)");
     does_more(&with(&own, &changed, RELU), "torch.neg");
+    let bare = LINEAR.replace("weight, bias)", "weight)");
+    does_more(&with(&own, &bare, RELU), "with other biases");
     let hooked = LINEAR.replace("  weight", "  __forward_hooks__ = [\"hook\", ]\n  weight");
     does_more(&with(&own, &hooked, RELU), "__forward_hooks__");
     does_more(&compiled(&own.replace("def forward(", "def act(")), "has no function `forward`");

@@ -210,6 +210,11 @@ impl<'c, 'a> Walk<'c, 'a> {
                 Value::Weight(path) => Some(Value::Transposed(path)),
                 _ => None,
             },
+            ("torch.linear", [input, weight]) => {
+                self.stream(input, scope, depth)?;
+                let weight = self.value(weight, scope, depth)?;
+                self.layer(&weight, &Value::Nothing, true)
+            }
             ("torch.linear", [input, weight, bias])
             | ("torch.addmm", [bias, input, weight, "beta=1", "alpha=1"])
             | ("torch.addmm", [bias, input, weight]) => {
