@@ -1,16 +1,13 @@
 //! What a file leaves in doubt is asked for, with what to do about it, and never guessed.
 
-use std::io::{Cursor, Read, Write};
 use std::path::Path;
 
 use reachcast::policy::import::{Imported, Request, from_bytes};
 use reachcast::policy::{Activation, Layer, Mlp, Rescale};
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::layouts::file;
 use super::{imported, named};
-use crate::checkpoint::{bytes, stated};
+use crate::checkpoint::stated;
 
 fn read(name: &str, content: &[u8], request: &Request) -> reachcast::Result<Imported> {
     from_bytes(Path::new(name), content, request)
@@ -126,79 +123,6 @@ fn orders_that_the_names_do_not_say_are_asked_for() {
     is(&apart, &[], &["takes 4 numbers", "in no order", "ONNX"]);
     let several = [("net.mu", [2, 8]), ("net.a", [8, 8]), ("net.b", [8, 8]), ("net.c", [8, 4])];
     is(&several, &["net.mu", "net.a", "net.b", "net.c"], &["several orders fit"]);
-}
-
-/// The checkpoint of three layers as a compiled module whose own class does this.
-fn compiled(lines: &str) -> Vec<u8> {
-    let mut old = ZipArchive::new(Cursor::new(bytes("sequential.pth"))).unwrap();
-    let mut new = ZipWriter::new(Cursor::new(Vec::new()));
-    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    let mut folder = String::new();
-    let mut add = |name: &str, content: &[u8]| {
-        new.start_file(name, options).unwrap();
-        new.write_all(content).unwrap();
-    };
-    for index in 0..old.len() {
-        let mut entry = old.by_index(index).unwrap();
-        let name = entry.name().unwrap().into_owned();
-        folder = name.split_once('/').unwrap().0.to_owned();
-        let mut content = Vec::new();
-        entry.read_to_end(&mut content).unwrap();
-        add(&name, &content);
-    }
-    add(&format!("{folder}/constants.pkl"), b"\x80\x02).");
-    let code = format!(
-        "class P(Module):\n  __parameters__ = []\n  def forward(self: __torch__.P,\n    x: Tensor) -> Tensor:\n{lines}"
-    );
-    add(&format!("{folder}/code/__torch__.py"), code.as_bytes());
-    let library = "class Linear(Module):\n  def forward(self: Q,\n    input: Tensor) -> Tensor:\n    return torch.linear(input)\n";
-    add(&format!("{folder}/code/__torch__/torch/nn/modules/linear.py"), library.as_bytes());
-    new.finish().unwrap().into_inner()
-}
-
-#[test]
-fn compiled_modules_are_their_layers_only_if_their_code_does_no_more() {
-    let parts = "    _0 = getattr(self, \"0\")\n    _2 = getattr(self, \"2\")\n    _4 = getattr(self, \"4\")\n";
-    let with = |lines: &str| compiled(&format!("{parts}{lines}"));
-    for plain in [
-        "    _5 = torch.relu((_0).forward(x, ))\n    return (_4).forward((_2).forward(_5, ), )\n",
-        "    a = (_0).forward(x, )\n    b = (_2).forward(a, )\n    return (_4).forward(b, )\n",
-    ] {
-        assert!(read("x.pt", &with(plain), &stated()).unwrap().notes.is_empty(), "{plain}");
-    }
-    let activation = Some(Activation::Relu);
-    let half = Request { activation, ..Request::default() };
-    for (more, words) in [
-        // A factor, a residual, a branch, parts in another order, one that is applied twice, and one that is not.
-        (
-            "    _5 = torch.mul((_0).forward(x, ), 2.)\n    return (_4).forward((_2).forward(_5, ), )\n",
-            "torch.mul",
-        ),
-        (
-            "    a = (_0).forward(x, )\n    b = torch.add(a, (_2).forward(a, ))\n    return (_4).forward(b, )\n",
-            "torch.add",
-        ),
-        (
-            "    a = (_0).forward(x, )\n    b = (_2).forward(a, )\n    return (_4).forward(a, )\n",
-            "(_4).forward(a, )",
-        ),
-        (
-            "    return (_4).forward((_0).forward((_2).forward(x, ), ), )\n",
-            "it applies 2, then 0, then 4",
-        ),
-        ("    return (_4).forward((_0).forward((_0).forward(x, ), ), )\n", "(_0).forward((_0)"),
-        ("    return (_4).forward((_0).forward(x, ), )\n", "`2` is not applied"),
-        ("    return ((_4).forward((_2).forward((_0).forward(x, ), ), ), x)\n", "return ("),
-        ("    if torch.gt(x, 0):\n      return x\n", "if torch.gt"),
-    ] {
-        let error = read("x.pt", &with(more), &half).unwrap_err().to_string();
-        assert!(error.contains("does more than its layers") && error.contains(words), "{error}");
-        assert!(error.contains("ONNX") && error.contains("--activation and --output"), "{error}");
-        let found = read("x.pt", &with(more), &stated()).unwrap();
-        assert!(found.notes[0].starts_with("not in it: the code"), "{:?}", found.notes);
-    }
-    // A class of PyTorch that is no layer, and code that PyTorch has compressed.
-    assert!(read("script.pt", &bytes("script.pt"), &stated()).unwrap().notes.is_empty());
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod doubt;
 mod forward;
 mod layouts;
 mod lost;
+mod scripts;
 mod written;
 
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
 //! The entries of a zip archive, with the folder that they lie in.
 
+use std::collections::HashMap;
 use std::io::Cursor;
 
 use crate::files::Archive;
@@ -9,6 +10,8 @@ use crate::files::Archive;
 pub(super) struct Entries<'a> {
     archive: Archive<Cursor<&'a [u8]>>,
     names: Vec<String>,
+    /// The number of the first entry of each name.
+    numbers: HashMap<String, usize>,
     /// Where the entries lie, `archive/` in most checkpoints.
     folder: String,
 }
@@ -22,7 +25,8 @@ impl<'a> Entries<'a> {
         let damaged = |e| format!("not a whole archive ({e})");
         let archive = Archive::open(Cursor::new(bytes), bytes.len() as u64).map_err(damaged)?;
         let names = archive.names().map_err(damaged)?;
-        Ok(Self { archive, names, folder: String::new() })
+        let numbers = names.iter().cloned().enumerate().rev().map(|(i, name)| (name, i)).collect();
+        Ok(Self { archive, names, numbers, folder: String::new() })
     }
 
     /// The same with the folder that the entry `name` lies in, if there is one.
@@ -69,7 +73,6 @@ impl<'a> Entries<'a> {
 
     /// Number of the entry `name`.
     fn index(&self, name: &str) -> Option<usize> {
-        let is = |entry: &String| entry.strip_prefix(&self.folder) == Some(name);
-        self.names.iter().position(is)
+        self.numbers.get(&format!("{}{name}", self.folder)).copied()
     }
 }

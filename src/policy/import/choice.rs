@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::applied::Layer;
 use super::bearing::{is_memory, is_parametrized};
 use super::dense::{Dense, Order};
 use super::draft::{Draft, MOST_LAYERS, Step};
@@ -70,7 +71,7 @@ pub(super) fn policy(
     let dicts = choice.layers.iter().map(|layer| layer.weight.dict).collect();
     lost::refuse_unmade(&source, &dicts)?;
     let mut made = Made::default();
-    choice.check_script(&source, request, &mut made)?;
+    let hints = &hints.with(choice.by_code(&source, request, &mut made)?);
     choice.add_statistics(&mut source, &mut made)?;
     choice.add_layers(&mut source, &mut made, request, hints)?;
     if !choice.by_name {
@@ -134,27 +135,20 @@ impl Choice {
         })
     }
 
-    /// Refuses a compiled module whose code does more than these layers, unless what lies between them is stated.
-    fn check_script(
+    /// What the code of a compiled module applies behind each layer, if there is code, and it does no more.
+    fn by_code(
         &self,
         source: &Source<'_>,
         request: &Request,
         made: &mut Made,
-    ) -> Result<(), String> {
-        let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
-        let beyond = source.script.as_ref().and_then(|script| script.beyond(&names));
-        let Some(beyond) = beyond else { return Ok(()) };
-        match (request.activation, request.output) {
-            (Some(_), Some(_)) => {
-                made.notes.push(format!("not in it: the code of the module does more: {beyond}"));
-                Ok(())
-            }
-            _ => Err(format!(
-                "the code of this TorchScript module does more than its layers one after the other: {beyond}. An ONNX \
-                 export keeps it: torch.onnx.export(module, torch.zeros(1, INPUTS), 'policy.onnx'), of the module \
-                 before it is compiled; --activation and --output, both stated, import its layers in a row without it"
-            )),
-        }
+    ) -> Result<Option<Vec<Activation>>, String> {
+        let Some(script) = &source.script else { return Ok(None) };
+        let layer =
+            |layer: &Chosen| Layer { name: layer.name.clone(), has_bias: layer.bias.is_some() };
+        let layers: Vec<Layer> = self.layers.iter().map(layer).collect();
+        let behind = script.settled(&layers, request)?;
+        made.notes.push(behind.note);
+        Ok(behind.activations)
     }
 
     /// Refuses layers of which nobody says what lies between them: neither the file, nor a layout, nor the request.
@@ -242,7 +236,10 @@ impl Choice {
             }
             made.draft.push(Step::Linear(linear))?;
             self.add_clip(layer, made, hints)?;
-            made.draft.push(Step::Activation(if is_last { behind } else { hidden }))?;
+            let stated = if is_last { request.output } else { request.activation };
+            let said = stated.or(hints.behind.as_ref().and_then(|behind| behind.get(i)).copied());
+            let usual = if is_last { behind } else { hidden };
+            made.draft.push(Step::Activation(said.unwrap_or(usual)))?;
             let bias = layer.bias.iter().map(|bias| bias.name.clone());
             made.used.extend(bias.chain([layer.weight.name.clone()]));
         }

@@ -2,6 +2,7 @@
 //!
 //! Nothing in a file is executed, and no length in it decides how much memory is taken.
 
+mod applied;
 mod archive;
 mod arrange;
 mod array;
@@ -9,6 +10,7 @@ mod bearing;
 mod calls;
 mod checkpoint;
 mod choice;
+mod classes;
 mod collect;
 mod constants;
 mod dense;
@@ -17,6 +19,7 @@ mod elementwise;
 mod foreign;
 mod form;
 mod format;
+mod functional;
 mod graph;
 mod kind;
 mod layers;

@@ -60,6 +60,8 @@ pub(super) struct Hints {
     pub(super) activation: Option<Activation>,
     /// Activation of the last layer.
     pub(super) output: Option<Activation>,
+    /// What follows each layer, where the code beside the tensors says it.
+    pub(super) behind: Option<Vec<Activation>>,
     /// Limit of what goes into the last activation, where the library has one.
     pub(super) clip: Option<f64>,
     /// Why it is not known what lies between the layers, unless that is stated.
@@ -70,4 +72,13 @@ pub(super) struct Hints {
     pub(super) refusal: Option<String>,
     /// What to say about it.
     pub(super) notes: Vec<String>,
+}
+
+impl Hints {
+    /// The same with what code says that follows each layer, if it does.
+    pub(super) fn with(&self, behind: Option<Vec<Activation>>) -> Self {
+        let Some(behind) = behind else { return self.clone() };
+        let [activation, output] = [behind.first().copied(), behind.last().copied()];
+        Self { activation, output, behind: Some(behind), unsaid: None, ..self.clone() }
+    }
 }

@@ -1,68 +1,28 @@
-//! The code of a TorchScript module, read as text and never executed: whether its parts are applied one after the other,
-//! and nothing else is done.
+//! The code of a TorchScript module against the layers that are imported of it: what follows each of them, or what
+//! the code does besides.
 
-use std::collections::{HashMap, HashSet};
-
+use super::applied::{self, Layer, Step};
 use super::archive::Entries;
+use super::classes::Code;
+use super::request::Request;
+use crate::policy::Activation;
 
 /// Longest file of code, bytes.
 const LONGEST: usize = 1 << 22;
-/// Where the code of PyTorch's own modules and functions lies.
-const MODULES: &str = "code/__torch__/torch/nn/modules/";
-const FUNCTIONS: &str = "code/__torch__/torch/nn/functional";
-/// Functions of PyTorch that are activations, of one argument.
-const ACTIVATIONS: [&str; 9] = [
-    "torch.relu",
-    "torch.tanh",
-    "torch.sigmoid",
-    "torch.silu",
-    "torch.mish",
-    "torch.selu",
-    "torch.relu6",
-    "torch.hardtanh",
-    "torch.softplus",
-];
-/// Modules of PyTorch that keep numbers one after the other: layers, containers, activations and what does nothing.
-const PLAIN: [&str; 21] = [
-    "Linear",
-    "Sequential",
-    "ModuleList",
-    "Identity",
-    "Dropout",
-    "AlphaDropout",
-    "Flatten",
-    "ReLU",
-    "LeakyReLU",
-    "ELU",
-    "SELU",
-    "CELU",
-    "GELU",
-    "SiLU",
-    "Mish",
-    "Tanh",
-    "Sigmoid",
-    "Softplus",
-    "Softsign",
-    "Hardtanh",
-    "ReLU6",
-];
+/// Most files of code.
+const MOST_FILES: usize = 1000;
 
-/// What the code of a module does.
-#[derive(Debug, Default)]
-pub(super) struct Script {
-    /// Parts in the order in which each class of its own applies them.
-    chains: Vec<Vec<String>>,
-    /// The first line or class that is something else.
-    more: Option<String>,
-}
+/// What the code of a module applies, or why that is not known.
+#[derive(Debug)]
+pub(super) struct Script(Result<Vec<Step>, String>);
 
-/// What a name stands for within a function.
-#[derive(Clone, Debug)]
-enum Value {
-    /// What the function is given, after these parts.
-    Chain(Vec<String>),
-    /// A part of the module.
-    Part(String),
+/// What follows the layers, and what is to be said about it.
+#[derive(Debug)]
+pub(super) struct Settled {
+    /// An activation for each layer, where the code says it.
+    pub(super) activations: Option<Vec<Activation>>,
+    /// What is to be said about it.
+    pub(super) note: String,
 }
 
 /// The code in the archive of a compiled module.
@@ -70,121 +30,129 @@ enum Value {
 /// # Errors
 /// A sentence about an entry that is damaged.
 pub(super) fn read(entries: &mut Entries<'_>) -> Result<Script, String> {
-    let mut script = Script::default();
-    for name in entries.within("code/") {
-        if name.ends_with(".py") && !name.starts_with(FUNCTIONS) {
-            let code = entries.inflated(&name, LONGEST)?;
-            script.add(&String::from_utf8_lossy(&code), name.starts_with(MODULES));
+    let mut names = entries.within("code/");
+    names.retain(|name| name.ends_with(".py"));
+    if names.len() > MOST_FILES {
+        let count = names.len();
+        return Ok(Script(Err(format!("{count} files of code; {MOST_FILES} are read at most"))));
+    }
+    let mut texts = Vec::new();
+    for name in names {
+        let code = entries.inflated(&name, LONGEST)?;
+        match String::from_utf8(code) {
+            Ok(text) => texts.push((name, text)),
+            Err(_) => return Ok(Script(Err(format!("`{name}` is no text in UTF-8")))),
         }
     }
-    Ok(script)
+    Ok(Script(steps(&texts)))
+}
+
+/// What the code of these files applies.
+fn steps(texts: &[(String, String)]) -> Result<Vec<Step>, String> {
+    let mut code = Code::default();
+    for (name, text) in texts {
+        code.add(name, text)?;
+    }
+    applied::steps(&code)
 }
 
 impl Script {
-    /// What it does besides applying these layers one after the other, if anything.
-    pub(super) fn beyond(&self, layers: &[&str]) -> Option<String> {
-        if let Some(more) = &self.more {
-            return Some(more.clone());
+    /// What follows each of these layers, as stated or else as the code has it.
+    ///
+    /// # Errors
+    /// A sentence about code that does more than the layers, or other than is stated, unless all is stated.
+    pub(super) fn settled(&self, layers: &[Layer], request: &Request) -> Result<Settled, String> {
+        let is_stated = request.activation.is_some() && request.output.is_some();
+        match self.behind(layers, !request.networks.is_empty()) {
+            Ok(behind) => agreed(behind, request),
+            Err(more) if is_stated => {
+                let note = format!("not in it: the code of the module does more: {more}");
+                Ok(Settled { activations: None, note })
+            }
+            Err(more) => Err(format!(
+                "the code of this TorchScript module does more than its layers one after the other, as far as it can \
+                 be read: {more}. An ONNX export keeps it: torch.onnx.export(module, torch.zeros(1, INPUTS), \
+                 'policy.onnx'), of the module before it is compiled; --activation and --output, both stated, import \
+                 its layers in a row without it"
+            )),
         }
-        let apart = self.chains.iter().find(|chain| !follows(chain, layers));
-        if let Some(chain) = apart {
-            return Some(format!("it applies {}", chain.join(", then ")));
-        }
-        let of = |layer: &str, chain: &[String]| place(chain, layer).is_some();
-        let idle = layers.iter().find(|layer| !self.chains.iter().any(|chain| of(layer, chain)));
-        let idle = idle.filter(|_| !self.chains.is_empty());
-        idle.map(|layer| format!("`{layer}` is not applied"))
     }
 
-    /// Adds a file of code, of PyTorch itself or of anybody else.
-    fn add(&mut self, code: &str, is_library: bool) {
-        let lines: Vec<&str> = code.lines().collect();
-        for (i, line) in lines.iter().enumerate() {
-            let class = line.strip_prefix("class ").and_then(|rest| rest.split('(').next());
-            if let Some(class) = class.filter(|class| is_library && !PLAIN.contains(class)) {
-                self.more.get_or_insert_with(|| format!("a module `{class}`"));
-            }
-            if !is_library && line.trim_start().starts_with("def forward(") {
-                match forward(&lines[i..]) {
-                    Ok(chain) => self.chains.push(chain),
-                    Err(line) => _ = self.more.get_or_insert(line),
+    /// The activation behind each of these layers, all that the code applies unless they are a part of it.
+    fn behind(&self, layers: &[Layer], is_part: bool) -> Result<Vec<Activation>, String> {
+        let mut applied: Vec<&Layer> = Vec::new();
+        let mut behind: Vec<Vec<Activation>> = vec![Vec::new()];
+        for step in self.0.as_ref().map_err(Clone::clone)? {
+            match step {
+                Step::Layer(layer) => {
+                    applied.push(layer);
+                    behind.push(Vec::new());
+                }
+                Step::Activation(activation) => {
+                    behind.last_mut().into_iter().for_each(|all| all.push(*activation));
                 }
             }
         }
-    }
-}
-
-/// Whether the layers come in the order of the parts that they lie in, each part once.
-fn follows(chain: &[String], layers: &[&str]) -> bool {
-    let places: Vec<usize> = layers.iter().filter_map(|layer| place(chain, layer)).collect();
-    let distinct: HashSet<&String> = chain.iter().collect();
-    places.is_sorted() && distinct.len() == chain.len()
-}
-
-/// The number of the part that a layer lies in.
-fn place(chain: &[String], layer: &str) -> Option<usize> {
-    chain.iter().position(|part| layer.split('.').any(|key| key == part))
-}
-
-/// The parts that the function at the beginning of `lines` applies, one after the other.
-///
-/// # Errors
-/// The first line that does something else.
-fn forward(lines: &[&str]) -> Result<Vec<String>, String> {
-    let head = lines.iter().position(|line| line.contains("->") && line.ends_with(':'));
-    let head = head.ok_or_else(|| "a function without an end of its head".to_owned())?;
-    let (names, body) = (lines[..=head].concat(), &lines[head + 1..]);
-    let names = names.split_once('(').map_or("", |(_, rest)| rest);
-    let names: Vec<&str> =
-        names.split(',').filter_map(|name| Some(name.split_once(':')?.0.trim())).collect();
-    let &[own, input] = names.as_slice() else {
-        return Err(format!("it takes `{}`", names.join(", ")));
-    };
-    let mut values = HashMap::from([(input.to_owned(), Value::Chain(Vec::new()))]);
-    for line in body {
-        let other = || format!("`{}`", line.trim());
-        if let Some(said) = line.trim().strip_prefix("return ") {
-            return match value(said, own, &mut values) {
-                Some(Value::Chain(chain)) => Ok(chain),
-                _ => Err(other()),
-            };
+        let start = start(&applied, layers, is_part)?;
+        if let (0, [first, ..]) = (start, behind[0].as_slice()) {
+            return Err(format!("{first} stands before its first layer"));
         }
-        let (name, said) = line.split_once(" = ").ok_or_else(other)?;
-        let found = value(said, own, &mut values).ok_or_else(other)?;
-        values.insert(name.trim().to_owned(), found);
+        let behind = behind[start + 1..].iter().zip(layers);
+        behind.map(|(all, layer)| single(all, &layer.name)).collect()
     }
-    Err("a function that gives nothing".to_owned())
 }
 
-/// What an expression stands for; every name is used once, so that nothing branches.
-fn value(text: &str, own: &str, values: &mut HashMap<String, Value>) -> Option<Value> {
-    let text = text.trim().trim_end_matches(',').trim();
-    if let Some(key) = text.strip_prefix("getattr(") {
-        let key = key.strip_suffix(')')?.strip_prefix(own)?.strip_prefix(", \"")?;
-        return Some(Value::Part(key.strip_suffix('"')?.to_owned()));
+/// The place of the first of the layers among those that are applied, in whose order they have to be.
+fn start(applied: &[&Layer], layers: &[Layer], is_part: bool) -> Result<usize, String> {
+    let is_applied = |layer: &&Layer| applied.iter().any(|other| other.name == layer.name);
+    if let Some(idle) = layers.iter().find(|layer| !is_applied(layer)) {
+        return Err(format!("`{}` is not applied", idle.name));
     }
-    if let Some(key) = text.strip_prefix(own).and_then(|rest| rest.strip_prefix('.'))
-        && is_name(key)
-    {
-        return Some(Value::Part(key.to_owned()));
+    let start = applied.iter().position(|layer| layer.name == layers[0].name).unwrap_or_default();
+    let same = |run: &[&Layer]| run.iter().copied().eq(layers);
+    let run = applied.get(start..start + layers.len()).unwrap_or_default();
+    if same(run) && (is_part || applied.len() == layers.len()) {
+        return Ok(start);
     }
-    if is_name(text) {
-        return values.remove(text);
-    }
-    let inside = text.strip_suffix(')')?;
-    let activation =
-        ACTIVATIONS.iter().find_map(|name| inside.strip_prefix(name)?.strip_prefix('('));
-    if let Some(argument) = activation {
-        return value(argument, own, values).filter(|value| matches!(value, Value::Chain(_)));
-    }
-    let (part, argument) = inside.strip_prefix('(')?.split_once(").forward(")?;
-    let Some(Value::Part(part)) = value(part, own, values) else { return None };
-    let Some(Value::Chain(mut chain)) = value(argument, own, values) else { return None };
-    chain.push(part);
-    Some(Value::Chain(chain))
+    let names: Vec<&str> = applied.iter().take(8).map(|layer| layer.name.as_str()).collect();
+    let rest = if names.len() < applied.len() { ", and others" } else { "" };
+    let is_same = layers.iter().map(|layer| layer.name.as_str()).eq(names.iter().copied());
+    let bias = if is_same { ", with other biases" } else { "" };
+    Err(format!("it applies {}{rest}{bias}", names.join(", then ")))
 }
 
-/// Whether a text is one name.
-fn is_name(text: &str) -> bool {
-    text.chars().all(|c| c.is_alphanumeric() || c == '_') && !text.is_empty()
+/// The one activation behind a layer, identity if there is none.
+fn single(all: &[Activation], layer: &str) -> Result<Activation, String> {
+    match all {
+        [] => Ok(Activation::Identity),
+        [one] => Ok(*one),
+        [first, second, ..] => Err(format!("{first}, then {second} behind `{layer}`")),
+    }
+}
+
+/// The activations of the code, or those that are stated, all of them if any is another.
+fn agreed(mut behind: Vec<Activation>, request: &Request) -> Result<Settled, String> {
+    let words: Vec<String> = behind.iter().map(|one| one.to_string()).collect();
+    let words = words.join(", ");
+    let last = behind.pop();
+    let is_other = |stated: Option<Activation>, code: &[Activation]| {
+        stated.is_some_and(|stated| code.iter().any(|&code| code != stated))
+    };
+    let others = [is_other(request.activation, &behind), is_other(request.output, last.as_slice())];
+    behind.extend(last);
+    let note = match (others, request.activation.and(request.output)) {
+        ([false, false], _) => format!("its code applies {words} behind its layers"),
+        (_, Some(_)) => format!(
+            "as stated, while the code of the module applies {words} behind its layers, one after the other"
+        ),
+        ([hidden, _], None) => {
+            return Err(format!(
+                "{} is not what the code of this TorchScript module says: it applies {words} behind its layers, one \
+                 after the other. Leave it out to have that, or state both --activation and --output to have them \
+                 anyway",
+                if hidden { "--activation" } else { "--output" }
+            ));
+        }
+    };
+    Ok(Settled { activations: Some(behind), note })
 }
