@@ -84,7 +84,14 @@ fn objects_beside_a_policy_are_refused_by_name() {
     let words =
         "`obs_rms.rms` (an object of `__main__.RunningMeanStd`, which was not made) may act";
     assert!(error.contains(words), "{error}");
-    // Those of training, a device and a path are not.
+    // It is no part of the policy's dictionary in a list, either.
+    let layers = dict(&[("w", array(&[4, 2], 0)), ("b", array(&[2], 1))]);
+    let list = [b"\x80\x02](".to_vec(), layers, OBJECT.to_vec(), b"e.".to_vec()].concat();
+    let error = read(&list, &stated()).unwrap_err().to_string();
+    assert!(error.contains("`1` (an object of"), "{error}");
+    let found = read(&list, &Request { networks: named(&["0"]).networks, ..stated() }).unwrap();
+    assert_eq!(found.left_out, ["1 (__main__.RunningMeanStd)"]);
+    // Those of training, and a device are not.
     let device = b"ctorch\ndevice\nX\x03\x00\x00\x00cpu\x85R".to_vec();
     let names = left_out(&[
         ("scheduler", dict(&[("x", OBJECT.to_vec())])),

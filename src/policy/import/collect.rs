@@ -23,7 +23,7 @@ const HOLDERS: [&str; 3] = ["RunningStatisticsState", "NestedMeanStd", "FrozenDi
 pub(super) fn source<'a>(unpickled: Unpickled<'_>) -> Result<Source<'a>, String> {
     let Unpickled { pickle, root, .. } = unpickled;
     refuse_object(&pickle, root)?;
-    let mut walk = Walk { pickle: &pickle, seen: 0, dict: 0, found: Source::default() };
+    let mut walk = Walk { pickle: &pickle, seen: 0, dict: usize::MAX, found: Source::default() };
     walk.value(root, &mut Vec::new())?;
     let mut found = walk.found;
     let mut names = HashSet::new();
@@ -71,7 +71,7 @@ struct Walk<'p, 'b, 'a> {
     pickle: &'p Pickle<'b>,
     /// Entries seen.
     seen: usize,
-    /// The dictionary that is walked through.
+    /// The dictionary that is walked through; no number of one where the root is none.
     dict: usize,
     found: Source<'a>,
 }
@@ -112,6 +112,7 @@ impl<'b> Walk<'_, 'b, '_> {
                 match (amount(value), value) {
                     (Some(amount), _) => self.count(amount, path),
                     (_, Value::Text(text)) => self.say(text.to_owned(), path),
+                    (_, Value::Type(_)) => self.say(String::new(), path),
                     _ => {}
                 }
                 Ok(())
