@@ -169,6 +169,10 @@ fn statistics_of_others_and_of_nobody_are_not_taken() {
             "{error}"
         );
     }
+    // What `--network` would find in a module is not there for it.
+    let item = [("0.fc1", [8, 4]), ("0.fc2", [8, 8]), ("0.fc_mu", [2, 8])];
+    let error = refusal(&item, &["0.action_scale", "0.action_bias", "1.obs_mean"]);
+    assert!(error.contains("--network 0.fc1,0.fc2,0.fc_mu --activation"), "{error}");
     let rsl_rl = [("actor.0", [8, 4]), ("actor.2", [2, 8]), ("critic.0", [1, 4])];
     let error = refusal(&rsl_rl, &["std", "actor.0.std"]);
     assert!(error.contains("`actor.0.std` may act on"), "{error}");

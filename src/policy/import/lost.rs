@@ -80,7 +80,7 @@ pub(super) fn refuse(source: &Source<'_>, own: &Own<'_>) -> Result<(), String> {
         rest.iter().filter(is).copied().collect()
     };
     let (memory, unknown) = (of(Bearing::Memory), of(Bearing::Unknown));
-    let remedy = remedy(own, &all, &unknown);
+    let remedy = remedy(source, &known, own.flags);
     let tensors = unknown.iter().filter_map(|rest| source.tensor(rest.name));
     let norm = tensors.filter_map(|tensor| norms::refusal(source, tensor)).next();
     let norm = norm.map_or(String::new(), |norm| format!(". {norm}"));
@@ -111,18 +111,26 @@ fn lies_beside(name: &str, module: &str, known: &Known<'_>) -> bool {
 }
 
 /// How the policy's layers are had alone: by their modules, where nothing else that matters lies in these.
-fn remedy(own: &Own<'_>, all: &[&str], unknown: &[Rest<'_>]) -> String {
+fn remedy(source: &Source<'_>, known: &Known<'_>, flags: &str) -> String {
+    let dense = layers::dense(source);
+    let parts = layers::parts(&dense);
+    let is_other = |tensor: &Tensor| {
+        let bearing = known.bearing(&tensor.name, tensor.amount());
+        !parts.contains(tensor.name.as_str()) && bearing != Bearing::None
+    };
     let mut networks: Vec<&str> = Vec::new();
-    for group in own.layers.chunk_by(|a, b| dense::module(a) == dense::module(b)) {
+    for group in known.own.chunk_by(|a, b| dense::module(a) == dense::module(b)) {
         let module = dense::module(group[0]);
-        let is_whole = all.iter().filter(|name| starts_with(name, module)).count() == group.len();
-        let is_pure = !unknown.iter().any(|rest| starts_with(rest.name, module));
+        let mut layers = known.all.iter().filter(|name| starts_with(name, module));
+        let mut tensors = source.tensors.iter().filter(|tensor| starts_with(&tensor.name, module));
+        let is_whole = layers.all(|layer| group.contains(layer));
+        let is_pure = !tensors.any(is_other);
         match !module.is_empty() && is_whole && is_pure {
             true => networks.push(module),
             false => networks.extend(group),
         }
     }
-    format!("--network {}{}", networks.join(","), own.flags)
+    format!("--network {}{flags}", networks.join(","))
 }
 
 /// Whether a tensor lies in the module of statistics that are used: their squares and counts.
