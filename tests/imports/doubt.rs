@@ -176,3 +176,9 @@ fn inputs_far_from_zero_keep_their_digits() {
     let onnx = reachcast::policy::onnx_bytes(&network);
     assert_eq!(read("x.onnx", &onnx, &default()).unwrap().network.digest(), network.digest());
 }
+
+#[test]
+fn a_matlab_file_of_version_7_3_is_called_so() {
+    let error = read("x.mat", b"MATLAB 7.3 MAT-file", &default()).unwrap_err();
+    assert!(error.to_string().contains("version 7.3, which is HDF5"), "{error}");
+}

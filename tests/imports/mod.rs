@@ -1,5 +1,7 @@
 //! Policies of the libraries of the field: what comes out of each file is what its library makes of it.
 
+mod archives;
+mod beside;
 mod doubt;
 mod forward;
 mod layouts;

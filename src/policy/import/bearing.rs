@@ -1,6 +1,7 @@
 //! What a tensor or a number that is no part of a network may have to do with it, told by its name.
 
-use super::names::starts_with;
+use super::names::{split, starts_with};
+use super::source::Amount;
 
 /// Keys of what an optimiser or a trainer keeps.
 const TRAINING: [&str; 6] = ["optim", "opt", "opt_state", "loops", "callbacks", "grad_scaler"];
@@ -28,13 +29,14 @@ const WHOLE_JUDGES: [&str; 4] = ["v", "q", "V", "Q"];
 /// Ends of such keys.
 const ENDS_JUDGES: [&str; 3] = ["_critic", "_target", "_old"];
 /// Normalisers of what a critic alone is given.
-const CRITICS_OWN: [&str; 2] = ["critic_obs_norm", "privileged_obs_norm"];
+const CRITICS_OWN: [&str; 3] = ["critic_obs_norm", "privileged_obs_norm", "privileged_state"];
 /// Logarithms of deviations and of the weight of the entropy.
 const LOGARITHMS: [&str; 5] = ["log_std", "logstd", "log_std_param", "log_alpha", "log_ent_coef"];
 /// Ends of the keys of the former, and of the layers that give them.
 const ENDS_LOGARITHMS: [&str; 4] = ["_log_std", "_logstd", "log_std_layer", "log_std_linear"];
 /// Keys of counts, sizes and constants of training, at the end of a name.
-const COUNTS: [&str; 31] = [
+const COUNTS: [&str; 32] = [
+    "training",
     "count",
     "num_batches_tracked",
     "step",
@@ -68,7 +70,9 @@ const COUNTS: [&str; 31] = [
     "last_mean_rewards",
 ];
 /// Ends of such keys.
-const ENDS_COUNTS: [&str; 4] = ["_loss", "_features", "_steps", "_epoch"];
+const ENDS_COUNTS: [&str; 5] = ["_loss", "_features", "_steps", "_epoch", "version"];
+/// Modules of paths and times.
+const INERT: [&str; 2] = ["pathlib", "datetime"];
 /// Beginnings of the keys of the tensors of recurrent layers.
 const RECURRENT: [&str; 6] =
     ["weight_ih", "weight_hh", "bias_ih", "bias_hh", "kernel_h", "recurrent"];
@@ -97,8 +101,8 @@ pub(super) struct Known<'a> {
 }
 
 impl Known<'_> {
-    /// What the tensor or number `name` may have to do with the policy.
-    pub(super) fn bearing(&self, name: &str) -> Bearing {
+    /// What the numbers `name` may have to do with the policy.
+    pub(super) fn bearing(&self, name: &str, amount: Amount) -> Bearing {
         let last = name.rsplit('.').next().unwrap_or_default();
         let mut ends = name.match_indices('.').map(|(at, _)| at).chain([name.len()]);
         let beside = ends.any(|end| {
@@ -106,14 +110,15 @@ impl Known<'_> {
             trains(key) || (judges(key) && self.is_apart(&name[..end]))
         });
         match is_memory(last) {
-            _ if beside || is_count(last) => Bearing::None,
+            // Of several numbers, none is a count.
+            _ if beside || (amount == Amount::One && is_count(last)) => Bearing::None,
             true => Bearing::Memory,
             false => Bearing::Unknown,
         }
     }
 
     /// Whether the module has layers, and none of the policy's.
-    fn is_apart(&self, module: &str) -> bool {
+    pub(super) fn is_apart(&self, module: &str) -> bool {
         self.all.iter().any(|layer| starts_with(layer, module))
             && !self.own.iter().any(|layer| starts_with(layer, module))
     }
@@ -134,7 +139,7 @@ fn is_logarithm(key: &str) -> bool {
 }
 
 /// Whether a key is that of a network that judges, or of a copy.
-fn judges(key: &str) -> bool {
+pub(super) fn judges(key: &str) -> bool {
     WHOLE_JUDGES.contains(&key)
         || JUDGES.iter().any(|begin| key.starts_with(begin))
         || ENDS_JUDGES.iter().any(|end| key.ends_with(end))
@@ -143,6 +148,12 @@ fn judges(key: &str) -> bool {
 /// Whether a key is that of a count, or of a constant of training.
 fn is_count(key: &str) -> bool {
     COUNTS.contains(&key) || ENDS_COUNTS.iter().any(|end| key.ends_with(end))
+}
+
+/// Whether an object of this class or function does nothing with numbers: a device or a kind of PyTorch, a path, a time.
+pub(super) fn is_inert(maker: &str) -> bool {
+    let (module, _) = split(maker);
+    module == "torch" || INERT.contains(&module.split('.').next().unwrap_or_default())
 }
 
 /// Whether the last key of a tensor is that of a recurrent layer.
@@ -182,7 +193,7 @@ mod tests {
             "epoch",
             "critic_obs_normalizer._mean",
         ] {
-            assert_eq!(known.bearing(name), Bearing::None, "{name}");
+            assert_eq!(known.bearing(name, Amount::One), Bearing::None, "{name}");
         }
         for name in [
             "obs.std",
@@ -201,9 +212,11 @@ mod tests {
             "obs_rms.mean",
             "action_scale",
         ] {
-            assert_eq!(known.bearing(name), Bearing::Unknown, "{name}");
+            assert_eq!(known.bearing(name, Amount::One), Bearing::Unknown, "{name}");
         }
-        assert_eq!(known.bearing("value_rnn.weight_ih_l0"), Bearing::Memory);
+        assert_eq!(known.bearing("epoch", Amount::Many), Bearing::Unknown);
+        assert!(is_inert("torch.device") && !is_inert("torch.nn.Linear"));
+        assert_eq!(known.bearing("value_rnn.weight_ih_l0", Amount::Many), Bearing::Memory);
         assert!(is_parametrized("0.parametrizations.weight.original0"));
         assert!(gives_deviations("actor.log_std") && !gives_deviations("actor.mean"));
     }

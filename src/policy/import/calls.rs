@@ -206,7 +206,9 @@ pub(super) fn filled<'a>(
     match *state {
         [Value::Tuple(shape), Value::Type(kind), Value::Truth(by_columns), Value::Bytes(bytes)] => {
             let shape = lengths(pickle, shape)?;
-            Ok(Some(array(pickle, kind, bytes, shape, by_columns)))
+            let array = array(pickle, kind, bytes, shape, by_columns);
+            pickle.objects[number].array = Some(array);
+            Ok(Some(array))
         }
         _ => Ok(None),
     }
@@ -237,7 +239,7 @@ pub(super) fn head<'a>(pickle: &Pickle<'a>, tuple: usize) -> Vec<Value<'a>> {
 
 /// An object that nobody made.
 fn object<'a>(pickle: &mut Pickle<'a>, maker: Name<'a>, parts: Vec<Value<'a>>) -> usize {
-    pickle.objects.push(Object { maker, parts });
+    pickle.objects.push(Object { maker, parts, array: None });
     pickle.objects.len() - 1
 }
 

@@ -3,7 +3,6 @@
 use std::collections::HashSet;
 
 use super::applied::Layer;
-use super::bearing::{is_memory, is_parametrized};
 use super::dense::{Dense, Order};
 use super::draft::{Draft, MOST_LAYERS, Step};
 use super::kind::Cast;
@@ -15,6 +14,7 @@ use super::map::Map;
 use super::names::{split, under};
 use super::order;
 use super::request::{Hints, Imported, Origin, Request};
+use super::said::{self, Used};
 use super::source::{Source, Tensor};
 use super::statistics;
 use crate::policy::Activation;
@@ -54,6 +54,8 @@ struct Made {
     draft: Draft,
     /// Names of its tensors.
     used: HashSet<String>,
+    /// Modules of the statistics among them.
+    statistics: HashSet<String>,
     /// What is to be said about it.
     notes: Vec<String>,
 }
@@ -78,13 +80,13 @@ pub(super) fn policy(
         let of_layout = choice.layout.and_then(|layout| layout.refusal).map(str::to_owned);
         hints.refusal.clone().or(of_layout).map_or(Ok(()), Err)?;
         choice.add_ends(&mut source, &mut made, hints)?;
-        let own: Vec<&str> = choice.layers.iter().map(|layer| layer.name.as_str()).collect();
-        let beside = choice.layout.map_or(Vec::new(), |layout| layout.beside(&choice.outer));
-        lost::refuse(&source, &made.used, &beside, &own)?;
+        choice.refuse_lost(&source, &made, request, hints)?;
     }
     let network = made.draft.network()?;
     // Last, since what is asked for is of no use to a file that is refused for another reason.
     choice.check_stated(request, hints)?;
+    let [hidden, last] = choice.activations(request, hints);
+    said::check(&source, hidden, last)?;
     let origin = |stated: bool, hinted: bool| match (stated, hinted, choice.layout) {
         (true, ..) => Origin::Stated,
         (_, true, _) => Origin::File,
@@ -107,7 +109,7 @@ impl Choice {
     fn of(source: &Source<'_>, request: &Request) -> Result<Self, String> {
         let dense = layers::dense(source);
         if dense.is_empty() {
-            return Err(none(source));
+            return Err(layers::none(source));
         }
         let recognised = layouts::recognise(source, &dense);
         let by_name = !request.networks.is_empty();
@@ -199,15 +201,52 @@ impl Choice {
     /// Adds the map that normalises what the network is given, where the file has its statistics.
     fn add_statistics(&self, source: &mut Source<'_>, made: &mut Made) -> Result<(), String> {
         let Some(layout) = self.layout.filter(|_| !self.by_name) else { return Ok(()) };
-        if let Some(normaliser) = statistics::find(source, layout.name, self.inputs)? {
+        if let Some(normaliser) =
+            statistics::find(source, layout.name, self.inputs, &self.layers[0].name)?
+        {
             made.draft.push(Step::Map(normaliser.map))?;
             made.notes.push(format!(
                 "the inputs are normalised by `{}` first, as {} does: {}",
                 normaliser.module, layout.name, normaliser.words
             ));
+            made.statistics.extend(normaliser.names.iter().map(|name| split(name).0.to_owned()));
             made.used.extend(normaliser.names);
         }
         Ok(())
+    }
+
+    /// What lies between the layers, and behind the last one.
+    fn activations(&self, request: &Request, hints: &Hints) -> [Used; 2] {
+        let [hidden, last] = match self.layout {
+            Some(layout) => [layout.hidden, layout.last],
+            None => [Activation::Relu, self.usual_output()],
+        };
+        [(request.activation, hints.activation, hidden), (request.output, hints.output, last)].map(
+            |(stated, hinted, usual)| Used {
+                activation: stated.or(hinted).unwrap_or(usual),
+                is_stated: stated.is_some(),
+            },
+        )
+    }
+
+    /// Refuses what would be lost.
+    fn refuse_lost(
+        &self,
+        source: &Source<'_>,
+        made: &Made,
+        request: &Request,
+        hints: &Hints,
+    ) -> Result<(), String> {
+        let layers: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
+        let beside = self.layout.map_or(Vec::new(), |layout| layout.beside(&self.outer));
+        let known = |used: &Used| used.is_stated || self.layout.is_some();
+        let used = self.activations(request, hints).into_iter().zip(["activation", "output"]);
+        let flags = used.filter(|(used, _)| known(used));
+        let flags = flags.map(|(used, flag)| format!(" --{flag} '{}'", used.activation.name()));
+        let flags = &flags.collect::<String>();
+        let (used, statistics) = (&made.used, &made.statistics);
+        let own = lost::Own { used, statistics, beside: &beside, layers: &layers, flags };
+        lost::refuse(source, &own)
     }
 
     /// Adds the layers and what follows each of them.
@@ -218,10 +257,7 @@ impl Choice {
         request: &Request,
         hints: &Hints,
     ) -> Result<(), String> {
-        let usual = self.layout.map_or(Activation::Relu, |layout| layout.hidden);
-        let hidden = request.activation.or(hints.activation).unwrap_or(usual);
-        let usual = self.layout.map_or_else(|| self.usual_output(), |layout| layout.last);
-        let behind = request.output.or(hints.output).unwrap_or(usual);
+        let [hidden, behind] = self.activations(request, hints).map(|used| used.activation);
         for (i, layer) in self.layers.iter().enumerate() {
             let is_last = i + 1 == self.layers.len();
             let mut linear = linear(source, layer, request.cast)?;
@@ -254,6 +290,10 @@ impl Choice {
             return Ok(());
         };
         let limit = hints.clip.unwrap_or(usual);
+        // The library has no clip then.
+        if limit <= 0.0 {
+            return Ok(());
+        }
         let what = format!("the sums of `{}` stay within {limit} (clip_mean)", layer.name);
         if self.by_name {
             made.notes.push(format!("not in it: {what}"));
@@ -299,34 +339,10 @@ impl Choice {
         }
         made.notes.extend(hints.notes.iter().cloned());
         let beyond = self.layout.and_then(|layout| layout.beyond);
-        made.notes.extend(beyond.map(|beyond| format!("not in it: {beyond}")));
+        let unsaid = self.layout.and_then(|layout| layout.unsaid).filter(|_| !hints.is_said);
+        made.notes.extend(beyond.or(unsaid).map(|beyond| format!("not in it: {beyond}")));
         Ok(())
     }
-}
-
-/// The refusal of a file without a dense layer.
-fn none(source: &Source<'_>) -> String {
-    let names = || source.tensors.iter().map(|tensor| tensor.name.as_str());
-    if let Some(name) = names().find(|name| is_parametrized(name)) {
-        return layers::parametrized(name);
-    }
-    if let Some(name) = names().find(|name| is_memory(split(name).1)) {
-        return format!(
-            "recurrent layers alone, `{name}` the first: a network with a memory is no dense one, and none is read"
-        );
-    }
-    let count = source.tensors.len();
-    let unmade = source.unmade.first().map(|object| {
-        format!(
-            "; `{}` is an object of `{}`, which a program would have to make: nothing was executed. Save tensors \
-             alone: torch.save(module.state_dict(), FILE)",
-            object.name, object.maker
-        )
-    });
-    format!(
-        "no dense layer among its {count} tensors: none is called `.weight` and has the shape [out, in]{}",
-        unmade.unwrap_or_default()
-    )
 }
 
 /// The layer with its numbers.

@@ -3,7 +3,8 @@
 use std::collections::HashSet;
 
 use super::pickle::Unpickled;
-use super::source::{Place, Source, Tensor, Unmade};
+use super::said;
+use super::source::{Amount, Place, Plain, Said, Source, Tensor, Unmade};
 use super::value::{self, Object, Pickle, Value, View};
 
 /// How deep dictionaries may lie in one another.
@@ -22,7 +23,7 @@ const HOLDERS: [&str; 3] = ["RunningStatisticsState", "NestedMeanStd", "FrozenDi
 pub(super) fn source<'a>(unpickled: Unpickled<'_>) -> Result<Source<'a>, String> {
     let Unpickled { pickle, root, .. } = unpickled;
     refuse_object(&pickle, root)?;
-    let mut walk = Walk { pickle: &pickle, seen: 0, dict: 0, found: Source::default() };
+    let mut walk = Walk { pickle: &pickle, seen: 0, dict: usize::MAX, found: Source::default() };
     walk.value(root, &mut Vec::new())?;
     let mut found = walk.found;
     let mut names = HashSet::new();
@@ -70,7 +71,7 @@ struct Walk<'p, 'b, 'a> {
     pickle: &'p Pickle<'b>,
     /// Entries seen.
     seen: usize,
-    /// The dictionary that is walked through.
+    /// The dictionary that is walked through; no number of one where the root is none.
     dict: usize,
     found: Source<'a>,
 }
@@ -98,17 +99,35 @@ impl<'b> Walk<'_, 'b, '_> {
                 self.found.unmade.push(Unmade { name, dict: self.dict, maker });
                 Ok(())
             }
+            Value::Name(name) if name.module.starts_with("torch.nn") => {
+                self.say(name.name.to_owned(), path);
+                Ok(())
+            }
             Value::Name(name) => {
                 let (path, maker) = (path.join("."), name.to_string());
                 self.found.unmade.push(Unmade { name: path, dict: self.dict, maker });
                 Ok(())
             }
-            Value::Int(_) | Value::Float => {
-                self.found.plain.push(path.join("."));
+            _ => {
+                match (amount(value), value) {
+                    (Some(amount), _) => self.count(amount, path),
+                    (_, Value::Text(text)) => self.say(text.to_owned(), path),
+                    (_, Value::Type(_)) => self.say(String::new(), path),
+                    _ => {}
+                }
                 Ok(())
             }
-            _ => Ok(()),
         }
+    }
+
+    /// Adds numbers that are no tensor.
+    fn count(&mut self, amount: Amount, path: &[String]) {
+        self.found.plain.push(Plain { name: path.join("."), amount });
+    }
+
+    /// Adds words.
+    fn say(&mut self, text: String, path: &[String]) {
+        self.found.said.push(Said { name: path.join("."), text });
     }
 
     /// Adds what is in a dictionary.
@@ -132,9 +151,15 @@ impl<'b> Walk<'_, 'b, '_> {
 
     /// Adds what is in a list or a tuple.
     fn items(&mut self, items: &[Value<'b>], path: &mut Vec<String>) -> Result<(), String> {
-        let plain = |item: &Value<'_>| matches!(item, Value::Int(_) | Value::Float);
-        if !items.is_empty() && items.iter().all(plain) {
-            self.found.plain.push(path.join("."));
+        if !items.is_empty() && items.iter().all(|item| amount(*item).is_some()) {
+            self.count(Amount::of(items.len()), path);
+            return Ok(());
+        }
+        let word = |item: &Value<'b>| if let Value::Text(text) = item { Some(*text) } else { None };
+        if let Some(words) = items.iter().map(word).collect::<Option<Vec<&str>>>()
+            && !words.is_empty()
+        {
+            self.say(words.join(", "), path);
             return Ok(());
         }
         if let [weight, bias] = items
@@ -174,6 +199,16 @@ impl<'b> Walk<'_, 'b, '_> {
         self.value(value, path)?;
         path.pop();
         Ok(())
+    }
+}
+
+/// How many numbers a value is that is no tensor and holds none; none if it is no number.
+fn amount(value: Value<'_>) -> Option<Amount> {
+    match value {
+        Value::Int(_) | Value::Long | Value::Float | Value::Truth(_) => Some(Amount::One),
+        Value::Bytes(_) | Value::Storage(_) => Some(Amount::Many),
+        Value::Text(text) => said::amount(text),
+        _ => None,
     }
 }
 

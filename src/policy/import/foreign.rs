@@ -4,7 +4,8 @@ use safetensors::SafeTensors;
 
 use super::kind::Kind;
 use super::names::compare;
-use super::source::{Source, Tensor};
+use super::said;
+use super::source::{Plain, Said, Source, Tensor};
 use crate::policy::Mlp;
 
 /// The entry of the metadata by which programs say who wrote a file.
@@ -32,11 +33,14 @@ pub(super) fn open(bytes: &[u8]) -> Result<Source<'_>, String> {
     }
     let mut source = Source::default();
     for (key, text) in header.metadata().iter().flatten().filter(|(key, _)| *key != FORMAT) {
-        let to = if is_numbers(text) { &mut source.plain } else { &mut source.said };
-        to.push(key.to_owned());
+        let (name, text) = (key.to_owned(), text.to_owned());
+        match said::amount(&text) {
+            Some(amount) => source.plain.push(Plain { name, amount }),
+            None => source.said.push(Said { name, text }),
+        }
     }
-    source.plain.sort_unstable();
-    source.said.sort_unstable();
+    source.plain.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+    source.said.sort_unstable_by(|a, b| a.name.cmp(&b.name));
     // Haiku joins the names of modules by slashes.
     let dotted = file.names().iter().any(|name| name.contains('.'));
     for (name, view) in file.iter() {
@@ -49,12 +53,4 @@ pub(super) fn open(bytes: &[u8]) -> Result<Source<'_>, String> {
     // The file has no order of its own.
     source.tensors.sort_by(|a, b| compare(&a.name, &b.name));
     Ok(source)
-}
-
-/// Whether a text is a number, or a list of numbers in brackets or without.
-fn is_numbers(text: &str) -> bool {
-    let inside = text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
-    let mut words = inside.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty());
-    let first = words.next();
-    first.into_iter().chain(words).all(|word| word.parse::<f64>().is_ok()) && first.is_some()
 }

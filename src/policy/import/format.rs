@@ -22,9 +22,10 @@ pub(super) enum Format {
 }
 
 /// First bytes of other files, what they are, and what to do.
-const OTHERS: [(&[u8], &str, &str); 12] = [
+const OTHERS: [(&[u8], &str, &str); 13] = [
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file, as Keras writes it (or MATLAB 7.3)", KERAS),
     (b"MATLAB 5.0", "a MATLAB file", MATLAB),
+    (b"MATLAB 7.3", "a MATLAB file of version 7.3, which is HDF5", MATLAB_HDF5),
     (b"\x1f\x8b", "compressed with gzip", "unpack it first: gunzip -k FILE"),
     (
         b"version https://git-lfs",
@@ -51,6 +52,8 @@ const MATLAB: &str = "export the network to ONNX in MATLAB: exportONNXNetwork(ne
                       numpy.ascontiguousarray(scipy.io.loadmat(FILE)['W1'], 'f4'), '0.bias': \
                       scipy.io.loadmat(FILE)['b1'].ravel().astype('f4')}, 'policy.safetensors'); a weight [in, out] goes \
                       under '0.kernel'";
+const MATLAB_HDF5: &str = "export the network to ONNX in MATLAB: exportONNXNetwork(net, 'policy.onnx'); or save it again \
+                           with save(FILE, '-v7'), and import that";
 const NUMPY: &str = "save all arrays of the network as safetensors: safetensors.numpy.save_file({'0.weight': w0, \
                      '0.bias': b0}, 'policy.safetensors'), each w [out, in]; one that is [in, out] goes under '0.kernel'";
 /// A file in an archive of arrays that `policy export` writes.

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::bearing::{Bearing, Known, gives_deviations, is_parametrized};
+use super::bearing::{Bearing, Known, gives_deviations, is_memory, is_parametrized};
 use super::dense::{Dense, Order};
 use super::names::{compare, holds, is_head, numbered, split, starts_with};
 use super::source::{Source, Tensor};
@@ -91,6 +91,31 @@ pub(super) fn only<'a>(
     }
 }
 
+/// The refusal of a file without a dense layer.
+pub(super) fn none(source: &Source<'_>) -> String {
+    let names = || source.tensors.iter().map(|tensor| tensor.name.as_str());
+    if let Some(name) = names().find(|name| is_parametrized(name)) {
+        return parametrized(name);
+    }
+    if let Some(name) = names().find(|name| is_memory(split(name).1)) {
+        return format!(
+            "recurrent layers alone, `{name}` the first: a network with a memory is no dense one, and none is read"
+        );
+    }
+    let count = source.tensors.len();
+    let unmade = source.unmade.first().map(|object| {
+        format!(
+            "; `{}` is an object of `{}`, which a program would have to make: nothing was executed. Save tensors \
+             alone: torch.save(module.state_dict(), FILE)",
+            object.name, object.maker
+        )
+    });
+    format!(
+        "no dense layer among its {count} tensors: none is called `.weight` and has the shape [out, in]{}",
+        unmade.unwrap_or_default()
+    )
+}
+
 /// The layers that lie under `prefix`, which must be all that lies there.
 fn pick<'a>(
     source: &'a Source<'_>,
@@ -105,7 +130,9 @@ fn pick<'a>(
     let known = Known { all: &all, own: &own };
     let bears = |tensor: &&Tensor| {
         let name = tensor.name.as_str();
-        rule(name, prefix) && !parts.contains(name) && known.bearing(name) != Bearing::None
+        rule(name, prefix)
+            && !parts.contains(name)
+            && known.bearing(name, tensor.amount()) != Bearing::None
     };
     let others: Vec<&Tensor> = source.tensors.iter().filter(bears).collect();
     if let Some(tensor) = others.iter().find(|tensor| is_parametrized(&tensor.name)) {

@@ -31,13 +31,17 @@ pub(super) struct Layout {
     pub(super) refusal: Option<&'static str>,
     /// What the library does with the output that no file of its says.
     pub(super) beyond: Option<&'static str>,
+    /// The same, of a library whose archives say it.
+    pub(super) unsaid: Option<&'static str>,
 }
 
 impl Layout {
     /// What in a file is known to be no part of the policy: what marks the layout, and what lies beside it.
     pub(super) fn beside(&self, outer: &str) -> Vec<String> {
-        let own =
-            self.marks.iter().flat_map(|marks| marks.split('|')).chain(self.beside.iter().copied());
+        let marks = self.marks.iter().flat_map(|marks| marks.split('|'));
+        // Means of observations are lost where they are not used.
+        let marks = marks.filter(|mark| split(mark).1 != "mean");
+        let own = marks.chain(self.beside.iter().copied());
         own.map(|name| under(outer, name))
             .chain(self.beside.iter().map(|&name| name.to_owned()))
             .collect()
@@ -57,6 +61,7 @@ const PLAIN: Layout = Layout {
     doubled: false,
     refusal: None,
     beyond: None,
+    unsaid: None,
 };
 const ELU: Activation = Activation::Elu { alpha: 1.0 };
 /// What CleanRL calls the limits of its actions.
@@ -64,6 +69,15 @@ const ACTIONS: Option<[&str; 2]> = Some(["action_scale", "action_bias"]);
 /// What several libraries do behind the tanh.
 const LIMITS: Option<&str> =
     Some("the largest action, which the output is multiplied by; the file does not say it");
+/// What stable-baselines3 does with the output, which its archives say and its state dicts do not.
+const CLAMPED: Option<&str> = Some(
+    "the limits of the actions, which predict() keeps the output within; a state dict does not say them, model.save(FILE) \
+     does",
+);
+const SCALED: Option<&str> = Some(
+    "the limits of the actions, to which predict() scales the output, here within -1 and 1; a state dict does not say \
+     them, model.save(FILE) does",
+);
 const GAUSSIAN: (Activation, Activation) = (Activation::Tanh, Activation::Identity);
 
 /// The layouts, those with more parts first.
@@ -72,13 +86,14 @@ const LAYOUTS: [Layout; 23] = [
         name: "Brax",
         body: &["1.params.hidden_"],
         marks: &["0.mean"],
-        beside: &["0", "2"],
+        beside: &["0.count", "0.summed_variance", "2"],
         hidden: Activation::Silu,
         doubled: true,
         ..PLAIN
     },
     Layout {
         name: "stable-baselines3 (PPO, A2C)",
+        unsaid: CLAMPED,
         body: &["mlp_extractor.shared_net", "mlp_extractor.policy_net", "action_net"],
         marks: &["value_net"],
         hidden: GAUSSIAN.0,
@@ -87,6 +102,7 @@ const LAYOUTS: [Layout; 23] = [
     },
     Layout {
         name: "stable-baselines3 (PPO, A2C)",
+        unsaid: CLAMPED,
         body: &["mlp_extractor.policy_net", "action_net"],
         marks: &["value_net"],
         hidden: GAUSSIAN.0,
@@ -95,6 +111,7 @@ const LAYOUTS: [Layout; 23] = [
     },
     Layout {
         name: "stable-baselines3 (SAC)",
+        unsaid: SCALED,
         body: &["actor.latent_pi", "actor.mu"],
         marks: &["actor.log_std"],
         // With exploration that depends on the state, the means go through a Hardtanh, which has no tensor.
@@ -103,6 +120,7 @@ const LAYOUTS: [Layout; 23] = [
     },
     Layout {
         name: "stable-baselines3 (TD3, DDPG)",
+        unsaid: SCALED,
         body: &["actor.mu"],
         marks: &["actor_target.mu"],
         ..PLAIN
@@ -111,7 +129,7 @@ const LAYOUTS: [Layout; 23] = [
         name: "rl_games",
         body: &["a2c_network.actor_mlp", "a2c_network.mu"],
         marks: &["a2c_network.value"],
-        beside: &["a2c_network.sigma", "value_mean_std"],
+        beside: &["a2c_network.sigma", "value_mean_std", "assymetric_vf_nets"],
         hidden: ELU,
         last: Activation::Identity,
         ..PLAIN

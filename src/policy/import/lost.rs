@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::bearing::{Bearing, Known, is_parametrized};
+use super::bearing::{Bearing, Known, is_inert, is_parametrized};
 use super::names::{split, starts_with};
-use super::source::{Source, Tensor, Unmade};
+use super::source::{Amount, Source, Tensor, Unmade};
 use super::{dense, layers, norms};
 
 /// Names that a refusal lists.
@@ -24,64 +24,117 @@ pub(super) fn refuse_unmade(source: &Source<'_>, dicts: &HashSet<usize>) -> Resu
     }
 }
 
-/// Refuses tensors and plain numbers that are not `used`, lie under nothing that is `beside` the policy, and may
-/// act on what the network of the layers `own` is given or gives.
+/// The policy in a file.
+#[derive(Debug)]
+pub(super) struct Own<'a> {
+    /// Names of its tensors.
+    pub(super) used: &'a HashSet<String>,
+    /// Modules of the statistics among them.
+    pub(super) statistics: &'a HashSet<String>,
+    /// Modules that are known to be no part of it.
+    pub(super) beside: &'a [String],
+    /// Its layers, in their order.
+    pub(super) layers: &'a [&'a str],
+    /// Flags that state what lies between its layers and behind them, each with a blank before it.
+    pub(super) flags: &'a str,
+}
+
+/// Numbers or an object beside the policy.
+#[derive(Clone, Copy)]
+struct Rest<'a> {
+    name: &'a str,
+    amount: Amount,
+    /// What would have made it.
+    maker: Option<&'a str>,
+}
+
+/// What of a file is no tensor of the policy: tensors, plain numbers, and objects that nobody made.
+fn rest<'a>(source: &'a Source<'_>, own: &Own<'_>) -> Vec<Rest<'a>> {
+    let tensors = source.tensors.iter().filter(|tensor| !own.used.contains(&tensor.name));
+    let tensors = tensors.filter(|tensor| !is_of_statistics(tensor, own.statistics));
+    let tensors =
+        tensors.map(|tensor| Rest { name: &tensor.name, amount: tensor.amount(), maker: None });
+    let plain = source.plain.iter();
+    let plain = plain.map(|plain| Rest { name: &plain.name, amount: plain.amount, maker: None });
+    let unmade = source.unmade.iter().filter(|object| !is_inert(&object.maker));
+    let unmade = unmade.map(|object| Rest {
+        name: &object.name,
+        amount: Amount::Many,
+        maker: Some(&object.maker),
+    });
+    tensors.chain(plain).chain(unmade).collect()
+}
+
+/// Refuses what is not the policy's `own`, lies in nothing that is known to be beside it, and may act on what its
+/// network is given or gives.
 ///
 /// # Errors
 /// The refusal, which names them, and says how the network is had without them.
-pub(super) fn refuse(
-    source: &Source<'_>,
-    used: &HashSet<String>,
-    beside: &[String],
-    own: &[&str],
-) -> Result<(), String> {
-    let modules: HashSet<&str> = used.iter().map(|name| split(name).0).collect();
-    let rest = source.tensors.iter().filter(|tensor| !used.contains(&tensor.name));
-    let rest = rest.filter(|tensor| !is_of_statistics(tensor, &modules));
-    let rest = rest.map(|tensor| tensor.name.as_str());
-    let lies_beside = |name: &&str| beside.iter().any(|module| starts_with(name, module));
-    let rest = rest.chain(source.plain.iter().map(String::as_str));
-    let rest: Vec<&str> = rest.filter(|name| !lies_beside(name)).collect();
+pub(super) fn refuse(source: &Source<'_>, own: &Own<'_>) -> Result<(), String> {
     let all = layers::names(&layers::dense(source));
-    let known = Known { all: &all, own };
-    let of = |wanted: Bearing| -> Vec<&str> {
-        rest.iter().copied().filter(|name| known.bearing(name) == wanted).collect()
+    let known = Known { all: &all, own: own.layers };
+    let mut rest = rest(source, own);
+    rest.retain(|rest| !own.beside.iter().any(|module| lies_beside(rest.name, module, &known)));
+    let of = |wanted: Bearing| -> Vec<Rest<'_>> {
+        let is = |rest: &&Rest<'_>| known.bearing(rest.name, rest.amount) == wanted;
+        rest.iter().filter(is).copied().collect()
     };
-    let remedy = remedy(own);
     let (memory, unknown) = (of(Bearing::Memory), of(Bearing::Unknown));
-    let tensors = unknown.iter().filter_map(|name| source.tensor(name));
+    let remedy = remedy(source, &known, own.flags);
+    let tensors = unknown.iter().filter_map(|rest| source.tensor(rest.name));
     let norm = tensors.filter_map(|tensor| norms::refusal(source, tensor)).next();
     let norm = norm.map_or(String::new(), |norm| format!(". {norm}"));
-    match (memory.is_empty(), unknown.is_empty()) {
-        (false, _) => Err(format!(
+    if !memory.is_empty() {
+        return Err(format!(
             "recurrent layers: {}; a network with a memory is no dense one. To import the dense layers alone, \
              which are another policy: {remedy}",
             listed(&memory)
-        )),
-        (_, false) if unknown.iter().any(|name| is_parametrized(name)) => {
-            let name = unknown.iter().find(|name| is_parametrized(name));
-            Err(layers::parametrized(name.copied().unwrap_or_default()))
-        }
-        (_, false) => Err(format!(
+        ));
+    }
+    if let Some(rest) = unknown.iter().find(|rest| is_parametrized(rest.name)) {
+        return Err(layers::parametrized(rest.name));
+    }
+    match unknown.is_empty() {
+        true => Ok(()),
+        false => Err(format!(
             "{} may act on what the network is given or gives, and would be lost; to import it without: {remedy}; an ONNX \
              export of the whole policy keeps it{norm}",
             listed(&unknown)
         )),
-        _ => Ok(()),
     }
 }
 
-/// How the layers `own` are had alone.
-fn remedy(own: &[&str]) -> String {
-    let module = dense::module(own.first().copied().unwrap_or_default());
-    match module {
-        "" => format!("--network {}", own.join(",")),
-        module => format!("--network {module}"),
+/// Whether `name` lies in a module beside the policy; in an item of a tuple, if that has layers of its own.
+fn lies_beside(name: &str, module: &str, known: &Known<'_>) -> bool {
+    let is_item = split(module).1.parse::<u32>().is_ok();
+    starts_with(name, module) && (!is_item || known.is_apart(module))
+}
+
+/// How the policy's layers are had alone: by their modules, where nothing else that matters lies in these.
+fn remedy(source: &Source<'_>, known: &Known<'_>, flags: &str) -> String {
+    let dense = layers::dense(source);
+    let parts = layers::parts(&dense);
+    let is_other = |tensor: &Tensor| {
+        let bearing = known.bearing(&tensor.name, tensor.amount());
+        !parts.contains(tensor.name.as_str()) && bearing != Bearing::None
+    };
+    let mut networks: Vec<&str> = Vec::new();
+    for group in known.own.chunk_by(|a, b| dense::module(a) == dense::module(b)) {
+        let module = dense::module(group[0]);
+        let mut layers = known.all.iter().filter(|name| starts_with(name, module));
+        let mut tensors = source.tensors.iter().filter(|tensor| starts_with(&tensor.name, module));
+        let is_whole = layers.all(|layer| group.contains(layer));
+        let is_pure = !tensors.any(is_other);
+        match !module.is_empty() && is_whole && is_pure {
+            true => networks.push(module),
+            false => networks.extend(group),
+        }
     }
+    format!("--network {}{flags}", networks.join(","))
 }
 
 /// Whether a tensor lies in the module of statistics that are used: their squares and counts.
-fn is_of_statistics(tensor: &Tensor, modules: &HashSet<&str>) -> bool {
+fn is_of_statistics(tensor: &Tensor, modules: &HashSet<String>) -> bool {
     let (module, key) = split(&tensor.name);
     let counts =
         ["_sumsq", "_var", "_count", "count", "summed_variance", "_mean", "_std", "std", "var"];
@@ -89,9 +142,13 @@ fn is_of_statistics(tensor: &Tensor, modules: &HashSet<&str>) -> bool {
 }
 
 /// The first names, and how many more there are.
-fn listed(names: &[&str]) -> String {
-    let first: Vec<String> = names.iter().take(LISTED).map(|name| format!("`{name}`")).collect();
-    let more = match names.len() - first.len() {
+fn listed(rest: &[Rest<'_>]) -> String {
+    let shown = |rest: &Rest<'_>| match rest.maker {
+        Some(maker) => format!("`{}` (an object of `{maker}`, which was not made)", rest.name),
+        None => format!("`{}`", rest.name),
+    };
+    let first: Vec<String> = rest.iter().take(LISTED).map(shown).collect();
+    let more = match rest.len() - first.len() {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
@@ -108,6 +165,7 @@ pub(super) fn left_out(source: &Source<'_>, used: &HashSet<String>) -> Vec<Strin
         source.tensors.iter().map(|tensor| &tensor.name).filter(|name| !used.contains(*name));
     let mut rest: Vec<&String> = rest.collect();
     rest.sort_by_key(|name| of_layers.contains(name.as_str()));
-    let plain = source.plain.iter().chain(&source.said).cloned();
+    let said = source.said.iter().map(|said| said.name.clone());
+    let plain = source.plain.iter().map(|plain| plain.name.clone()).chain(said);
     unmade.chain(plain).chain(rest.into_iter().cloned()).collect()
 }

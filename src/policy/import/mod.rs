@@ -38,6 +38,7 @@ mod parts;
 mod pickle;
 mod polar;
 mod request;
+mod said;
 mod sb3;
 mod script;
 mod source;

@@ -19,7 +19,7 @@ pub(super) fn refusal(source: &Source<'_>, tensor: &Tensor) -> Option<String> {
     Some(format!(
         "`{module}` is {what} (`{}` of shape {:?}), and no dense layer; the file does not say whether it stands before or \
          behind an activation. An ONNX export keeps it where it is: torch.onnx.export(policy, torch.zeros(1, INPUTS), \
-         'policy.onnx')",
+         'policy.onnx', external_data=False)",
         tensor.name, tensor.shape
     ))
 }

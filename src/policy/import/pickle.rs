@@ -204,7 +204,7 @@ impl<'a> Machine<'a> {
             b'K' => Value::Int(self.unsigned::<1>()?.into()),
             b'M' => Value::Int(self.unsigned::<2>()?.into()),
             b'J' => Value::Int(i32::from_le_bytes(self.array()?).into()),
-            _ => long(self.counted(1)?),
+            _ => Value::long(self.counted(1)?),
         };
         self.push(value)
     }
@@ -264,7 +264,7 @@ impl<'a> Machine<'a> {
     fn recall<const N: usize>(&mut self) -> Result<(), String> {
         let number = self.unsigned::<N>()?;
         let value = *self.memo.get(&number).ok_or("a value that was never remembered")?;
-        self.push(value)
+        self.push(self.pickle.recalled(value))
     }
 
     /// A dictionary, a list, a set or a tuple.
@@ -383,18 +383,5 @@ impl<'a> Machine<'a> {
             }
             _ => Err("attributes of something that has none".to_owned()),
         }
-    }
-}
-
-/// An integer, least byte first, in two's complement.
-fn long<'a>(bytes: &[u8]) -> Value<'a> {
-    let negative = bytes.last().is_some_and(|&byte| byte >= 0x80);
-    let mut word = [if negative { 0xff } else { 0 }; 8];
-    match word.get_mut(..bytes.len()) {
-        Some(low) => {
-            low.copy_from_slice(bytes);
-            Value::Int(i64::from_le_bytes(word))
-        }
-        None => Value::Other,
     }
 }

@@ -8,6 +8,7 @@ use super::archive::Entries;
 use super::format::OWN_ARRAYS;
 use super::map::Map;
 use super::request::Hints;
+use super::said;
 use crate::policy::Activation;
 
 /// Longest `data`, bytes.
@@ -75,8 +76,10 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
         Ok(known) => hints.activation = known,
         Err(unsaid) => hints.unsaid = Some(unsaid),
     }
+    hints.is_said = true;
     hints.clip = number(&kwargs["clip_mean"])?;
     hints.refusal = own_classes(&data);
+    observations(&data, &mut hints);
     // With exploration that depends on the state, PPO may bound its actions as SAC does.
     let squashed =
         kwargs["squash_output"] == Value::Bool(true) || kwargs["squash_output"] == "True";
@@ -95,9 +98,9 @@ fn number(value: &Value) -> Result<Option<f64>, String> {
         Value::String(text) => text.trim().parse().ok(),
         other => other.as_f64(),
     };
-    let positive = number.filter(|number| number.is_finite() && *number > 0.0);
-    let problem = || format!("`data` has the clip_mean {value}, which is no number above 0");
-    positive.map(Some).ok_or_else(problem)
+    let finite = number.filter(|number| number.is_finite());
+    let problem = || format!("`data` has the clip_mean {value}, which is no finite number");
+    finite.map(Some).ok_or_else(problem)
 }
 
 /// The refusal of a model with a class of its own, which may do anything with observations and actions.
@@ -123,30 +126,59 @@ fn own_classes(data: &Value) -> Option<String> {
 /// The activation between the layers, where the model was given one.
 fn activation(kwargs: &Value) -> Result<Option<Activation>, String> {
     let Some(class) = kwargs["activation_fn"].as_str() else { return Ok(None) };
-    let name = class.trim_end_matches("'>").rsplit('.').next().unwrap_or_default();
-    Ok(Some(match name {
-        "ReLU" => Activation::Relu,
-        "Tanh" => Activation::Tanh,
-        "ELU" => Activation::Elu { alpha: 1.0 },
-        "SELU" => Activation::Selu,
-        "CELU" => Activation::Celu { alpha: 1.0 },
-        "GELU" => Activation::Gelu,
-        "SiLU" => Activation::Silu,
-        "Mish" => Activation::Mish,
-        "LeakyReLU" => Activation::LeakyRelu { slope: 0.01 },
-        "Sigmoid" => Activation::Sigmoid,
-        "Softplus" => Activation::Softplus { beta: 1.0 },
-        "Softsign" => Activation::Softsign,
-        "Hardtanh" => Activation::Hardtanh { low: -1.0, high: 1.0 },
-        "ReLU6" => Activation::Relu6,
-        "Identity" => Activation::Identity,
-        _ => {
-            return Err(format!(
-                "`data` has the activation `{class}`, which is none that is known: --activation states which it is, one of {}",
-                Activation::words()
+    let problem = || {
+        format!(
+            "`data` has the activation `{class}`, which is none that is known: --activation states which it is, one of {}",
+            Activation::words()
+        )
+    };
+    said::activation(class).map(Some).ok_or_else(problem)
+}
+
+/// What the model does with observations before its layers: images are divided, choices are written out, and parts joined.
+fn observations(data: &Value, hints: &mut Hints) {
+    let space = &data["observation_space"];
+    let class = space[":type:"].as_str().unwrap_or_default();
+    let said = |key: &str| space[key].as_str().unwrap_or_default();
+    let kind = class.trim_end_matches("'>").rsplit('.').next().unwrap_or_default();
+    match kind {
+        "Box" if is_image(data) => {
+            hints.refusal = Some(format!(
+                "its observations are images of shape {} with numbers from 0 to 255, which predict() divides by 255, and \
+                 whose channels it may put first; export the model to ONNX with that, or --network imports the layers alone",
+                space["_shape"]
             ));
         }
-    }))
+        "Discrete" => hints.notes.push(format!(
+            "the observation is one of {} choices: the inputs are 1 at the chosen one and 0 at the others",
+            said("n")
+        )),
+        "MultiDiscrete" => hints.notes.push(format!(
+            "the observations are choices of {}: the inputs are, for one after the other, 1 at the chosen one and 0 at \
+             the others",
+            said("nvec")
+        )),
+        "Dict" => hints.notes.push(format!(
+            "the observations are a dictionary: the inputs are its parts one after the other, in the order of {}",
+            said("spaces")
+        )),
+        _ => {}
+    }
+}
+
+/// Whether the library divides the observations by 255: three dimensions of bytes that go from 0 to 255.
+fn is_image(data: &Value) -> bool {
+    let space = &data["observation_space"];
+    let all = |key: &str, wanted: &str| {
+        let text = space[key].as_str().unwrap_or_default();
+        let mut words = text.split(|c: char| !c.is_ascii_digit()).filter(|word| !word.is_empty());
+        words.all(|word| word == wanted)
+    };
+    space["dtype"].as_str().is_some_and(|dtype| dtype.contains("uint8"))
+        && space["_shape"].as_array().is_some_and(|shape| shape.len() == 3)
+        && data["policy_kwargs"]["normalize_images"] != Value::Bool(false)
+        && all("low", "0")
+        && all("high", "255")
 }
 
 /// What the model does with its output: within the limits of the actions, or scaled to them.

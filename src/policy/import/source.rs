@@ -9,10 +9,10 @@ use super::script::Script;
 pub(super) struct Source<'a> {
     /// Its tensors in the order of the file, which is that of the modules in a state dict.
     pub(super) tensors: Vec<Tensor>,
-    /// Names of plain numbers, and lists of them.
-    pub(super) plain: Vec<String>,
-    /// What else it says, with its names.
-    pub(super) said: Vec<String>,
+    /// Plain numbers, and lists of them.
+    pub(super) plain: Vec<Plain>,
+    /// What else it says.
+    pub(super) said: Vec<Said>,
     /// What in it is no tensor, and was not made.
     pub(super) unmade: Vec<Unmade>,
     /// What the code beside the tensors does, of a compiled module.
@@ -49,6 +49,40 @@ pub(super) enum Place {
     Entry(String),
     /// In the run of bytes of this number.
     Run(usize),
+}
+
+/// How many numbers lie under a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Amount {
+    /// At most one.
+    One,
+    /// More.
+    Many,
+}
+
+impl Amount {
+    /// So many numbers.
+    pub(super) fn of(count: usize) -> Self {
+        if count <= 1 { Self::One } else { Self::Many }
+    }
+}
+
+/// Numbers that are no tensor.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Plain {
+    /// The keys on the way to them, joined by dots.
+    pub(super) name: String,
+    /// How many there are.
+    pub(super) amount: Amount,
+}
+
+/// Words beside the tensors.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Said {
+    /// The keys on the way to them, joined by dots.
+    pub(super) name: String,
+    /// The words.
+    pub(super) text: String,
 }
 
 /// An object that a file would have had made by a program.
@@ -95,6 +129,11 @@ impl Tensor {
     pub(super) fn plain(name: String, shape: Vec<usize>, kind: Kind, run: usize) -> Self {
         let strides = (0..shape.len()).map(|i| shape[i + 1..].iter().product()).collect();
         Self { name, dict: 0, shape, strides, offset: 0, kind, place: Place::Run(run) }
+    }
+
+    /// How many numbers it has.
+    pub(super) fn amount(&self) -> Amount {
+        Amount::of(self.shape.iter().fold(1, |count, length| count.saturating_mul(*length)))
     }
 
     /// Its numbers in a storage of these bytes.

@@ -2,7 +2,7 @@
 
 use super::kind::Cast;
 use super::map::Map;
-use super::names::around;
+use super::names::{around, starts_with};
 use super::source::{Source, Tensor};
 
 /// How a library calls the statistics, and what it does with them.
@@ -100,8 +100,8 @@ pub(super) struct Normaliser {
     pub(super) words: String,
 }
 
-/// The normaliser of a file of the layout `layout` whose network takes `inputs` numbers, if the file has one that is
-/// that library's.
+/// The normaliser of a file of the layout `layout` whose network takes `inputs` numbers in the layer `first`, if the
+/// file has one that is that library's, and the network's own.
 ///
 /// # Errors
 /// A sentence about statistics of another size, or from which no map follows.
@@ -109,9 +109,10 @@ pub(super) fn find(
     source: &mut Source<'_>,
     layout: &str,
     inputs: usize,
+    first: &str,
 ) -> Result<Option<Normaliser>, String> {
     let mut own = KNOWN.iter().filter(|known| layout.starts_with(known.library));
-    let found = own.find_map(|known| Some((known, tensors(source, known)?)));
+    let found = own.find_map(|known| Some((known, tensors(source, known, first)?)));
     let Some((known, tensors)) = found else { return Ok(None) };
     let numbers: Result<Vec<Vec<f64>>, String> =
         tensors.iter().map(|tensor| source.numbers(tensor, Cast::ToF32)).collect();
@@ -153,13 +154,14 @@ impl Statistics {
     }
 }
 
-/// The tensors of these statistics: means, spreads, limits.
-fn tensors(source: &Source<'_>, known: &Statistics) -> Option<Vec<Tensor>> {
+/// The tensors of these statistics: means, spreads, limits. Those of the network that `first` is a layer of lie in a
+/// module around it.
+fn tensors(source: &Source<'_>, known: &Statistics, first: &str) -> Option<Vec<Tensor>> {
     let ends = |name: &str| {
-        source
-            .tensors
-            .iter()
-            .find(|tensor| around(&tensor.name, name).is_some_and(|(_, after)| after.is_empty()))
+        source.tensors.iter().find(|tensor| {
+            around(&tensor.name, name)
+                .is_some_and(|(before, after)| after.is_empty() && starts_with(first, before))
+        })
     };
     let (Spread::Deviation(spread, _) | Spread::Variance(spread, _)) = known.spread;
     let mut tensors = vec![ends(known.mean)?.clone(), ends(spread)?.clone()];

@@ -11,6 +11,8 @@ pub(super) enum Value<'a> {
     Text(&'a str),
     /// An integer of at most 64 bits.
     Int(i64),
+    /// A longer one.
+    Long,
     /// A float.
     Float,
     /// A truth value.
@@ -33,7 +35,7 @@ pub(super) enum Value<'a> {
     Tensor(usize),
     /// Number of an object of a class that is not known.
     Object(usize),
-    /// What no network is made of: None, a long integer.
+    /// What no network is made of: None.
     Other,
 }
 
@@ -90,6 +92,8 @@ pub(super) struct Object<'a> {
     pub(super) maker: Name<'a>,
     /// Its arguments, its attributes and what was put into it.
     pub(super) parts: Vec<Value<'a>>,
+    /// The array that it is, where its numbers came after it.
+    pub(super) array: Option<Value<'a>>,
 }
 
 /// A pickle that has been read.
@@ -113,4 +117,29 @@ pub(super) struct Pickle<'a> {
     pub(super) storages: HashMap<&'a str, Kind>,
     /// Objects that nobody made.
     pub(super) objects: Vec<Object<'a>>,
+}
+
+impl<'a> Pickle<'a> {
+    /// A value that was remembered, maybe before the numbers of the array that it is were there.
+    pub(super) fn recalled(&self, value: Value<'a>) -> Value<'a> {
+        match value {
+            Value::Object(number) => self.objects[number].array.unwrap_or(value),
+            _ => value,
+        }
+    }
+}
+
+impl Value<'_> {
+    /// An integer, least byte first, in two's complement.
+    pub(super) fn long(bytes: &[u8]) -> Self {
+        let negative = bytes.last().is_some_and(|&byte| byte >= 0x80);
+        let mut word = [if negative { 0xff } else { 0 }; 8];
+        match word.get_mut(..bytes.len()) {
+            Some(low) => {
+                low.copy_from_slice(bytes);
+                Self::Int(i64::from_le_bytes(word))
+            }
+            None => Self::Long,
+        }
+    }
 }

@@ -1,0 +1,79 @@
+//! What `data` in an archive of stable-baselines3 says beside the layers, and what a state dict of its leaves open.
+
+use std::io::{Cursor, Read, Write};
+
+use reachcast::policy::import::{Request, from_bytes};
+use serde_json::{Value, json};
+use zip::write::SimpleFileOptions;
+use zip::{ZipArchive, ZipWriter};
+
+use super::layouts::file;
+use super::{imported, path};
+
+/// The archive with another `data`.
+fn with_data(content: &[u8], change: &dyn Fn(&mut Value)) -> Vec<u8> {
+    let mut old = ZipArchive::new(Cursor::new(content)).unwrap();
+    let mut new = ZipWriter::new(Cursor::new(Vec::new()));
+    for index in 0..old.len() {
+        let mut entry = old.by_index(index).unwrap();
+        let name = entry.name().unwrap().into_owned();
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).unwrap();
+        if name == "data" {
+            let mut data = serde_json::from_slice(&bytes).unwrap();
+            change(&mut data);
+            bytes = serde_json::to_vec(&data).unwrap();
+        }
+        new.start_file(name, SimpleFileOptions::default()).unwrap();
+        new.write_all(&bytes).unwrap();
+    }
+    new.finish().unwrap().into_inner()
+}
+
+#[test]
+fn what_an_archive_says_of_observations_is_told() {
+    let sb3 = |change: &dyn Fn(&mut Value)| {
+        let content = std::fs::read(path("sb3_ppo.zip")).unwrap();
+        from_bytes("x.zip".as_ref(), &with_data(&content, change), &Request::default())
+    };
+    let space = |class: &str, key: &str, said: &str| {
+        let (class, said) = (format!("<class 'gymnasium.spaces.{class}'>"), said.to_owned());
+        sb3(&|data| data["observation_space"] = json!({ ":type:": class, key: said }))
+    };
+    for (class, key, said, words) in [
+        ("discrete.Discrete", "n", "4", "one of 4 choices"),
+        ("multi_discrete.MultiDiscrete", "nvec", "[3 1]", "choices of [3 1]"),
+        ("dict.Dict", "spaces", "{'b': Box(2,), 'a': Box(2,)}", "in the order of {'b': Box"),
+    ] {
+        let notes = space(class, key, said).unwrap().notes.join("; ");
+        assert!(notes.contains(words), "{notes}");
+    }
+    let image = |high: &str| {
+        sb3(&|data| {
+            data["observation_space"] = json!({ ":type:": "<class 'gymnasium.spaces.box.Box'>",
+                "dtype": "uint8", "_shape": [1, 2, 2], "low": "[[[0 0]\n [0 0]]]", "high": high });
+        })
+    };
+    let error = image("[[[255 255]\n [255 255]]]").unwrap_err().to_string();
+    assert!(
+        error.contains("images of shape [1,2,2]") && error.contains("divides by 255"),
+        "{error}"
+    );
+    assert!(image("[[[9 9]\n [9 9]]]").is_ok());
+    // The tensors alone say nothing of actions.
+    let layers = [("actor.mu.0", [8, 4]), ("actor.mu.2", [2, 8]), ("actor_target.mu.0", [8, 4])];
+    let content = file(&layers, &[]);
+    let found = from_bytes("x.safetensors".as_ref(), &content, &Request::default()).unwrap();
+    assert!(found.notes[0].contains("here within -1 and 1"), "{:?}", found.notes);
+    assert!(!imported("sb3_td3.zip", &Request::default()).notes.join(" ").contains("here within"));
+}
+
+#[test]
+fn a_clip_of_0_is_none() {
+    let content = std::fs::read(path("sb3_sac_sde.zip")).unwrap();
+    let content = with_data(&content, &|data| {
+        data["policy_kwargs"]["clip_mean"] = json!(0.0);
+    });
+    let found = from_bytes("x.zip".as_ref(), &content, &Request::default()).unwrap();
+    assert_eq!(found.network.hidden_words(), "relu");
+}
