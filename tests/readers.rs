@@ -15,7 +15,7 @@ use proptest::test_runner::{Config as Cases, RngSeed, TestRunner};
 use reachcast::config::{Config, Overrides};
 use reachcast::files::{StateReader, npy_bytes, npz_bytes, read_npz};
 use reachcast::policy::Mlp;
-use reachcast::policy::import::{self, Request};
+use reachcast::policy::import;
 use reachcast::race::log::{RaceLog, StepLog, arrays, races};
 use reachcast::race::record::RaceRecord;
 use reachcast::race::sweep::record::{PointResult, SweepRecord};
@@ -260,7 +260,7 @@ fn zipped(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
 
 #[test]
 fn checkpoints() {
-    let import = |path: &Path| said(import::read(path, &Request::default()));
+    let import = |path: &Path| said(import::read(path, &checkpoint::stated()));
     holds("damaged.pth", &[checkpoint::bytes("sequential.pth")], &import);
     let graphs = ["relu.onnx", "silu.onnx", "products.onnx"].map(checkpoint::bytes);
     holds("damaged.onnx", &graphs, &import);
@@ -273,7 +273,7 @@ fn pickles_within_checkpoints() {
         let inner = path.with_extension("pth");
         let content = checkpoint::with_pickle("sequential.pth", &std::fs::read(path).unwrap());
         std::fs::write(&inner, content).unwrap();
-        let said = said(import::read(&inner, &Request::default()));
+        let said = said(import::read(&inner, &checkpoint::stated()));
         std::fs::remove_file(&inner).unwrap();
         said.map_err(|message| message.replace(".pth", ".pkl"))
     };

@@ -122,10 +122,10 @@ mod tests {
     #[test]
     fn labels_have_the_digits_that_tell_them_apart() {
         assert_eq!(texts([0.0, 2.0], 4.0), ["0.0", "0.5", "1.0", "1.5", "2.0"]);
-        assert_eq!(texts([-1e-5, 1e-5], 2.0), ["−1e-5", "0", "1e-5"]);
-        assert_eq!(texts([0.0, 3e-5], 6.0)[1..3], ["5e-6", "1e-5"]);
+        assert_eq!(texts([-1e-5, 1e-5], 2.0), ["−1e−5", "0", "1e−5"]);
+        assert_eq!(texts([0.0, 3e-5], 6.0)[1..3], ["5e−6", "1e−5"]);
         assert_eq!(texts([1e6, 2e6], 4.0)[..2], ["1e6", "1.5e6"]);
-        assert_eq!(texts([0.0, 4e-14], 2.0), ["0", "2e-14", "4e-14"]);
+        assert_eq!(texts([0.0, 4e-14], 2.0), ["0", "2e−14", "4e−14"]);
     }
 
     /// Of whatever span, an axis has two ticks, and labels that do not touch.
