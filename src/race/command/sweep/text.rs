@@ -35,7 +35,9 @@ fn legend(record: &SweepRecord) -> &'static str {
         None => {
             "N: pairs of the deviation bound; certified share: interval of the certified set's share of\n\
              the box; risk: most that a perturbed rollout from there fails with; growth, radius: what came\n\
-             of the ball around a boundary point; holds: whether every claim that was asked for was obtained\n"
+             of the ball around a boundary point (exhausted: each radius had failures; no-boundary: no start that\n\
+             is certified lies next to one that is not); holds: whether every claim that was asked for was obtained,\n\
+             if not, certify of that point says which failed\n"
         }
     }
 }
