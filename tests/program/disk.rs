@@ -90,7 +90,7 @@ fn all(certificate: &Path) -> Vec<Work> {
             false,
         ),
         work(
-            "policy import tests/fixtures/checkpoints/sequential.pth",
+            "policy import tests/fixtures/checkpoints/sequential.pth --activation relu",
             "--out",
             "policy.safetensors",
             false,

@@ -266,6 +266,7 @@ fn a_killed_sweep_goes_on() {
 
 #[test]
 fn a_killed_import_leaves_no_trace() {
-    let arguments = ["policy", "import", "tests/fixtures/checkpoints/sequential.pth"];
+    let file = "tests/fixtures/checkpoints/sequential.pth";
+    let arguments = ["policy", "import", file, "--activation", "relu"];
     survives(&Work { arguments: &arguments, out: "policy.safetensors" }, 4, 0.5);
 }

@@ -89,7 +89,7 @@ impl<'b> Walk<'_, 'b, '_> {
             Value::Dict(number) => self.entries(number, path),
             Value::List(number) => self.items(&pickle.lists[number], path),
             Value::Tuple(number) => self.items(&pickle.tuples[number], path),
-            Value::Object(number) if holds(&pickle.objects[number]) => {
+            Value::Object(number) if holds(&pickle.objects[number]) && self.is_plain(number) => {
                 let parts = pickle.objects[number].parts.iter();
                 let dicts = parts.filter(|part| matches!(part, Value::Dict(_)));
                 dicts.copied().try_for_each(|part| self.value(part, path))
@@ -128,6 +128,15 @@ impl<'b> Walk<'_, 'b, '_> {
     /// Adds words.
     fn say(&mut self, text: String, path: &[String]) {
         self.found.said.push(Said { name: path.join("."), text });
+    }
+
+    /// Whether all that an object is made of are its attributes.
+    fn is_plain(&self, object: usize) -> bool {
+        self.pickle.objects[object].parts.iter().all(|part| match part {
+            Value::Dict(_) | Value::Other => true,
+            Value::Tuple(number) => self.pickle.tuples[*number].is_empty(),
+            _ => false,
+        })
     }
 
     /// Adds what is in a dictionary.

@@ -27,8 +27,10 @@ impl Map {
     }
 
     /// `clamp(x, low, high)`.
-    pub(super) fn clamp(low: Vec<f64>, high: Vec<f64>) -> Self {
+    pub(super) fn clamp(mut low: Vec<f64>, high: Vec<f64>) -> Self {
         let width = low.len();
+        // The upper limit is the last word where they are the wrong way around.
+        low.iter_mut().zip(&high).for_each(|(low, high)| *low = low.min(*high));
         Self { scale: vec![1.0; width], shift: vec![0.0; width], low, high }
     }
 

@@ -372,7 +372,9 @@ impl<'a> Machine<'a> {
         let state = self.pop()?;
         let top = self.stack.last_mut().ok_or(EMPTY)?;
         match *top {
-            Value::Dict(_) | Value::Tensor(_) | Value::List(_) => Ok(()),
+            Value::Dict(_) | Value::Tensor(_) | Value::List(_) => {
+                self.pickle.refuse_attributes(state)
+            }
             Value::Type(kind) => calls::order(&mut self.pickle, kind, state),
             Value::Object(number) => {
                 match calls::filled(&mut self.pickle, number, state)? {

@@ -132,7 +132,11 @@ fn activation(kwargs: &Value) -> Result<Option<Activation>, String> {
             Activation::words()
         )
     };
-    said::activation(class).map(Some).ok_or_else(problem)
+    // A class of the user's own may be called as one of PyTorch is.
+    let module =
+        class.trim_start_matches("<class '").rsplit_once('.').map_or("", |(module, _)| module);
+    let own = class.starts_with("<class '") && !module.starts_with("torch.nn");
+    said::activation(class).filter(|_| !own).map(Some).ok_or_else(problem)
 }
 
 /// What the model does with observations before its layers: images are divided, choices are written out, and parts joined.

@@ -143,3 +143,23 @@ impl Value<'_> {
         }
     }
 }
+
+impl Pickle<'_> {
+    /// Refuses attributes of a tensor or a container, but for those by which PyTorch notes versions.
+    ///
+    /// # Errors
+    /// The refusal, with the name of the first.
+    pub(super) fn refuse_attributes(&self, state: Value<'_>) -> Result<(), String> {
+        let Value::Dict(state) = state else { return Ok(()) };
+        let key = self.dicts[state].iter().find_map(|(key, _)| match key {
+            Value::Text("_metadata") => None,
+            Value::Text(key) => Some(*key),
+            _ => Some("?"),
+        });
+        key.map_or(Ok(()), |key| {
+            Err(format!(
+                "a tensor or dictionary with an attribute `{key}` of its own, which would be lost; save it under a key"
+            ))
+        })
+    }
+}
