@@ -3,7 +3,7 @@
 use super::contour::Field;
 use super::figure::{Figure, Swatch};
 use super::plan_runs::{PlanPage, drawn, shown};
-use super::plot::{Labels, Plot, Proportions};
+use super::plot::{Plot, Proportions};
 use super::span::Span;
 use super::tracks::{self, Run, Scene, Track};
 use crate::model::Form;
@@ -165,12 +165,6 @@ impl<'a> Picture<'a> {
         if let Some(ground) = ground {
             ground.draw(&mut plot);
         }
-        tracks::draw_shapes(&mut plot, scene.shapes());
-        scene.draw_paths(&mut plot, tracks);
-        tracks::draw_bodies(&mut plot, tracks);
-        scene.draw_marks(&mut plot, tracks);
-        let [x, y] = [0, 1].map(|axis| tracks::label(tracks, axis));
-        let labels = Labels { x: &x, y: &y, whole: false };
-        Ok(plot.finish(&labels, &format!("Paths of the runs: {y} against {x}")))
+        Ok(scene.finish(plot, tracks, |[x, y]| format!("Paths of the runs: {y} against {x}")))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::figure::{Swatch, cross, dot};
 use super::places::{point, same_unit, unit_of, with_unit};
-use super::plot::Plot;
+use super::plot::{Labels, Plot};
 use super::span::Span;
 use super::text::{ordinary, shorten};
 use crate::model::{Outline, Shape, ShapeKind};
@@ -169,8 +169,23 @@ impl Scene<'_> {
         named.chain(good).chain(bad).collect()
     }
 
+    /// The picture of shapes, paths, bodies and marks over what `plot` has so far; `describe` is told its labels.
+    pub(super) fn finish(
+        &self,
+        mut plot: Plot,
+        tracks: &[Track],
+        describe: impl FnOnce([&str; 2]) -> String,
+    ) -> String {
+        draw_shapes(&mut plot, self.shapes());
+        self.draw_paths(&mut plot, tracks);
+        draw_bodies(&mut plot, tracks);
+        self.draw_marks(&mut plot, tracks);
+        let [x, y] = [0, 1].map(|axis| label(tracks, axis));
+        plot.finish(&Labels { x: &x, y: &y, whole: false }, &describe([&x, &y]))
+    }
+
     /// Draws the paths of all bodies.
-    pub(super) fn draw_paths(&self, plot: &mut Plot, tracks: &[Track]) {
+    fn draw_paths(&self, plot: &mut Plot, tracks: &[Track]) {
         for (number, run) in self.runs.iter().enumerate() {
             for (index, track) in tracks.iter().enumerate() {
                 let line = plot.line(track.paths.get(number).into_iter().flatten().copied());
@@ -180,7 +195,7 @@ impl Scene<'_> {
     }
 
     /// Marks where each body starts, and where the first one ends.
-    pub(super) fn draw_marks(&self, plot: &mut Plot, tracks: &[Track]) {
+    fn draw_marks(&self, plot: &mut Plot, tracks: &[Track]) {
         let drawable = |place: &&[f64; 2]| place.iter().all(|value| ordinary(*value));
         for (number, run) in self.runs.iter().enumerate() {
             for (index, track) in tracks.iter().enumerate() {
@@ -221,7 +236,7 @@ fn end(success: bool) -> String {
 }
 
 /// What the places of the bodies are called along an axis, with the unit where they share one.
-pub(super) fn label(tracks: &[Track], axis: usize) -> String {
+fn label(tracks: &[Track], axis: usize) -> String {
     let [first, others @ ..] = tracks else {
         return String::new();
     };
@@ -245,7 +260,7 @@ pub(super) fn label(tracks: &[Track], axis: usize) -> String {
 }
 
 /// Draws the shapes, under everything else.
-pub(super) fn draw_shapes(plot: &mut Plot, shapes: &[Shape]) {
+fn draw_shapes(plot: &mut Plot, shapes: &[Shape]) {
     for shape in shapes {
         let class = area(shape.kind);
         match shape.outline {
@@ -278,7 +293,7 @@ pub(super) fn shape_legend(shapes: &[Shape]) -> impl Iterator<Item = (Swatch, St
 
 /// Draws the bodies of the first rollout as large as they are, with the lines that join them, at its first
 /// and its last state.
-pub(super) fn draw_bodies(plot: &mut Plot, tracks: &[Track]) {
+fn draw_bodies(plot: &mut Plot, tracks: &[Track]) {
     let path = |track: &Track| track.paths.first().cloned().unwrap_or_default();
     let first: Vec<_> = tracks.iter().map(|track| path(track).first().copied()).collect();
     let last: Vec<_> = tracks.iter().map(|track| path(track).last().copied()).collect();

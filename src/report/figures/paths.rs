@@ -5,7 +5,7 @@ use super::plane::{GroundOf, slice_states};
 use crate::model::Form;
 use crate::report::figure::{Figure, Swatch};
 use crate::report::places::entry;
-use crate::report::plot::{Labels, Plot, Proportions};
+use crate::report::plot::{Plot, Proportions};
 use crate::report::slice::Grid;
 use crate::report::span::Span;
 use crate::report::text::{listed, shorten};
@@ -159,12 +159,7 @@ impl Picture<'_> {
         if let Some(ground) = ground {
             ground.draw(&mut plot);
         }
-        tracks::draw_shapes(&mut plot, scene.shapes());
-        scene.draw_paths(&mut plot, tracks);
-        tracks::draw_bodies(&mut plot, tracks);
-        scene.draw_marks(&mut plot, tracks);
-        let [x, y] = [0, 1].map(|axis| tracks::label(tracks, axis));
-        Ok(plot.finish(&Labels { x: &x, y: &y, whole: false }, &description))
+        Ok(scene.finish(plot, tracks, |_| description))
     }
 }
 
