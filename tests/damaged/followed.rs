@@ -186,8 +186,84 @@ fn numbers_far_from_zero_keep_their_digits() {
     assert!(far(&normal, &[one(4)], &[0, 1, 2, 3]) < 2e-6);
     let part = node_with("Gather x i -> p", &[attribute("axis", 1)]);
     let some = ["Sub p m -> a", "Div a d -> b", "Add b t -> c", "MatMul c I -> y"].map(node);
-    let nodes = [vec![part], some.to_vec()].concat();
+    let nodes = [vec![part.clone()], some.to_vec()].concat();
     assert!(far(&nodes, &[one(2), places("i", &[2], &[3, 0])], &[3, 0]) < 2e-6);
+    // Behind what cuts off, some of them twice in two ways, and with a small number added first.
+    let behind = |first: &[Vec<u8>]| {
+        let some = ["Sub q m -> a", "Div a d -> b", "Add b t -> c", "MatMul c I -> y"].map(node);
+        [first, &some].concat()
+    };
+    let limits = [tensor("low", &[], &[-1e3]), tensor("high", &[], &[2e6])];
+    let clip = [&limits[..], &[one(4)]].concat();
+    assert!(far(&behind(&[node("Clip x low high -> q")]), &clip, &[0, 1, 2, 3]) < 2e-6);
+    let chosen = |count: usize, all: &[i64]| [one(count), places("i", &[count as i64], all)];
+    let relu = [part.clone(), node("Relu p -> q")];
+    assert!(far(&behind(&relu), &chosen(3, &[3, 0, 2]), &[3, 0, 2]) < 2e-6);
+    let twice = [part, node("Identity p -> q")];
+    assert!(far(&behind(&twice), &chosen(3, &[3, 0, 3]), &[3, 0, 3]) < 2e-6);
+    let small = [&chosen(2, &[0, 0])[..], &[tensor("s", &[2], &[0.5, 0.25])]].concat();
+    let added = ["Add q s -> e", "Sub e s -> f", "Sub f m -> a", "Div a d -> b", "Add b t -> y"];
+    let nodes = [&twice[..], &added.map(node)].concat();
+    assert!(far(&nodes, &small, &[0, 0]) < 2e-6);
+}
+
+#[test]
+fn cuts_without_room_leave_a_number() {
+    let limits = [square(), tensor("low", &[], &[3.0]), tensor("high", &[], &[3.0])];
+    let nodes = [node("Clip x low high -> c"), layer("c", "y")];
+    is(|_| sums(&[3.0; 4]), &[0, 4], &nodes, &limits);
+    // The upper limit is the last word where they are the wrong way around, as in PyTorch and ONNX.
+    let turned = [square(), tensor("low", &[], &[3.0]), tensor("high", &[], &[1.0])];
+    is(|_| sums(&[1.0; 4]), &[0, 4], &nodes, &turned);
+}
+
+#[test]
+fn inputs_turned_around_and_put_together_go_into_the_layer_behind() {
+    let ends = |from: i64, to: i64, step: i64| {
+        let all = [("from", from), ("to", to), ("axes", 1), ("step", step)];
+        all.map(|(name, number)| places(name, &[1], &[number]))
+    };
+    let sliced = |from: i64, to: i64, step: i64, expected: &dyn Fn(&[f32]) -> Vec<f32>| {
+        let nodes = [
+            node("Slice x from to axes step -> p"),
+            node_with("Gather p all -> q", &[attribute("axis", 1)]),
+            layer("q", "y"),
+        ];
+        let all = places("all", &[4], &[0, 1, 0, 1]);
+        let tensors = [&ends(from, to, step)[..], &[square(), all]].concat();
+        is(|x| sums(&expected(x)), &[0, 4], &nodes, &tensors);
+    };
+    let pair = |x: &[f32], i: usize, j: usize| vec![x[i], x[j], x[i], x[j]];
+    sliced(-1, i64::MIN, -1, &|x| pair(x, 3, 2));
+    sliced(2, 0, -1, &|x| pair(x, 2, 1));
+    sliced(-1, -9, -2, &|x| pair(x, 3, 1));
+    sliced(0, i64::MAX, 2, &|x| pair(x, 0, 2));
+    sliced(-3, 4, 2, &|x| pair(x, 1, 3));
+    // A list of places in the first dimension.
+    let order = places("i", &[4, 1], &[2, 0, 3, 1]);
+    let nodes = ["Transpose x -> t", "GatherND t i -> p", "Transpose p -> q"].map(node);
+    let nodes = [&nodes[..], &[layer("q", "y")]].concat();
+    is(|x| sums(&[x[2], x[0], x[3], x[1]]), &[0, 4], &nodes, &[square(), order]);
+    let split = node_with("Split x parts -> a b", &[attribute("axis", 1)]);
+    let concat = || node_with("Concat b c -> p", &[attribute("axis", -1)]);
+    let parts = || [square(), places("parts", &[2], &[1, 3]), tensor("k", &[], &[-0.5])];
+    let nodes = [split.clone(), node("Identity a -> c"), concat(), layer("p", "y")];
+    is(|x| sums(&[x[1], x[2], x[3], x[0]]), &[0, 4], &nodes, &parts());
+    // Each with a map of its own, and behind a layer.
+    let nodes = [split, node("Mul a k -> m"), node("Relu m -> c"), concat(), layer("p", "y")];
+    let mapped = |x: &[f32]| sums(&[x[1], x[2], x[3], (-0.5 * x[0]).max(0.0)]);
+    is(mapped, &[0, 4], &nodes, &parts());
+    let split = node_with("Split s parts -> a b", &[attribute("axis", 1)]);
+    let nodes = [
+        layer("x", "s"),
+        split,
+        node("Mul a k -> m"),
+        node("Neg m -> c"),
+        concat(),
+        layer("p", "y"),
+    ];
+    let turned = |x: &[f32]| sums(&[x[1], x[2], x[3], 0.5 * x[0]]);
+    is(|x| turned(&sums(x)), &[0, 4], &nodes, &parts());
 }
 
 #[test]

@@ -168,7 +168,7 @@ fn parts() {
     let list = |name: &str, all: &[i64]| places(name, &[all.len() as i64], all);
     let slice = ["Slice s from to one steps -> y"];
     let ends = |from: i64, to: i64| vec![list("from", &[from]), list("to", &[to]), one()];
-    not(&["`Slice`", "not there"], &slice, &[ends(0, 4), vec![list("steps", &[2])]].concat());
+    not(&["`Slice`", "not there"], &slice, &[ends(0, 4), vec![list("steps", &[0])]].concat());
     not(&["`Slice`", "not there"], &["Slice s from to one -> y"], &ends(3, 3));
     let split = |lengths: &[i64]| {
         let split = node_with("Split s parts -> y z", &[attribute("axis", 1)]);
@@ -181,6 +181,30 @@ fn parts() {
         no(&["two parts"], &[split, node(next)], &[list("parts", &[2, 2])]);
     };
     halves("Add a b -> y");
+    let together = |words: &str, first: &str, more: &[Vec<u8>]| {
+        let split = node_with("Split s parts -> a b", &[attribute("axis", 1)]);
+        let concat = node_with("Concat c b -> y", &[attribute("axis", 1)]);
+        no(
+            &["`Concat`", words],
+            &[split, node(first), concat],
+            &[&[list("parts", &[2, 2])], more].concat(),
+        );
+    };
+    together("different functions", "Tanh a -> c", &[]);
+    together("different dimensions", "Unsqueeze a first -> c", &[list("first", &[2])]);
+    together("a constant", "Identity k -> c", &[tensor("k", &[1, 1], &[1.0])]);
+    let along = |axis: &[Vec<u8>], words: &str| {
+        no(&["`Concat`", words], &[node_with("Concat s s -> y", axis)], &[]);
+    };
+    along(&[attribute("axis", 0)], "counts inputs");
+    along(&[], "without an axis");
+    let nd = |attributes: &[Vec<u8>], places: Vec<u8>, words: &str| {
+        let nodes = [node("Transpose s -> t"), node_with("GatherND t i -> y", attributes)];
+        no(&["`GatherND`", words], &nodes, &[places]);
+    };
+    nd(&[], places("i", &[2], &[0, 1]), "one axis");
+    nd(&[attribute("batch_dims", 1)], places("i", &[2, 1], &[0, 1]), "one axis");
+    nd(&[], places("i", &[2, 1], &[0, 4]), "not there");
     let other = ["Slice s from to one -> a", "Softplus s -> p"];
     let picked = ["Greater a t -> g", "Where g a p -> y"];
     let twenty = tensor("t", &[], &[20.0]);

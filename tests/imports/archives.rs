@@ -2,13 +2,14 @@
 
 use std::io::{Cursor, Read, Write};
 
-use reachcast::policy::import::{Request, from_bytes};
+use reachcast::policy::Activation;
+use reachcast::policy::import::{Imported, Request, from_bytes, read};
 use serde_json::{Value, json};
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
 use super::layouts::file;
-use super::{imported, path};
+use super::{imported, named, path};
 
 /// The archive with another `data`.
 fn with_data(content: &[u8], change: &dyn Fn(&mut Value)) -> Vec<u8> {
@@ -76,4 +77,58 @@ fn a_clip_of_0_is_none() {
     });
     let found = from_bytes("x.zip".as_ref(), &content, &Request::default()).unwrap();
     assert_eq!(found.network.hidden_words(), "relu");
+}
+
+#[test]
+fn limits_of_actions_are_read_in_every_shape_or_their_lack_is_no_silence() {
+    let with = |name: &str, shape: Value, low: &str, high: &str| {
+        let content = std::fs::read(path(name)).unwrap();
+        let content = with_data(&content, &|data| {
+            let space = &mut data["action_space"];
+            (space["_shape"], space["low"], space["high"]) =
+                (shape.clone(), json!(low), json!(high));
+        });
+        from_bytes("x.zip".as_ref(), &content, &Request::default())
+    };
+    let notes = |found: reachcast::Result<Imported>| found.unwrap().notes.join("; ");
+    let rows = with("sb3_sac.zip", json!([2, 1]), "[[-3.]\n [-1.]]", "[[1.]\n [5.]]");
+    assert!(
+        notes(rows).contains("scaled to the limits of the actions, [-3.0, -1.0] to [1.0, 5.0]")
+    );
+    for [low, high] in [["[-1. ... -1.]", "[1. ... 1.]"], ["[-1.]", "[1.]"], ["-inf", "[inf inf]"]]
+    {
+        let error = with("sb3_sac.zip", json!([2]), low, high).unwrap_err().to_string();
+        assert!(error.contains("gives the output scaled to the limits"), "{error}");
+        assert!(error.contains("--network imports the layers alone"), "{error}");
+        let note = notes(with("sb3_ppo.zip", json!([2]), low, high));
+        assert!(note.contains("not in it: predict() gives the output kept within"), "{note}");
+    }
+}
+
+#[test]
+fn an_activation_of_ones_own_is_none_of_pytorch() {
+    let with = |class: &str| {
+        let content = std::fs::read(path("sb3_ppo.zip")).unwrap();
+        let content = with_data(&content, &|data| {
+            data["policy_kwargs"]["activation_fn"] = json!(class);
+        });
+        move |request: &Request| from_bytes("x.zip".as_ref(), &content, request)
+    };
+    let usual = with("<class 'torch.nn.modules.activation.ELU'>")(&Request::default());
+    assert_eq!(usual.unwrap().network.hidden_words(), "elu");
+    for class in ["<class 'mine.ELU'>", "<class '__main__.ReLU'>", "<class 'torch.nn.Unheard'>"] {
+        let error = with(class)(&Request::default()).unwrap_err().to_string();
+        assert!(error.contains(class) && error.contains("--activation states"), "{error}");
+        let stated = Request { activation: Some(Activation::Silu), ..Request::default() };
+        assert_eq!(with(class)(&stated).unwrap().network.hidden_words(), "silu");
+    }
+}
+
+#[test]
+fn a_part_of_an_archive_has_the_activations_of_no_whole() {
+    let error = read(&path("sb3_ppo.zip"), &named(&["action_net"])).unwrap_err().to_string();
+    assert!(error.contains("what follows its one layer") && error.contains("--output"), "{error}");
+    let output = Some(Activation::Identity);
+    let found = read(&path("sb3_ppo.zip"), &Request { output, ..named(&["action_net"]) });
+    assert_eq!(found.unwrap().layers, ["action_net"]);
 }

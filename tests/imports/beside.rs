@@ -101,6 +101,63 @@ fn objects_beside_a_policy_are_refused_by_name() {
 }
 
 #[test]
+fn what_objects_are_called_with_is_not_lost() {
+    // Statistics of Brax by name are read; those that it is called with, in a row or by name, are an object's.
+    const CLASS: &[u8] = b"cbrax.running_statistics\nRunningStatisticsState\n";
+    let statistics = |arguments: &[u8]| [CLASS, arguments].concat();
+    let mean = || array(&[4], 5);
+    let attributes = statistics(&[&b")\x81"[..], &dict(&[("mean", mean())]), b"b"].concat());
+    assert!(refusal("normalizer", attributes).contains("`normalizer.mean` may act on"));
+    let is_object = |value: Vec<u8>| {
+        let error = refusal("normalizer", value);
+        assert!(error.contains("`normalizer` (an object of `brax"), "{error}");
+    };
+    is_object(statistics(&[mean(), b"\x85R".to_vec()].concat()));
+    is_object(statistics(&[mean(), b"\x85\x81".to_vec()].concat()));
+    is_object(statistics(&[&b")R"[..], &mean(), b"\x85R"].concat()));
+    let by_name = [&b")"[..], &dict(&[("mean", mean())]), b"\x92"].concat();
+    assert!(refusal("normalizer", statistics(&by_name)).contains("`normalizer.mean` may act on"));
+    let dictionary = [&b"ccollections\nOrderedDict\n)"[..], &dict(&[("mean", mean())]), b"\x92"];
+    let content = pickle(array(&[2], 2), &[("normalizer", dictionary.concat())]);
+    let error = read(&content, &stated()).unwrap_err().to_string();
+    assert!(error.contains("named arguments of what takes none"), "{error}");
+}
+
+#[test]
+fn attributes_of_tensors_and_dictionaries_are_refused() {
+    let slots = |state: Vec<u8>| [&b"N"[..], &state, b"\x86"].concat();
+    let state = || dict(&[("scale", text("2"))]);
+    let built = |value: Vec<u8>, state: Vec<u8>| [value, state, b"b".to_vec()].concat();
+    for value in
+        [built(dict(&[]), state()), built(dict(&[]), slots(state())), built(b"]".to_vec(), state())]
+    {
+        let error = read(&pickle(array(&[2], 2), &[("more", value)]), &stated()).unwrap_err();
+        assert!(error.to_string().contains("an attribute `scale` of its own"), "{error}");
+    }
+    // Versions of modules, and none.
+    let versions = dict(&[("_metadata", dict(&[]))]);
+    assert!(left_out(&[("more", built(dict(&[]), versions))]).is_empty());
+    // As PyTorch writes them, of a tensor and of a parameter.
+    let inner = |name: &str| [b"ctorch._tensor\n", name.as_bytes()].concat();
+    let typed = |state: Vec<u8>| {
+        let parts = [
+            inner("_rebuild_from_type_v2\n"),
+            b"(ccollections\nOrderedDict\nctorch\nTensor\n)".to_vec(),
+        ];
+        [parts.concat(), state, b"tR".to_vec()].concat()
+    };
+    let parameter = |state: Vec<u8>| {
+        let name = b"ctorch._utils\n_rebuild_parameter_with_state\n(".to_vec();
+        [name, array(&[2], 7), b"\x88}".to_vec(), state, b"tR".to_vec()].concat()
+    };
+    for value in [typed(state()), typed(slots(state())), parameter(state())] {
+        let error = read(&pickle(array(&[2], 2), &[("epoch", value)]), &stated()).unwrap_err();
+        assert!(error.to_string().contains("an attribute `scale` of its own"), "{error}");
+    }
+    assert_eq!(left_out(&[("optimizer", parameter(b"}".to_vec()))]), ["optimizer"]);
+}
+
+#[test]
 fn plain_values_of_all_sorts_are_refused_or_named() {
     let long = [b"\x8a\x09", &[1; 9][..]].concat();
     let flags = b"](\x88\x89e".to_vec();
@@ -147,6 +204,11 @@ fn words_that_name_another_activation_are_refused() {
     assert!(error.contains("--output"), "{error}");
     assert!(is("output_activation", "Tanh", &half).is_ok());
     assert!(is("activation", "elu", &half).is_ok());
+    for key in ["hidden_act", "activation_fn", "act", "nonlinearity"] {
+        let error = is(key, "elu", &named(&["params"])).unwrap_err().to_string();
+        assert!(error.contains(&format!("`cfg.{key}` says `elu`")), "{error}");
+        assert!(is(key, "relu", &named(&["params"])).is_ok());
+    }
     let network = named(&["params"]);
     let error = is("activation", "elu", &network).unwrap_err().to_string();
     assert!(error.contains("says `elu`, and `relu` would be used"), "{error}");

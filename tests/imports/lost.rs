@@ -1,5 +1,6 @@
 //! What would be lost is refused, unless the layers are asked for by name, and then it is named.
 
+use reachcast::policy::Activation;
 use reachcast::policy::import::Request;
 
 use super::{imported, named, refusal};
@@ -21,7 +22,8 @@ fn heads_are_named() {
     refusal("heads.onnx", &named(&["policy"]), &["no output `policy`", "action, value"]);
     let found = imported("heads.onnx", &named(&["action"]));
     assert_eq!(found.left_out, ["v.weight", "v.bias", "value"]);
-    let body = imported("sb3_ppo.zip", &named(&["mlp_extractor.policy_net"]));
+    let body = Request { output: Some(Activation::Tanh), ..named(&["mlp_extractor.policy_net"]) };
+    let body = imported("sb3_ppo.zip", &Request { activation: body.output, ..body });
     assert!(body.left_out.contains(&"action_net.weight".to_owned()), "{:?}", body.left_out);
 }
 

@@ -198,6 +198,32 @@ fn classes_that_are_not_the_usual_ones_are_refused() {
 }
 
 #[test]
+fn what_is_left_out_at_random_is_refused() {
+    let named = |name: &str, train: &str, words: &[&str]| {
+        let content = bytes(name);
+        let error = read(&content, &Request::default()).map(|found| found.notes);
+        match words {
+            [] => assert!(error.unwrap().join(" ").contains("identity, identity"), "{train}"),
+            _ => {
+                let error = error.unwrap_err().to_string();
+                words.iter().for_each(|word| assert!(error.contains(word), "{train}: {error}"));
+            }
+        }
+    };
+    // Compiled by PyTorch with a Dropout and an Identity between two layers, before and after `eval()`.
+    let random = ["numbers are left out at random", "`1.training` is true", "module.eval()"];
+    named("dropout_train.pt", "compiled in training", &random);
+    named("dropout_eval.pt", "compiled for use", &[]);
+    named("identity_traced.pt", "traced", &[]);
+    // A flag of another name decides as `training` does.
+    let lines = "    training = self.always\n    a = torch.dropout((_0).forward(x, ), 0.5, training)\n    \
+                 return (_4).forward((_2).forward(a, ), )\n";
+    let own = forward(lines)
+        .replace("  __parameters__ = []\n", "  __parameters__ = []\n  always : bool\n");
+    does_more(&compiled(&own), "torch.dropout");
+}
+
+#[test]
 fn many_files_of_code_are_not_read() {
     let names: Vec<String> = (0..30_000).map(|i| format!("code/__torch__/m{i}.py")).collect();
     let files: Vec<(&str, &[u8])> = names.iter().map(|name| (name.as_str(), &b"a"[..])).collect();

@@ -31,13 +31,16 @@ pub(super) struct Layer {
     pub(super) has_bias: bool,
 }
 
-/// What the `forward` of the whole module applies, one after the other.
+/// Truth values of a module, by the keys on the way to them, joined by dots.
+pub(super) type Flags = HashMap<String, bool>;
+
+/// What the `forward` of the whole module applies, one after the other, if these are its flags.
 ///
 /// # Errors
 /// The first line or class that does something else.
-pub(super) fn steps(code: &Code<'_>) -> Result<Vec<Step>, String> {
+pub(super) fn steps(code: &Code<'_>, flags: &Flags) -> Result<Vec<Step>, String> {
     let part = Part { path: String::new(), class: code.root()?.to_owned() };
-    let mut walk = Walk { code, steps: Vec::new(), lines: 0, problem: None };
+    let mut walk = Walk { code, flags, steps: Vec::new(), lines: 0, problem: None };
     walk.call(&part, "forward", 0)?;
     Ok(walk.steps)
 }
@@ -47,6 +50,16 @@ pub(super) fn steps(code: &Code<'_>) -> Result<Vec<Step>, String> {
 struct Part {
     path: String,
     class: String,
+}
+
+impl Part {
+    /// The path of what it holds under `key`.
+    fn key(&self, key: &str) -> String {
+        match self.path.as_str() {
+            "" => key.to_owned(),
+            path => format!("{path}.{key}"),
+        }
+    }
 }
 
 /// What a name or expression stands for.
@@ -64,8 +77,8 @@ enum Value {
     Nothing,
     /// A function of PyTorch.
     Function(String),
-    /// A flag or number.
-    Setting,
+    /// The flag of this path.
+    Flag(String),
 }
 
 /// The names of a function that is followed.
@@ -77,6 +90,7 @@ struct Scope {
 /// A walk through the code.
 struct Walk<'c, 'a> {
     code: &'c Code<'a>,
+    flags: &'c Flags,
     steps: Vec<Step>,
     lines: usize,
     /// Why a part that was called is not followed.
@@ -169,13 +183,9 @@ impl<'c, 'a> Walk<'c, 'a> {
         Some(match (kind, key) {
             ("Tensor", "weight") => Value::Weight(part.path.clone()),
             ("Tensor" | "NoneType", "bias") => Value::Bias(part.path.clone(), kind == "Tensor"),
-            ("bool", _) => Value::Setting,
+            ("bool", _) => Value::Flag(part.key(key)),
             _ if kind.starts_with("__torch__.") => {
-                let path = match part.path.as_str() {
-                    "" => key.to_owned(),
-                    path => format!("{path}.{key}"),
-                };
-                Value::Part(Part { path, class: kind.to_owned() })
+                Value::Part(Part { path: part.key(key), class: kind.to_owned() })
             }
             _ => return None,
         })
@@ -193,7 +203,11 @@ impl<'c, 'a> Walk<'c, 'a> {
             && method.starts_with("forward")
         {
             let Value::Part(part) = self.value(base, scope, depth)? else { return None };
-            let &[argument] = arguments else { return None };
+            let argument = match arguments {
+                [] => return self.gives_nothing(&part, method).then_some(Value::Nothing),
+                &[argument] => argument,
+                _ => return None,
+            };
             self.stream(argument, scope, depth)?;
             let called = self.call(&part, method, depth);
             return called
@@ -235,6 +249,16 @@ impl<'c, 'a> Walk<'c, 'a> {
         }
     }
 
+    /// Whether a method takes nothing and gives nothing, as that of a traced `Identity` does.
+    fn gives_nothing(&self, part: &Part, method: &str) -> bool {
+        let class = self.code.classes.get(&part.class).filter(|class| class.other.is_none());
+        let function = class.and_then(|class| class.methods.get(method));
+        function.is_some_and(|function| {
+            function.parameters.len() == 1
+                && matches!(function.body.as_slice(), [line] if line.trim() == "return None")
+        })
+    }
+
     /// Follows an argument that has to be what has gone through all steps so far.
     fn stream(&mut self, argument: &str, scope: &mut Scope, depth: usize) -> Option<()> {
         matches!(self.value(argument, scope, depth)?, Value::Stream).then_some(())
@@ -256,8 +280,28 @@ impl<'c, 'a> Walk<'c, 'a> {
         Some(Value::Stream)
     }
 
+    /// What a setting is, of a flag its value.
+    fn setting<'s>(&mut self, setting: &'s str, scope: &Scope) -> &'s str {
+        let Some(Value::Flag(path)) = scope.values.get(setting) else { return setting };
+        match self.flags.get(path) {
+            Some(false) => "False",
+            Some(true) => {
+                let problem = || {
+                    format!(
+                        "numbers are left out at random, since `{path}` is true; module.eval() makes `training` false"
+                    )
+                };
+                self.problem.get_or_insert_with(problem);
+                "True"
+            }
+            None => setting,
+        }
+    }
+
     /// The activation that a function is.
-    fn activation(&self, callee: &str, settings: &[&str], scope: &Scope) -> Option<Activation> {
+    fn activation(&mut self, callee: &str, settings: &[&str], scope: &Scope) -> Option<Activation> {
+        let settings: Vec<&str> = settings.iter().map(|text| self.setting(text, scope)).collect();
+        let settings = settings.as_slice();
         if let Some(name) = callee.strip_prefix("torch.") {
             return activation(name, settings);
         }

@@ -145,13 +145,16 @@ pub(super) fn result<'a>(
         (
             "torch._utils",
             "_rebuild_parameter" | "_rebuild_parameter_with_state",
-            &[tensor @ Value::Tensor(_), ..],
-        ) => Ok(tensor),
+            &[tensor @ Value::Tensor(_), _, _, ref state @ ..],
+        ) => state.iter().try_for_each(|&s| pickle.refuse_attributes(s)).map(|()| tensor),
         (
             "torch._tensor",
             "_rebuild_from_type_v2",
-            &[Value::Name(inner), _, Value::Tuple(inside), ..],
-        ) if inner != function => result(pickle, inner, inside),
+            &[Value::Name(inner), _, Value::Tuple(inside), ref state @ ..],
+        ) if inner != function => {
+            state.iter().try_for_each(|&state| pickle.refuse_attributes(state))?;
+            result(pickle, inner, inside)
+        }
         ("_codecs", "encode", &[Value::Text(text), Value::Text("latin1" | "latin-1")]) => {
             latin(pickle, text)
         }

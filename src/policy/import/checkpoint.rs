@@ -30,7 +30,7 @@ pub(super) fn open(mut entries: Entries<'_>) -> Result<Source<'_>, String> {
                     state dict before it is compiled: torch.save(module.state_dict(), FILE)"
             .to_owned());
     }
-    let script = if compiled { Some(script::read(&mut entries)?) } else { None };
+    let script = if compiled { Some(script::read(&mut entries, &source.flags)?) } else { None };
     Ok(Source { entries: Some(entries), script, ..source })
 }
 

@@ -155,13 +155,16 @@ impl Choice {
 
     /// Refuses layers of which nobody says what lies between them: neither the file, nor a layout, nor the request.
     fn check_stated(&self, request: &Request, hints: &Hints) -> Result<(), String> {
-        if self.layout.is_some() || self.by_name {
+        // Of an archive that says what it was given, the rest is known to whoever names a part of it.
+        if self.layout.is_some() || (self.by_name && !hints.is_said) {
             return match &hints.unsaid {
                 Some(unsaid) if request.activation.is_none() => Err(unsaid.clone()),
                 _ => Ok(()),
             };
         }
-        self.refuse_doubled()?;
+        if !self.by_name {
+            self.refuse_doubled()?;
+        }
         let hidden = self.layers.len() > 1 && request.activation.or(hints.activation).is_none();
         let single = self.layers.len() == 1 && request.output.or(hints.output).is_none();
         let (flag, what) = match (hidden, single) {

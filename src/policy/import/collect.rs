@@ -109,6 +109,9 @@ impl<'b> Walk<'_, 'b, '_> {
                 Ok(())
             }
             _ => {
+                if let Value::Truth(flag) = value {
+                    self.found.flags.insert(path.join("."), flag);
+                }
                 match (amount(value), value) {
                     (Some(amount), _) => self.count(amount, path),
                     (_, Value::Text(text)) => self.say(text.to_owned(), path),

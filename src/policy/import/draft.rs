@@ -1,6 +1,7 @@
 //! A network as a list of steps in f64, and the one place where it becomes a policy.
 
-use super::linear::Linear;
+use super::front::{self, Moved, cut};
+use super::linear::{Chosen, Linear};
 use super::map::Map;
 use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
 
@@ -8,8 +9,6 @@ use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
 pub(super) const MOST_LAYERS: usize = 64;
 /// Most weights of a network of more layers, and of layers that are made for an operation alone.
 const MOST_WEIGHTS: usize = 1 << 24;
-/// Summand of an input from which on a sum of products loses more than a millionth.
-const FAR: f64 = 4.0;
 /// Binary digits of a summand that are kept of what is left of it around a center: what f64 rounds is far below.
 const KEPT: i32 = 40;
 /// Most numbers between two layers that a layer of its own is made for.
@@ -50,6 +49,8 @@ pub(super) struct Draft {
     as_is: bool,
     /// The activation of the hidden layers of a policy that has none.
     hidden: Option<Activation>,
+    /// Whether the first linear step does no more than choose some of the inputs and map them.
+    chooses: bool,
 }
 
 /// A layer in f64 with what follows it.
@@ -64,7 +65,7 @@ struct Stage {
 impl Draft {
     /// A network of `inputs` numbers, where that is known before its layers are.
     pub(super) fn of(inputs: Option<usize>) -> Self {
-        Self { inputs, steps: Vec::new(), as_is: false, hidden: None }
+        Self { inputs, ..Self::default() }
     }
 
     /// The same of a policy that was written out, whose layers and maps stay what they are.
@@ -78,16 +79,19 @@ impl Draft {
     /// A sentence about widths that do not fit.
     pub(super) fn push(&mut self, step: Step) -> Result<(), String> {
         self.fits(&step)?;
+        let step = self.at_front(step);
         let first = self.steps.len() == 1;
-        let selects =
-            matches!(self.steps.as_slice(), [Step::Linear(_)] | [Step::Map(_), Step::Linear(_)]);
+        let selects = self.is_front();
         match (self.steps.last_mut(), step) {
             (_, Step::Map(map)) if map.is_identity() => {}
             (_, Step::Activation(Activation::Identity)) => {}
             (Some(Step::Map(last)), Step::Map(map)) => *last = last.then(&map),
             (_, step) if self.as_is => self.steps.push(step),
-            (Some(Step::Linear(last)), Step::Linear(next)) => *last = last.then(&next)?,
-            (Some(Step::Linear(last)), Step::Map(map)) if selects && last.places().is_some() => {
+            (Some(Step::Linear(last)), Step::Linear(next)) => {
+                *last = last.then(&next)?;
+                self.chooses = false;
+            }
+            (Some(Step::Linear(_)), Step::Map(map)) if selects => {
                 return self.before_selection(&map);
             }
             (Some(Step::Linear(last)), Step::Map(map)) if map.is_affine() => last.scaled(&map)?,
@@ -109,11 +113,50 @@ impl Draft {
         }
     }
 
+    /// Whether nothing came so far but a map of the inputs and a part of them.
+    fn is_front(&self) -> bool {
+        match self.steps.as_slice() {
+            [] | [Step::Map(_)] => true,
+            [Step::Linear(last)] | [Step::Map(_), Step::Linear(last)] => {
+                self.chooses || last.is_choice()
+            }
+            _ => false,
+        }
+    }
+
+    /// The step, and one before it whose width is known only now, as maps where they cut off numbers that no layer
+    /// has taken: behind a layer of its own, a map of numbers far from 0 would lose their digits.
+    fn at_front(&mut self, step: Step) -> Step {
+        let Some(width) = self.width().filter(|_| !self.as_is) else { return step };
+        if let [Step::Activation(activation)] = self.steps.as_slice()
+            && let Some(map) = cut(*activation, width)
+        {
+            self.steps[0] = Step::Map(map);
+        }
+        match step {
+            Step::Activation(activation) if self.is_front() => {
+                cut(activation, width).map_or(step, Step::Map)
+            }
+            step => step,
+        }
+    }
+
     /// Puts a map behind a part of the inputs in front of it, where numbers far from 0 keep their digits.
     fn before_selection(&mut self, map: &Map) -> Result<(), String> {
-        let Some(Step::Linear(selection)) = self.steps.pop() else { return Ok(()) };
-        let places = selection.places().unwrap_or_default();
-        self.push(Step::Map(map.scattered(&places, selection.inputs)))?;
+        let Some(Step::Linear(mut selection)) = self.steps.pop() else { return Ok(()) };
+        let Chosen { places, map: own } = selection.chosen();
+        let Moved { front, rest } = front::moved(&own.then(map), &places, selection.inputs);
+        selection = Linear::selection(&places, selection.inputs);
+        self.chooses = true;
+        self.push(Step::Map(front))?;
+        match rest {
+            Some(rest) if rest.is_affine() => selection.scaled(&rest)?,
+            Some(rest) => {
+                self.steps.extend([Step::Linear(selection), Step::Map(rest)]);
+                return Ok(());
+            }
+            None => {}
+        }
         self.steps.push(Step::Linear(selection));
         Ok(())
     }
@@ -157,7 +200,10 @@ impl Draft {
         match layer.filter(|&layer| self.steps[layer + 1..].iter().all(each)) {
             Some(layer) => self.steps[layer..].iter_mut().for_each(|step| step.select(rows)),
             // The layer that comes next takes it in.
-            None => return self.push(Step::Linear(Linear::selection(rows, width))),
+            None => {
+                self.chooses |= self.is_front();
+                return self.push(Step::Linear(Linear::selection(rows, width)));
+            }
         }
         Ok(())
     }
@@ -183,17 +229,13 @@ impl Draft {
 
     /// Makes a clip behind the last activation a map of the output: it needs no layer of its own.
     fn end_clip(&mut self) {
-        let limits = match self.steps.as_slice() {
-            [.., Step::Activation(_), Step::Activation(Activation::Hardtanh { low, high })] => {
-                [*low, *high]
-            }
-            [.., Step::Activation(_), Step::Activation(Activation::Relu6)] => [0.0, 6.0],
+        let clip = match self.steps.as_slice() {
+            [.., Step::Activation(_), Step::Activation(last)] if *last != Activation::Relu => *last,
             _ => return,
         };
-        if let Some(width) = self.width() {
-            let [low, high] = limits.map(|limit| vec![f64::from(limit); width]);
+        if let Some(map) = self.width().and_then(|width| cut(clip, width)) {
             self.steps.pop();
-            self.steps.push(Step::Map(Map::clamp(low, high)));
+            self.steps.push(Step::Map(map));
         }
     }
 
@@ -315,7 +357,15 @@ fn rescale(map: &Map) -> Rescale {
     let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect();
     let Map { scale, shift, low, high } = map;
     let affine = Rescale::affine(narrow(scale), narrow(shift));
-    Rescale { low: narrow(low), high: narrow(high), ..affine }
+    let mut found = Rescale { low: narrow(low), high: narrow(high), ..affine };
+    for i in 0..found.scale.len() {
+        // Limits without room between them leave one number.
+        if found.low[i] == found.high[i] {
+            (found.scale[i], found.shift[i]) = (0.0, found.low[i]);
+            (found.low[i], found.high[i]) = (f32::NEG_INFINITY, f32::INFINITY);
+        }
+    }
+    found
 }
 
 /// The map of inputs in f32: where products and summands far above 1 nearly cancel, as those of observations far from 0
@@ -324,7 +374,7 @@ fn centered(map: &Map) -> Rescale {
     let mut plain = rescale(map);
     for (i, (&scale, &shift)) in map.scale.iter().zip(&map.shift).enumerate() {
         let center = (-shift / scale) as f32;
-        if shift.abs() > FAR && center.is_finite() {
+        if plain.scale[i] != 0.0 && shift.abs() > front::FAR && center.is_finite() {
             // A multiple of it comes out again where the map is written, read and put together anew.
             let unit = 2_f64.powi(shift.abs().log2().floor() as i32 - KEPT);
             let rest = ((scale * f64::from(center) + shift) / unit).round() * unit;

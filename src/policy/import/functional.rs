@@ -28,9 +28,7 @@ pub(super) fn activation(name: &str, settings: &[&str]) -> Option<Activation> {
             [0.0, 6.0] => Activation::Relu6,
             [low, high] => Activation::Hardtanh { low, high },
         },
-        ("dropout" | "alpha_dropout", [_, "training" | "False"]) | ("flatten", ["1"]) => {
-            Activation::Identity
-        }
+        ("dropout" | "alpha_dropout", [_, "False"]) | ("flatten", ["1"]) => Activation::Identity,
         _ => return None,
     };
     found.check().is_ok().then_some(found)

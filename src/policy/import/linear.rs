@@ -1,7 +1,5 @@
 //! Linear layers in f64: products of them, and maps folded into them.
 
-use std::collections::HashSet;
-
 use super::map::Map;
 
 /// Most weights of a product of layers, which is not bounded by the size of a file.
@@ -16,6 +14,14 @@ pub(super) struct Linear {
     pub(super) bias: Vec<f64>,
     /// Columns of `W`, at least one.
     pub(super) inputs: usize,
+}
+
+/// Some of the inputs, each mapped by itself.
+pub(super) struct Chosen {
+    /// Which of them.
+    pub(super) places: Vec<usize>,
+    /// Of each.
+    pub(super) map: Map,
 }
 
 impl Linear {
@@ -48,16 +54,21 @@ impl Linear {
         Self::new(weight, inputs)
     }
 
-    /// Where each output is one of the inputs as it is, and each input one output at most: these inputs.
-    pub(super) fn places(&self) -> Option<Vec<usize>> {
-        let place = |(row, &bias): (&[f64], &f64)| {
-            let mut others = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
-            let (place, &weight) = others.next()?;
-            (weight == 1.0 && bias == 0.0 && others.next().is_none()).then_some(place)
+    /// Whether each output is one of the inputs as it is.
+    pub(super) fn is_choice(&self) -> bool {
+        let is_one = |row: &[f64]| {
+            let mut others = row.iter().filter(|weight| **weight != 0.0);
+            others.next() == Some(&1.0) && others.next().is_none()
         };
-        let places = self.rows().zip(&self.bias).map(place).collect::<Option<Vec<usize>>>()?;
-        let distinct: HashSet<&usize> = places.iter().collect();
-        (distinct.len() == places.len()).then_some(places)
+        self.rows().all(is_one) && self.bias.iter().all(|&bias| bias == 0.0)
+    }
+
+    /// The inputs that a layer of one weight at most in each row takes, and what it does with them.
+    pub(super) fn chosen(&self) -> Chosen {
+        let place = |row: &[f64]| row.iter().position(|weight| *weight != 0.0).unwrap_or(0);
+        let places: Vec<usize> = self.rows().map(place).collect();
+        let scale = self.rows().zip(&places).map(|(row, &place)| row[place]).collect();
+        Chosen { map: Map::affine(scale, self.bias.clone()), places }
     }
 
     /// Rows of `W`.

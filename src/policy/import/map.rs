@@ -44,6 +44,17 @@ impl Map {
         Self { scale: each(scale), shift: each(shift), low: each(low), high: each(high) }
     }
 
+    /// The maps of several parts as that of all.
+    pub(super) fn joined(parts: &[Self]) -> Self {
+        let all = |of: fn(&Self) -> &[f64]| parts.iter().flat_map(of).copied().collect();
+        Self {
+            scale: all(|part| &part.scale),
+            shift: all(|part| &part.shift),
+            low: all(|part| &part.low),
+            high: all(|part| &part.high),
+        }
+    }
+
     /// The map of these of its numbers.
     pub(super) fn selected(&self, rows: &[usize]) -> Self {
         let some = |values: &[f64]| rows.iter().map(|&row| values[row]).collect();

@@ -5,6 +5,7 @@ use super::array::Array;
 use super::constants::FLOATS;
 use super::draft::Step;
 use super::elementwise::{Each, erf};
+use super::joined;
 use super::map::Map;
 use super::parts;
 use super::walk::{Number, Problem, Value, Walk, constant, optional};
@@ -13,7 +14,7 @@ use crate::policy::Activation;
 use crate::policy::onnx::Node;
 
 /// The operations that are followed.
-pub(super) const OPERATIONS: [&str; 47] = [
+pub(super) const OPERATIONS: [&str; 49] = [
     "Gemm",
     "MatMul",
     "Conv (over the whole input)",
@@ -59,6 +60,8 @@ pub(super) const OPERATIONS: [&str; 47] = [
     "Split",
     "Slice",
     "Gather",
+    "GatherND (of one dimension)",
+    "Concat (of parts of one value)",
     "Greater (of a constant, before Where)",
     "Where (of a softplus and its input)",
 ];
@@ -113,7 +116,8 @@ pub(super) fn apply(
         "Clip" => one(clip(walk, node, number, &rest)),
         "BatchNormalization" => one(batch_norm(walk, node, number, &rest)),
         "LayerNormalization" => one(layer_norm(walk, node, number, &rest)),
-        "Split" | "Slice" | "Gather" => parts::apply(walk, node, number, &rest),
+        "Concat" => one(joined::apply(walk, node, number, rest)),
+        "Split" | "Slice" | "Gather" | "GatherND" => parts::apply(walk, node, number, &rest),
         _ => one(unary(node, number)),
     }
 }
@@ -136,6 +140,9 @@ fn from_constant(
     let operation = node.operation.as_str();
     if matches!(operation, "Max" | "Min") {
         return extreme(walk, node, number, rest).map(|value| vec![value]);
+    }
+    if operation == "Concat" {
+        return Err("of a value and a constant".into());
     }
     if first > 0 {
         return Err("of a constant and a value, in this order".into());

@@ -1,4 +1,4 @@
-//! Parts of what a network gives: `Split`, `Slice` and `Gather`.
+//! Parts of what a network gives: `Split`, `Slice`, `Gather` and `GatherND`.
 
 use super::walk::{Number, Problem, Value, Walk, constant};
 use crate::policy::onnx::Node;
@@ -18,14 +18,7 @@ pub(super) fn apply(
 ) -> Result<Vec<Value>, Problem> {
     let axis = axis(node, &number, rest)?;
     number.form.along(axis)?;
-    let all = match &number.rows {
-        Some(rows) => rows.clone(),
-        None => {
-            let width = walk.draft.width().ok_or("of an input of unknown width")?;
-            few(width)?;
-            (0..width).collect()
-        }
-    };
+    let all = rows(walk, &number)?;
     let unknown = |value: &Option<Value>| match value {
         Some(Value::Constant(array)) => array.numbers.iter().any(|number| number.is_nan()),
         Some(_) => true,
@@ -43,9 +36,9 @@ pub(super) fn apply(
         "Slice" => {
             let steps = wholes(3, "steps").unwrap_or_default();
             let one = |all: Option<Vec<i64>>| all.filter(|all| all.len() == 1).map(|all| all[0]);
-            let ends = one(wholes(0, "starts")).zip(one(wholes(1, "ends")));
-            let ends = ends.filter(|_| steps.iter().all(|&step| step == 1));
-            ends.map(|(start, end)| vec![slice(&all, start, end)])
+            let ends = one(wholes(0, "starts")).zip(one(wholes(1, "ends"))).map(<[i64; 2]>::from);
+            let step = one(Some(steps)).unwrap_or(1);
+            ends.map(|ends| vec![slice(&all, ends, step)])
         }
         _ => {
             let picks = constant(rest, 0)?.wholes();
@@ -59,6 +52,8 @@ pub(super) fn apply(
     let parts = parts.ok_or("a part that is not there")?;
     let picked = match node.operation.as_str() {
         "Gather" => Some(constant(rest, 0)?.shape.clone()),
+        // Each index is a list of one.
+        "GatherND" => constant(rest, 0)?.shape.split_last().map(|(_, shape)| shape.to_vec()),
         _ => None,
     };
     let part = |rows: Vec<usize>| {
@@ -69,11 +64,28 @@ pub(super) fn apply(
     Ok(parts.into_iter().map(part).collect())
 }
 
+/// Which numbers of what the network gives a value has.
+///
+/// # Errors
+/// Those of an input of unknown width, or of more than [`MOST`] numbers.
+pub(super) fn rows(walk: &Walk, number: &Number) -> Result<Vec<usize>, Problem> {
+    if let Some(rows) = &number.rows {
+        return Ok(rows.clone());
+    }
+    let width = walk.draft.width().ok_or("of an input of unknown width")?;
+    few(width)?;
+    Ok((0..width).collect())
+}
+
 /// The dimension of which a part is taken.
 fn axis(node: &Node, number: &Number, rest: &[Option<Value>]) -> Result<usize, Problem> {
     let axis = match (node.operation.as_str(), rest.get(2)) {
         ("Slice", Some(Some(Value::Constant(axes)))) => one(&axes.wholes()),
         ("Slice", _) => node.integers("axes").and_then(one),
+        ("GatherND", _) => {
+            let lists = constant(rest, 0)?.shape.last() == Some(&1);
+            (lists && node.integer("batch_dims").unwrap_or(0) == 0).then_some(0)
+        }
         _ => Some(node.integer("axis").unwrap_or(0)),
     };
     Ok(number.form.axis(axis.ok_or("not of one axis")?)?)
@@ -85,7 +97,7 @@ fn one(all: &[i64]) -> Option<i64> {
 }
 
 /// Refuses a part of more than [`MOST`] numbers.
-fn few(count: usize) -> Result<(), Problem> {
+pub(super) fn few(count: usize) -> Result<(), Problem> {
     match count <= MOST {
         true => Ok(()),
         false => Err(format!("with a part of {count} numbers; at most {MOST} are taken").into()),
@@ -112,9 +124,16 @@ fn split(all: &[usize], lengths: Option<Vec<i64>>, count: usize) -> Option<Vec<V
     parts.filter(|_| rest.is_empty())
 }
 
-/// From `start` up to `end`, as far as there is something.
-fn slice(all: &[usize], start: i64, end: i64) -> Vec<usize> {
+/// From the first of `ends` up to the second, as far as there is something, by steps of either sign.
+fn slice(all: &[usize], [start, end]: [i64; 2], step: i64) -> Vec<usize> {
     let width = all.len() as i64;
-    let within = |i: i64| if i < 0 { i.saturating_add(width) } else { i }.clamp(0, width) as usize;
-    all.get(within(start)..within(end)).map_or(Vec::new(), <[usize]>::to_vec)
+    let from_start = |i: i64| if i < 0 { i.saturating_add(width) } else { i };
+    let (lowest, highest) = if step > 0 { (0, width) } else { (-1, width - 1) };
+    let [start, end] = [start, end].map(|i| from_start(i).clamp(lowest, highest));
+    let count = match step {
+        0 => 0,
+        _ => (end - start + step - step.signum()) / step,
+    };
+    let at = |k: i64| all.get(usize::try_from(start + k * step).ok()?).copied();
+    (0..count.max(0)).map_while(at).collect()
 }

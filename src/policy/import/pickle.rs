@@ -317,17 +317,18 @@ impl<'a> Machine<'a> {
 
     /// What a call of the name below the arguments would give, without a call.
     fn call(&mut self, code: u8) -> Result<(), String> {
-        if code == 0x92 {
-            // Arguments with names.
-            self.pop()?;
-        }
+        let named = if code == 0x92 { self.pop()? } else { Value::Other };
         let arguments = self.pop_tuple()?;
         let value = match self.pop()? {
             Value::Name(function) => calls::result(&mut self.pickle, function, arguments)?,
             // A bound method, or what else an object of an unknown class gives.
-            unknown @ Value::Object(_) => unknown,
+            unknown @ Value::Object(number) => {
+                self.pickle.objects[number].parts.push(Value::Tuple(arguments));
+                unknown
+            }
             _ => return Err("a call of something that has no name".to_owned()),
         };
+        self.pickle.add_named(value, named)?;
         self.push(value)
     }
 

@@ -11,6 +11,16 @@ const OTHERS: [(&str, Activation); 4] = [
     ("none", Activation::Identity),
     ("lrelu", Activation::LeakyRelu { slope: 0.01 }),
 ];
+/// What the keys of activations end in.
+const NAMES: [&str; 7] = [
+    "activation",
+    "activation_fn",
+    "activation_function",
+    "act",
+    "act_fn",
+    "nonlinearity",
+    "non_linearity",
+];
 /// What the keys of the last activation have in them.
 const LAST: [&str; 4] = ["out", "last", "final", "squash"];
 
@@ -53,7 +63,8 @@ pub(super) struct Used {
 pub(super) fn check(source: &Source<'_>, hidden: Used, last: Used) -> Result<(), String> {
     for Said { name, text } in &source.said {
         let (before, key) = name.rsplit_once('.').unwrap_or(("", name));
-        if !key.ends_with("activation") || before.split('.').any(judges) {
+        let names_one = NAMES.iter().any(|end| key == *end || key.ends_with(&format!("_{end}")));
+        if !names_one || before.split('.').any(judges) {
             continue;
         }
         let is_last = LAST.iter().any(|word| key.contains(word));

@@ -201,9 +201,16 @@ fn actions(space: &Value, squashed: bool, hints: &mut Hints) {
         "kept within the limits of the actions"
     };
     let Some([low, high]) = limits(space) else {
-        hints.notes.push(format!(
-            "not in it: predict() gives the output {what}, which `data` does not say in plain words"
-        ));
+        let unsaid =
+            format!("predict() gives the output {what}, which `data` does not say in plain words");
+        match squashed {
+            true => {
+                hints.refusal = Some(format!(
+                    "{unsaid}; --network imports the layers alone, whose output is not scaled"
+                ));
+            }
+            false => hints.notes.push(format!("not in it: {unsaid}")),
+        }
         return;
     };
     let map = match squashed {
@@ -220,14 +227,17 @@ fn actions(space: &Value, squashed: bool, hints: &mut Hints) {
     }
 }
 
-/// The limits of actions, where the texts of both are lists of finite numbers.
+/// The limits of actions, where the texts of both are finite numbers, as many as their shape says.
 fn limits(space: &Value) -> Option<[Vec<f64>; 2]> {
+    let lengths: Option<Vec<u64>> =
+        space["_shape"].as_array().map(|all| all.iter().filter_map(Value::as_u64).collect());
+    let count = lengths.map(|all| all.iter().product::<u64>());
     let numbers = |key: &str| -> Option<Vec<f64>> {
-        let text = space[key].as_str()?.trim();
-        let inside = text.strip_prefix('[').and_then(|text| text.strip_suffix(']')).unwrap_or(text);
-        let numbers: Option<Vec<f64>> =
-            inside.split_whitespace().map(|word| word.parse().ok()).collect();
-        numbers.filter(|numbers| !numbers.is_empty())
+        let words = space[key].as_str()?.split(|c: char| c.is_whitespace() || "[]".contains(c));
+        let words = words.filter(|word| !word.is_empty());
+        let numbers: Vec<f64> = words.map(|word| word.parse().ok()).collect::<Option<_>>()?;
+        let fits = count.is_none_or(|count| count == numbers.len() as u64);
+        Some(numbers).filter(|numbers| fits && !numbers.is_empty())
     };
     let [low, high] = [numbers("low")?, numbers("high")?];
     let ordered = low.len() == high.len() && low.iter().zip(&high).all(|(low, high)| low < high);

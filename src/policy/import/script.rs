@@ -1,7 +1,7 @@
 //! The code of a TorchScript module against the layers that are imported of it: what follows each of them, or what
 //! the code does besides.
 
-use super::applied::{self, Layer, Step};
+use super::applied::{self, Flags, Layer, Step};
 use super::archive::Entries;
 use super::classes::Code;
 use super::request::Request;
@@ -25,11 +25,11 @@ pub(super) struct Settled {
     pub(super) note: String,
 }
 
-/// The code in the archive of a compiled module.
+/// The code in the archive of a compiled module with these flags.
 ///
 /// # Errors
 /// A sentence about an entry that is damaged.
-pub(super) fn read(entries: &mut Entries<'_>) -> Result<Script, String> {
+pub(super) fn read(entries: &mut Entries<'_>, flags: &Flags) -> Result<Script, String> {
     let mut names = entries.within("code/");
     names.retain(|name| name.ends_with(".py"));
     if names.len() > MOST_FILES {
@@ -44,16 +44,16 @@ pub(super) fn read(entries: &mut Entries<'_>) -> Result<Script, String> {
             Err(_) => return Ok(Script(Err(format!("`{name}` is no text in UTF-8")))),
         }
     }
-    Ok(Script(steps(&texts)))
+    Ok(Script(steps(&texts, flags)))
 }
 
 /// What the code of these files applies.
-fn steps(texts: &[(String, String)]) -> Result<Vec<Step>, String> {
+fn steps(texts: &[(String, String)], flags: &Flags) -> Result<Vec<Step>, String> {
     let mut code = Code::default();
     for (name, text) in texts {
         code.add(name, text)?;
     }
-    applied::steps(&code)
+    applied::steps(&code, flags)
 }
 
 impl Script {

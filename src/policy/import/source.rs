@@ -1,5 +1,7 @@
 //! What a file holds: tensors with names, and where their numbers lie.
 
+use std::collections::HashMap;
+
 use super::archive::Entries;
 use super::kind::{Cast, FloatReader, Kind};
 use super::script::Script;
@@ -13,6 +15,8 @@ pub(super) struct Source<'a> {
     pub(super) plain: Vec<Plain>,
     /// What else it says.
     pub(super) said: Vec<Said>,
+    /// Truth values, by the keys on the way to them, joined by dots.
+    pub(super) flags: HashMap<String, bool>,
     /// What in it is no tensor, and was not made.
     pub(super) unmade: Vec<Unmade>,
     /// What the code beside the tensors does, of a compiled module.

@@ -144,22 +144,47 @@ impl Value<'_> {
     }
 }
 
-impl Pickle<'_> {
+impl<'a> Pickle<'a> {
+    /// Adds the arguments with names of the call that gives `value` to what it is made of.
+    ///
+    /// # Errors
+    /// A sentence about those of something whose arguments have none.
+    pub(super) fn add_named(&mut self, value: Value<'a>, named: Value<'a>) -> Result<(), String> {
+        match (value, named) {
+            (_, Value::Other) => Ok(()),
+            (_, Value::Dict(dict)) if self.dicts[dict].is_empty() => Ok(()),
+            (Value::Object(number), Value::Dict(_)) => {
+                self.objects[number].parts.push(named);
+                Ok(())
+            }
+            _ => Err("a call with named arguments of what takes none".to_owned()),
+        }
+    }
+
     /// Refuses attributes of a tensor or a container, but for those by which PyTorch notes versions.
     ///
     /// # Errors
     /// The refusal, with the name of the first.
     pub(super) fn refuse_attributes(&self, state: Value<'_>) -> Result<(), String> {
-        let Value::Dict(state) = state else { return Ok(()) };
-        let key = self.dicts[state].iter().find_map(|(key, _)| match key {
-            Value::Text("_metadata") => None,
-            Value::Text(key) => Some(*key),
-            _ => Some("?"),
-        });
+        let key = match state {
+            // One for attributes and one for slots.
+            Value::Tuple(both) => self.tuples[both].iter().find_map(|part| self.attribute(*part)),
+            state => self.attribute(state),
+        };
         key.map_or(Ok(()), |key| {
             Err(format!(
                 "a tensor or dictionary with an attribute `{key}` of its own, which would be lost; save it under a key"
             ))
+        })
+    }
+
+    /// The first attribute in a dictionary of them.
+    fn attribute(&self, state: Value<'_>) -> Option<&'a str> {
+        let Value::Dict(dict) = state else { return None };
+        self.dicts[dict].iter().find_map(|(key, _)| match key {
+            Value::Text("_metadata") => None,
+            Value::Text(key) => Some(*key),
+            _ => Some("?"),
         })
     }
 }
