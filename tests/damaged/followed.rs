@@ -156,11 +156,16 @@ fn parts_of_the_input_go_into_the_layer_behind() {
 fn far(nodes: &[Vec<u8>], more: &[Vec<u8>], places: &[usize]) -> f32 {
     let means = [1e6, -300.1, 9000.0, 101_325.0_f32];
     let some = |numbers: [f32; 4]| -> Vec<f32> { places.iter().map(|&i| numbers[i]).collect() };
-    let (shift, deviation) = (some([0.5, -1.0, 0.25, 2.0]), some([0.05, 2.0, 0.5, 40.0]));
     let count = places.len() as i64;
-    let own = [("m", some(means)), ("d", deviation.clone()), ("t", shift.clone())];
-    let own = own.iter().map(|(name, numbers)| tensor(name, &[count], numbers));
-    let tensors: Vec<Vec<u8>> = own.chain(more.iter().cloned()).collect();
+    let shift = [0.5, -1.0, 0.25, 2.0_f32][..places.len()].to_vec();
+    // Others where a number is taken again.
+    let own = some(means).into_iter().enumerate();
+    let own: Vec<f32> = own.map(|(i, mean)| mean + i as f32).collect();
+    let deviation = some([0.05, 2.0, 0.5, 40.0]).into_iter().enumerate();
+    let deviation: Vec<f32> = deviation.map(|(i, d)| d * (1.0 + i as f32)).collect();
+    let tensors = [("m", own.clone()), ("d", deviation.clone()), ("t", shift.clone())];
+    let tensors = tensors.iter().map(|(name, numbers)| tensor(name, &[count], numbers));
+    let tensors: Vec<Vec<u8>> = tensors.chain(more.iter().cloned()).collect();
     let network = outcome(&graph(&[0, 4], nodes, &tensors)).unwrap();
     let again = outcome(&reachcast::policy::onnx_bytes(&network)).unwrap();
     assert_eq!(again.digest(), network.digest(), "written and read");
@@ -168,8 +173,9 @@ fn far(nodes: &[Vec<u8>], more: &[Vec<u8>], places: &[usize]) -> f32 {
     let apart = |by: &[f32; 4]| {
         let x: [f32; 4] = std::array::from_fn(|i| means[i] + by[i]);
         let found = network.forward(&x);
-        let expected = places.iter().zip(&deviation).zip(&shift).map(|((&i, &d), &t)| {
-            ((f64::from(x[i]) - f64::from(means[i])) / f64::from(d) + f64::from(t)) as f32
+        let expected = (0..places.len()).map(|k| {
+            let apart = f64::from(x[places[k]]) - f64::from(own[k]);
+            (apart / f64::from(deviation[k]) + f64::from(shift[k])) as f32
         });
         found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
     };
@@ -229,12 +235,12 @@ fn inputs_turned_around_and_put_together_go_into_the_layer_behind() {
             node_with("Gather p all -> q", &[attribute("axis", 1)]),
             layer("q", "y"),
         ];
-        let all = places("all", &[4], &[0, 1, 0, 1]);
+        let all = places("all", &[4], &[0, -1, 0, -1]);
         let tensors = [&ends(from, to, step)[..], &[square(), all]].concat();
         is(|x| sums(&expected(x)), &[0, 4], &nodes, &tensors);
     };
     let pair = |x: &[f32], i: usize, j: usize| vec![x[i], x[j], x[i], x[j]];
-    sliced(-1, i64::MIN, -1, &|x| pair(x, 3, 2));
+    sliced(-1, i64::MIN, -1, &|x| pair(x, 3, 0));
     sliced(2, 0, -1, &|x| pair(x, 2, 1));
     sliced(-1, -9, -2, &|x| pair(x, 3, 1));
     sliced(0, i64::MAX, 2, &|x| pair(x, 0, 2));

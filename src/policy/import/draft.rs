@@ -200,10 +200,7 @@ impl Draft {
         match layer.filter(|&layer| self.steps[layer + 1..].iter().all(each)) {
             Some(layer) => self.steps[layer..].iter_mut().for_each(|step| step.select(rows)),
             // The layer that comes next takes it in.
-            None => {
-                self.chooses |= self.is_front();
-                return self.push(Step::Linear(Linear::selection(rows, width)));
-            }
+            None => return self.push(Step::Linear(Linear::selection(rows, width))),
         }
         Ok(())
     }
@@ -354,7 +351,8 @@ fn layer(stage: Stage) -> Layer {
 
 /// The map in f32.
 fn rescale(map: &Map) -> Rescale {
-    let narrow = |values: &[f64]| values.iter().map(|&value| value as f32).collect();
+    // Nothing added is 0, whatever its sign was on the way.
+    let narrow = |values: &[f64]| values.iter().map(|&value| value as f32 + 0.0).collect();
     let Map { scale, shift, low, high } = map;
     let affine = Rescale::affine(narrow(scale), narrow(shift));
     let mut found = Rescale { low: narrow(low), high: narrow(high), ..affine };
