@@ -367,14 +367,15 @@ fn inspect_text(inspect: &Inspect, place: &str) -> String {
     text += &format!("Lipschitz   at most {}, everywhere\n", finite_upper(network.lipschitz_bound));
     text += &format!("actions     over the box ({place}):\n");
     for Action { name, interval: within, seen: [least, largest] } in &inspect.actions {
-        // What was seen is rounded inwards: it was.
-        text += &format!(
-            "  {name}  within {}; seen {} to {} in {} states\n",
-            finite_interval(*within),
-            finite_upper(f64::from(*least)),
-            finite_lower(f64::from(*largest)),
-            inspect.samples
-        );
+        // What was seen is rounded inwards: it was; all of it, where it lies between two such numbers.
+        let ends = [least, largest].map(|end| f64::from(*end));
+        let inwards = [finite_upper(ends[0]), finite_lower(ends[1])];
+        let seen = match inwards.each_ref().map(|end| end.parse::<f64>()) {
+            [Ok(low), Ok(high)] if low > high => format!("seen within {}", finite_interval(ends)),
+            _ => format!("seen {} to {}", inwards[0], inwards[1]),
+        };
+        let within = finite_interval(*within);
+        text += &format!("  {name}  within {within}; {seen} in {} states\n", inspect.samples);
     }
     text
 }

@@ -143,7 +143,7 @@ fn operations_of_one_number() {
     not(&["`Clip`"], &["Clip s l u -> y"], &limits);
     // Between layers a clip is an activation: the same for all, its ends in order.
     let clip = ["Relu s -> r", "Clip r l u -> c", "Tanh c -> t", "MatMul t W -> y"];
-    let differ = [tensor("l", &[4], &[-1.0, -2.0, -3.0, -4.0]), tensor("u", &[], &[9.0])];
+    let differ = [tensor("l", &[4], &[0.5, 1.0, 1.5, 2.0]), tensor("u", &[], &[9.0])];
     not(&["not the same for all neurons"], &clip, &differ);
     let limit = |name: &str, value: f32| tensor(name, &[], &[value]);
     let crossed = ["Tanh s -> r", "Max r l -> a", "Min a u -> b", "Tanh b -> y"];

@@ -132,7 +132,7 @@ fn attributes_of_tensors_and_dictionaries_are_refused() {
         [built(dict(&[]), state()), built(dict(&[]), slots(state())), built(b"]".to_vec(), state())]
     {
         let error = read(&pickle(array(&[2], 2), &[("more", value)]), &stated()).unwrap_err();
-        assert!(error.to_string().contains("an attribute `scale` of its own"), "{error}");
+        assert!(error.to_string().contains("the attribute `scale`"), "{error}");
     }
     // Versions of modules, and none.
     let versions = dict(&[("_metadata", dict(&[]))]);
@@ -152,7 +152,7 @@ fn attributes_of_tensors_and_dictionaries_are_refused() {
     };
     for value in [typed(state()), typed(slots(state())), parameter(state())] {
         let error = read(&pickle(array(&[2], 2), &[("epoch", value)]), &stated()).unwrap_err();
-        assert!(error.to_string().contains("an attribute `scale` of its own"), "{error}");
+        assert!(error.to_string().contains("the attribute `scale`"), "{error}");
     }
     assert_eq!(left_out(&[("optimizer", parameter(b"}".to_vec()))]), ["optimizer"]);
 }

@@ -136,8 +136,10 @@ pub(super) fn result<'a>(
     let other = || Err(format!("{function} with arguments that are not its own"));
     let numpy = function.module.starts_with("numpy.");
     match (function.module, function.name, arguments.as_slice()) {
-        ("collections", "OrderedDict", []) | ("collections", "defaultdict", _) => Ok(dict(pickle)),
-        ("collections", "OrderedDict", _) => other(),
+        ("collections", "OrderedDict", []) | ("collections", "defaultdict", [] | [_]) => {
+            Ok(dict(pickle))
+        }
+        ("collections", "OrderedDict" | "defaultdict", _) => other(),
         ("flax.core.frozen_dict", "FrozenDict", &[dict @ Value::Dict(_)]) => Ok(dict),
         ("torch._utils", "_rebuild_tensor_v2", rest) => {
             tensor(pickle, rest)?.map_or_else(other, Ok)

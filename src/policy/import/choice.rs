@@ -81,7 +81,10 @@ pub(super) fn policy(
         hints.refusal.clone().or(of_layout).map_or(Ok(()), Err)?;
         choice.add_ends(&mut source, &mut made, hints)?;
         choice.refuse_lost(&source, &made, request, hints)?;
+    } else {
+        made.notes.extend(hints.around.iter().map(|around| format!("not in it: {around}")));
     }
+    choice.say_beyond(&mut made, hints);
     let network = made.draft.network()?;
     // Last, since what is asked for is of no use to a file that is refused for another reason.
     choice.check_stated(request, hints)?;
@@ -118,7 +121,7 @@ impl Choice {
             Some(recognised) => recognised.layers.clone(),
             None => layers::only(source, &dense)?,
         };
-        layers::check(&layers)?;
+        layers::check(&layers, request.networks.len() > 1)?;
         if !by_name && recognised.is_none() {
             layers::check_order(&layers)?;
             order::check(&layers)?;
@@ -339,12 +342,17 @@ impl Choice {
         }
         if let Some(map) = &hints.output_map {
             made.draft.push(Step::Map(map.widened(width)))?;
+            made.notes.extend(hints.around.iter().cloned());
         }
+        Ok(())
+    }
+
+    /// Says what of inputs and outputs the file does not hold.
+    fn say_beyond(&self, made: &mut Made, hints: &Hints) {
         made.notes.extend(hints.notes.iter().cloned());
         let beyond = self.layout.and_then(|layout| layout.beyond);
         let unsaid = self.layout.and_then(|layout| layout.unsaid).filter(|_| !hints.is_said);
         made.notes.extend(beyond.or(unsaid).map(|beyond| format!("not in it: {beyond}")));
-        Ok(())
     }
 }
 

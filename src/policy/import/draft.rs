@@ -1,7 +1,7 @@
 //! A network as a list of steps in f64, and the one place where it becomes a policy.
 
-use super::front::{self, Moved, cut};
-use super::linear::{Chosen, Linear};
+use super::front::{self, Moved, clip, cut};
+use super::linear::Linear;
 use super::map::Map;
 use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
 
@@ -9,6 +9,8 @@ use crate::policy::{Activation, Layer, Mlp, Norm, Rescale};
 pub(super) const MOST_LAYERS: usize = 64;
 /// Most weights of a network of more layers, and of layers that are made for an operation alone.
 const MOST_WEIGHTS: usize = 1 << 24;
+/// Most weights that are written for all operations together.
+const MOST_WRITTEN: usize = 1 << 32;
 /// Binary digits of a summand that are kept of what is left of it around a center: what f64 rounds is far below.
 const KEPT: i32 = 40;
 /// Most numbers between two layers that a layer of its own is made for.
@@ -49,8 +51,8 @@ pub(super) struct Draft {
     as_is: bool,
     /// The activation of the hidden layers of a policy that has none.
     hidden: Option<Activation>,
-    /// Whether the first linear step does no more than choose some of the inputs and map them.
-    chooses: bool,
+    /// Weights that were written so far.
+    written: usize,
 }
 
 /// A layer in f64 with what follows it.
@@ -80,19 +82,26 @@ impl Draft {
     pub(super) fn push(&mut self, step: Step) -> Result<(), String> {
         self.fits(&step)?;
         let step = self.at_front(step);
+        if let (Some(Step::Activation(last)), Step::Map(map)) = (self.steps.last_mut(), &step)
+            && let Some(both) = front::cut_again(*last, map).filter(|_| !self.as_is)
+        {
+            *last = both;
+            return Ok(());
+        }
         let first = self.steps.len() == 1;
-        let selects = self.is_front();
+        let step = match self.moved(step)? {
+            Some(step) => step,
+            None => return Ok(()),
+        };
         match (self.steps.last_mut(), step) {
             (_, Step::Map(map)) if map.is_identity() => {}
             (_, Step::Activation(Activation::Identity)) => {}
             (Some(Step::Map(last)), Step::Map(map)) => *last = last.then(&map),
             (_, step) if self.as_is => self.steps.push(step),
             (Some(Step::Linear(last)), Step::Linear(next)) => {
+                let count = last.outputs() / 16 * next.weight.len();
                 *last = last.then(&next)?;
-                self.chooses = false;
-            }
-            (Some(Step::Linear(_)), Step::Map(map)) if selects => {
-                return self.before_selection(&map);
+                self.write(count)?;
             }
             (Some(Step::Linear(last)), Step::Map(map)) if map.is_affine() => last.scaled(&map)?,
             // A map before the first layer is the policy's own, unless nothing is rounded.
@@ -113,14 +122,14 @@ impl Draft {
         }
     }
 
-    /// Whether nothing came so far but a map of the inputs and a part of them.
-    fn is_front(&self) -> bool {
+    /// The first linear step, if nothing but a map of the inputs came before it, and it only chooses some of them and
+    /// maps each.
+    fn choice(&self) -> Option<&Linear> {
         match self.steps.as_slice() {
-            [] | [Step::Map(_)] => true,
             [Step::Linear(last)] | [Step::Map(_), Step::Linear(last)] => {
-                self.chooses || last.is_choice()
+                Some(last).filter(|last| !self.as_is && last.is_choice())
             }
-            _ => false,
+            _ => None,
         }
     }
 
@@ -133,32 +142,45 @@ impl Draft {
         {
             self.steps[0] = Step::Map(map);
         }
-        match step {
-            Step::Activation(activation) if self.is_front() => {
-                cut(activation, width).map_or(step, Step::Map)
-            }
-            step => step,
-        }
+        let Step::Activation(activation) = step else { return step };
+        let Some(map) = cut(activation, width) else { return step };
+        let is_front = match self.choice() {
+            Some(choice) => Moved::of(choice, &map).rest.is_none(),
+            None => matches!(self.steps.as_slice(), [] | [Step::Map(_)]),
+        };
+        if is_front { Step::Map(map) } else { step }
     }
 
-    /// Puts a map behind a part of the inputs in front of it, where numbers far from 0 keep their digits.
-    fn before_selection(&mut self, map: &Map) -> Result<(), String> {
-        let Some(Step::Linear(mut selection)) = self.steps.pop() else { return Ok(()) };
-        let Chosen { places, map: own } = selection.chosen();
-        let Moved { front, rest } = front::moved(&own.then(map), &places, selection.inputs);
-        selection = Linear::selection(&places, selection.inputs);
-        self.chooses = true;
+    /// Puts what a choice of the inputs does, with a map behind it, in front of it where numbers are far from 0,
+    /// which keep their digits there; what is left of the step.
+    fn moved(&mut self, step: Step) -> Result<Option<Step>, String> {
+        let width = self.width().unwrap_or_default();
+        let (map, next) = match step {
+            Step::Map(map) => (map, None),
+            Step::Linear(_) => (Map::nothing(width), Some(step)),
+            step => return Ok(Some(step)),
+        };
+        self.write(self.choice().map_or(0, |choice| choice.weight.len()))?;
+        // Limits of each number by itself lie at the inputs or nowhere.
+        let moves = |moved: &Moved| moved.is_far() || !map.is_affine();
+        let far = self.choice().map(|choice| Moved::of(choice, &map)).filter(moves);
+        let Some(Moved { front, choice, rest, .. }) = far else {
+            return Ok(Some(next.unwrap_or(Step::Map(map))));
+        };
+        self.steps.pop();
         self.push(Step::Map(front))?;
-        match rest {
-            Some(rest) if rest.is_affine() => selection.scaled(&rest)?,
-            Some(rest) => {
-                self.steps.extend([Step::Linear(selection), Step::Map(rest)]);
-                return Ok(());
-            }
-            None => {}
+        self.steps.push(Step::Linear(choice));
+        self.steps.extend(rest.map(Step::Map));
+        Ok(next)
+    }
+
+    /// Counts weights that are written, and refuses what writes them again and again, as a small file may ask for.
+    fn write(&mut self, weights: usize) -> Result<(), String> {
+        self.written = self.written.saturating_add(weights);
+        match self.written > MOST_WRITTEN {
+            true => Err(format!("operations that write more than {MOST_WRITTEN} weights")),
+            false => Ok(()),
         }
-        self.steps.push(Step::Linear(selection));
-        Ok(())
     }
 
     /// Numbers of all steps.
@@ -195,6 +217,7 @@ impl Draft {
         if rows.iter().copied().eq(0..width) {
             return Ok(());
         }
+        self.write(rows.len() * width)?;
         let layer = self.steps.iter().rposition(|step| matches!(step, Step::Linear(_)));
         let each = |step: &Step| matches!(step, Step::Map(_) | Step::Activation(_));
         match layer.filter(|&layer| self.steps[layer + 1..].iter().all(each)) {
@@ -257,6 +280,7 @@ impl Draft {
         if stages.is_empty() {
             return Err("no layer between input and output".to_owned());
         }
+        let weights = stages[0].linear.steepest();
         let layers: Vec<Layer> = stages.into_iter().map(layer).collect();
         let mut network = match (layers.as_slice(), self.hidden) {
             ([only], Some(hidden)) => Mlp::new(vec![only.clone()], hidden, only.activation),
@@ -264,7 +288,7 @@ impl Draft {
         };
         for (at_input, map) in [(true, input), (false, output)] {
             if let Some(Step::Map(map)) = map {
-                let map = if at_input { centered(&map) } else { rescale(&map) };
+                let map = if at_input { centered(&map, &weights) } else { rescale(&map) };
                 network = network.and_then(|network| match at_input {
                     true => network.with_input(map),
                     false => network.with_output(map),
@@ -329,19 +353,6 @@ fn open(
     stages.last_mut().ok_or_else(|| "no layer".to_owned())
 }
 
-/// The activation that cuts off at these limits.
-fn clip([low, high]: [f64; 2]) -> Result<Activation, String> {
-    match (low, high) {
-        (f64::NEG_INFINITY, f64::INFINITY) => Ok(Activation::Identity),
-        (0.0, f64::INFINITY) => Ok(Activation::Relu),
-        (0.0, 6.0) => Ok(Activation::Relu6),
-        _ if low.is_finite() && high.is_finite() && low < high => {
-            Ok(Activation::Hardtanh { low: low as f32, high: high as f32 })
-        }
-        _ => Err(format!("a clip from {low} to {high} between layers")),
-    }
-}
-
 /// The layer in f32, each number rounded once.
 fn layer(stage: Stage) -> Layer {
     let Stage { linear: Linear { weight, bias, .. }, norm, activation, .. } = stage;
@@ -367,12 +378,14 @@ fn rescale(map: &Map) -> Rescale {
 }
 
 /// The map of inputs in f32: where products and summands far above 1 nearly cancel, as those of observations far from 0
-/// do, the difference from the nearest f32 number comes first, and what is left is added then.
-fn centered(map: &Map) -> Rescale {
+/// do, or the largest of the `weights` behind them makes much of the rest, the difference from the nearest f32 number
+/// comes first, and what is left is added then.
+fn centered(map: &Map, weights: &[f64]) -> Rescale {
     let mut plain = rescale(map);
     for (i, (&scale, &shift)) in map.scale.iter().zip(&map.shift).enumerate() {
         let center = (-shift / scale) as f32;
-        if plain.scale[i] != 0.0 && shift.abs() > front::FAR && center.is_finite() {
+        let is_far = shift.abs() > front::FAR || shift.abs() * weights[i] > front::STEEP;
+        if is_far && plain.scale[i] != 0.0 && center.is_finite() {
             // A multiple of it comes out again where the map is written, read and put together anew.
             let unit = 2_f64.powi(shift.abs().log2().floor() as i32 - KEPT);
             let rest = ((scale * f64::from(center) + shift) / unit).round() * unit;

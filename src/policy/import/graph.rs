@@ -17,6 +17,8 @@ use crate::policy::onnx::{Graph, Node};
 const MOST_NODES: usize = 4096;
 /// Most numbers of all constants that operations make of others.
 const MOST_MADE: usize = 1 << 24;
+/// Numbers that are kept for a value, about.
+const VALUE: usize = 256;
 
 /// A graph on the way to a network.
 struct Run<'g> {
@@ -170,6 +172,7 @@ impl<'g> Run<'g> {
         if !node.is_standard() {
             return Err(Problem::Foreign);
         }
+        self.check_size(node)?;
         let inputs =
             node.inputs.iter().map(|name| self.value(name)).collect::<Result<Vec<_>, _>>()?;
         let constants = inputs.iter().map(|input| match input {
@@ -192,6 +195,19 @@ impl<'g> Run<'g> {
             self.values.insert(name, value);
         }
         Ok(())
+    }
+
+    /// Refuses an operation that takes values many times over, which a small file may ask for.
+    fn check_size(&self, node: &Node) -> Result<(), Problem> {
+        let size = |name: &String| match self.values.get(name.as_str()) {
+            Some(Value::Constant(array)) => array.numbers.len(),
+            Some(Value::Number(number)) => number.rows.as_ref().map_or(0, Vec::len) + VALUE,
+            _ => VALUE,
+        };
+        match node.inputs.iter().map(size).sum::<usize>() > MOST_MADE {
+            true => Err(Problem::Words(format!("that takes more than {MOST_MADE} numbers"))),
+            false => Ok(()),
+        }
     }
 
     /// The value `name`; nothing for an input that is left out.

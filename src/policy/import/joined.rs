@@ -8,6 +8,9 @@ use super::parts::{few, rows};
 use super::walk::{Number, Problem, Value, Walk};
 use crate::policy::onnx::Node;
 
+/// Why parts that are no maps of the same are refused.
+const DIFFERENT: &str = "of parts that have gone through different functions";
+
 /// What it gives of `number` and the others.
 ///
 /// # Errors
@@ -28,8 +31,8 @@ pub(super) fn apply(
     let axis = parts[0].form.axis(node.integer("axis").ok_or("without an axis")?)?;
     parts.iter().try_for_each(|part| part.form.along(axis))?;
     let each = parts.iter().map(|part| rows(walk, part)).collect::<Result<Vec<_>, Problem>>()?;
+    few(each.iter().map(Vec::len).sum())?;
     let all = each.concat();
-    few(all.len())?;
     let form = parts[0].form.clone().replaced(axis, &[all.len()]);
     let others = |part: &Number| part.form.clone().replaced(axis, &[all.len()]) == form;
     if !parts.iter().all(others) {
@@ -39,17 +42,28 @@ pub(super) fn apply(
     if parts.iter().all(|part| part.expression == number.expression) {
         return Ok(Value::Number(number));
     }
-    let maps = parts.iter().zip(&each).map(|(part, rows)| map(&part.expression, rows.len()));
-    let maps = maps.collect::<Option<Vec<Map>>>();
-    let map = Map::joined(&maps.ok_or("of parts that have gone through different functions")?);
-    let plain = Number { expression: Expression::plain(), ..number };
-    walk.push(plain, all.len(), Step::Map(map))
+    // What all of them went through, and then each by itself.
+    let shared = shared(&parts).ok_or(DIFFERENT)?;
+    let maps = parts.iter().zip(&each).map(|(part, rows)| map(part, shared.len(), rows.len()));
+    let map = Map::joined(&maps.collect::<Option<Vec<Map>>>().ok_or(DIFFERENT)?);
+    let expression = shared.iter().fold(Expression::plain(), |all, each| all.then(*each));
+    walk.push(Number { expression, ..number }, all.len(), Step::Map(map))
 }
 
-/// What an expression does to each of `width` numbers, if it is a map.
-fn map(expression: &Expression, width: usize) -> Option<Map> {
-    let nothing = Map::affine(vec![1.0; width], vec![0.0; width]);
-    expression.steps()?.iter().try_fold(nothing, |map, each| {
+/// What all parts go through first; none if one is no row of operations.
+fn shared(parts: &[Number]) -> Option<Vec<Each>> {
+    let mut all = parts.iter().map(|part| part.expression.steps());
+    let first = all.next()??.to_vec();
+    all.try_fold(first, |mut shared, steps| {
+        let same = shared.iter().zip(steps?).take_while(|(a, b)| a == b).count();
+        shared.truncate(same);
+        Some(shared)
+    })
+}
+
+/// What a part does to each of its `width` numbers behind the first operations, if it is a map.
+fn map(part: &Number, first: usize, width: usize) -> Option<Map> {
+    part.expression.steps()?[first..].iter().try_fold(Map::nothing(width), |map, each| {
         let next = match each {
             Each::Activation(activation) => cut(*activation, width)?,
             each => match each.step(width) {

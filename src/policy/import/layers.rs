@@ -253,13 +253,18 @@ fn listing(networks: &[(&str, Vec<Dense<'_>>)]) -> String {
     networks.iter().take(MOST_LISTED).map(line).collect::<String>() + &more
 }
 
-/// Refuses layers that do not follow on one another, or have a bias that is not theirs.
+/// Refuses layers that do not follow on one another, or have a bias that is not theirs; their numbers count unless
+/// the order is `stated`.
 ///
 /// # Errors
 /// A sentence that names the two tensors that do not go together.
-pub(super) fn check(layers: &[Dense<'_>]) -> Result<(), String> {
+pub(super) fn check(layers: &[Dense<'_>], stated: bool) -> Result<(), String> {
     layers.iter().try_for_each(check_bias)?;
-    let pairs = layers.windows(2).try_for_each(|pair| check_pair(&pair[0], &pair[1]));
+    let follows = |pair: &[Dense<'_>]| {
+        check_widths(&pair[0], &pair[1])?;
+        if stated { Ok(()) } else { check_numbers(&pair[0], &pair[1]) }
+    };
+    let pairs = layers.windows(2).try_for_each(follows);
     pairs.map_err(|problem| format!("{problem}{}", order::remedy(layers)))
 }
 
@@ -277,16 +282,22 @@ fn check_bias(layer: &Dense<'_>) -> Result<(), String> {
     }
 }
 
-/// Refuses a layer that does not follow on the one before: by its width, or by its number.
-fn check_pair(before: &Dense<'_>, after: &Dense<'_>) -> Result<(), String> {
+/// Refuses a layer that takes another count of numbers than the one before gives.
+fn check_widths(before: &Dense<'_>, after: &Dense<'_>) -> Result<(), String> {
     let (first, second) = (&before.weight.name, &after.weight.name);
-    if before.outputs() != after.inputs() {
-        return Err(format!(
+    match before.outputs() == after.inputs() {
+        true => Ok(()),
+        false => Err(format!(
             "`{second}` takes {} numbers, `{first}` before it gives {}",
             after.inputs(),
             before.outputs()
-        ));
+        )),
     }
+}
+
+/// Refuses a layer whose number is not above that of the one before.
+fn check_numbers(before: &Dense<'_>, after: &Dense<'_>) -> Result<(), String> {
+    let (first, second) = (&before.weight.name, &after.weight.name);
     match (numbered(before.name), numbered(after.name)) {
         (Some((module, i)), Some((same, j))) if module == same && i >= j => Err(format!(
             "`{first}` stands before `{second}` in the file; the order of the layers is not clear"

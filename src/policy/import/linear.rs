@@ -54,13 +54,9 @@ impl Linear {
         Self::new(weight, inputs)
     }
 
-    /// Whether each output is one of the inputs as it is.
+    /// Whether each output is one of the inputs at most, mapped by itself.
     pub(super) fn is_choice(&self) -> bool {
-        let is_one = |row: &[f64]| {
-            let mut others = row.iter().filter(|weight| **weight != 0.0);
-            others.next() == Some(&1.0) && others.next().is_none()
-        };
-        self.rows().all(is_one) && self.bias.iter().all(|&bias| bias == 0.0)
+        self.rows().all(|row| row.iter().filter(|weight| **weight != 0.0).count() < 2)
     }
 
     /// The inputs that a layer of one weight at most in each row takes, and what it does with them.
@@ -69,6 +65,18 @@ impl Linear {
         let places: Vec<usize> = self.rows().map(place).collect();
         let scale = self.rows().zip(&places).map(|(row, &place)| row[place]).collect();
         Chosen { map: Map::affine(scale, self.bias.clone()), places }
+    }
+
+    /// The largest weight of each input.
+    pub(super) fn steepest(&self) -> Vec<f64> {
+        let mut largest = vec![0.0; self.inputs];
+        for row in self.rows() {
+            largest
+                .iter_mut()
+                .zip(row)
+                .for_each(|(most, w): (&mut f64, _)| *most = most.max(w.abs()));
+        }
+        largest
     }
 
     /// Rows of `W`.

@@ -20,6 +20,11 @@ impl Map {
         Self { scale, shift, low: vec![f64::NEG_INFINITY; width], high: vec![f64::INFINITY; width] }
     }
 
+    /// What changes none of `width` numbers.
+    pub(super) fn nothing(width: usize) -> Self {
+        Self::affine(vec![1.0; width], vec![0.0; width])
+    }
+
     /// `(x - mean) / deviation`.
     pub(super) fn normal(mean: &[f64], deviation: &[f64]) -> Self {
         let shift = mean.iter().zip(deviation).map(|(mean, deviation)| -mean / deviation);

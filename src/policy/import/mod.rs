@@ -44,6 +44,7 @@ mod said;
 mod sb3;
 mod script;
 mod source;
+mod spaces;
 mod statistics;
 mod text;
 mod value;

@@ -75,6 +75,7 @@ impl Graph {
         let inputs: Vec<&Named> = self.inputs.iter().filter(|input| !tensor(input)).collect();
         match inputs.as_slice() {
             [input] => {
+                input.floats()?;
                 let form = input.form();
                 if let Some(width) = form.width().filter(|width| *width > MOST_INPUTS) {
                     return Err(format!(
@@ -136,6 +137,21 @@ impl Graph {
 }
 
 impl Named {
+    /// Refuses one whose numbers are no floats: integers are divided otherwise.
+    fn floats(&self) -> Result<(), String> {
+        let kind = self.kind.as_ref().and_then(|kind| kind.tensor.as_ref());
+        match kind.map_or(0, |tensor| tensor.element) {
+            // Nothing is said.
+            0 => Ok(()),
+            element if Kind::of_onnx(element).size() > 0 => Ok(()),
+            element => Err(format!(
+                "the numbers of the input `{}` are no floats (their type is {element} in ONNX); export the model with \
+                 an input of floats",
+                self.name
+            )),
+        }
+    }
+
     /// Its dimensions.
     fn form(&self) -> Form {
         let shape = self.kind.as_ref().and_then(|kind| kind.tensor.as_ref()?.shape.as_ref());

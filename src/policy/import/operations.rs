@@ -281,7 +281,12 @@ fn extreme(
     number: Number,
     rest: Vec<Option<Value>>,
 ) -> Result<Value, Problem> {
-    let pick = if node.operation == "Max" { f64::max } else { f64::min };
+    let pick = |a: f64, b: f64| match node.operation.as_str() {
+        // A number that is none stays so, and is refused.
+        _ if a.is_nan() || b.is_nan() => f64::NAN,
+        "Max" => a.max(b),
+        _ => a.min(b),
+    };
     let (mut value, mut limit) = (number, None::<Array>);
     for other in rest.into_iter().flatten() {
         match other {

@@ -132,8 +132,11 @@ fn slice(all: &[usize], [start, end]: [i64; 2], step: i64) -> Vec<usize> {
     let [start, end] = [start, end].map(|i| from_start(i).clamp(lowest, highest));
     let count = match step {
         0 => 0,
-        _ => (end - start + step - step.signum()) / step,
+        _ => {
+            let (apart, step) = (i128::from(end - start), i128::from(step));
+            ((apart + step - step.signum()) / step) as i64
+        }
     };
-    let at = |k: i64| all.get(usize::try_from(start + k * step).ok()?).copied();
+    let at = |k: i64| all.get(usize::try_from(start + k.saturating_mul(step)).ok()?).copied();
     (0..count.max(0)).map_while(at).collect()
 }

@@ -72,6 +72,8 @@ pub(super) struct Hints {
     pub(super) refusal: Option<String>,
     /// What to say about it.
     pub(super) notes: Vec<String>,
+    /// What else is done with inputs and outputs, which layers that are asked for by name come without.
+    pub(super) around: Vec<String>,
     /// Whether anything stands there.
     pub(super) is_said: bool,
 }

@@ -11,6 +11,22 @@ const OTHERS: [(&str, Activation); 4] = [
     ("none", Activation::Identity),
     ("lrelu", Activation::LeakyRelu { slope: 0.01 }),
 ];
+/// Where the activations of libraries lie.
+const MODULES: [&str; 13] = [
+    "",
+    "nn",
+    "F",
+    "nn.functional",
+    "torch",
+    "torch.nn",
+    "torch.nn.functional",
+    "torch.nn.modules.activation",
+    "torch.nn.modules.linear",
+    "jax.nn",
+    "flax.linen",
+    "tf.nn",
+    "keras.activations",
+];
 /// What the keys of activations end in.
 const NAMES: [&str; 7] = [
     "activation",
@@ -22,7 +38,7 @@ const NAMES: [&str; 7] = [
     "non_linearity",
 ];
 /// What the keys of the last activation have in them.
-const LAST: [&str; 4] = ["out", "last", "final", "squash"];
+const LAST: [&str; 7] = ["out", "last", "final", "squash", "head", "mu_", "mean_"];
 
 /// How many numbers a text is: one, or a list of them in brackets or without; none if it is words.
 pub(super) fn amount(text: &str) -> Option<Amount> {
@@ -33,14 +49,15 @@ pub(super) fn amount(text: &str) -> Option<Amount> {
     numbers.then(|| Amount::of(words.len()))
 }
 
-/// The activation that a word or a class of PyTorch stands for: `elu`, `swish`, `<class 'torch.nn.ReLU'>`.
+/// The activation that a word or a class of a known library stands for: `elu`, `swish`, `<class 'torch.nn.ReLU'>`.
 pub(super) fn activation(text: &str) -> Option<Activation> {
-    let name = text.trim_end_matches("'>").trim_end_matches("()").rsplit('.').next();
+    let text = text.trim_start_matches("<class '").trim_end_matches("'>").trim_end_matches("()");
+    let (module, name) = text.rsplit_once('.').unwrap_or(("", text));
     let plain = |word: &str| word.trim().to_lowercase().replace(['_', '-', ' '], "");
-    let word = plain(name.unwrap_or_default());
+    let word = plain(name);
     let known = Activation::ALL.into_iter().find(|kind| plain(&bare(kind.name())) == word);
     let other = OTHERS.iter().find(|(other, _)| *other == word).map(|(_, kind)| *kind);
-    known.or(other)
+    known.or(other).filter(|_| MODULES.contains(&module))
 }
 
 /// The word of an activation without its parameters.
@@ -64,7 +81,7 @@ pub(super) fn check(source: &Source<'_>, hidden: Used, last: Used) -> Result<(),
     for Said { name, text } in &source.said {
         let (before, key) = name.rsplit_once('.').unwrap_or(("", name));
         let names_one = NAMES.iter().any(|end| key == *end || key.ends_with(&format!("_{end}")));
-        if !names_one || before.split('.').any(judges) {
+        if !names_one || before.split(['.', '_']).chain(key.split('_')).any(judges) {
             continue;
         }
         let is_last = LAST.iter().any(|word| key.contains(word));

@@ -1,6 +1,6 @@
 //! Archives of stable-baselines3: the checkpoint in one, and what its `data` says in plain JSON.
 //!
-//! `data` also holds pickled objects, as texts; they are never looked at.
+//! `data` also holds pickled objects, as texts; of one the numbers are read, and none is made.
 
 use serde_json::Value;
 
@@ -9,6 +9,7 @@ use super::format::OWN_ARRAYS;
 use super::map::Map;
 use super::request::Hints;
 use super::said;
+use super::spaces;
 use crate::policy::Activation;
 
 /// Longest `data`, bytes.
@@ -47,7 +48,7 @@ fn other(names: &[String]) -> String {
     }
     if all(".npy") {
         return "NumPy arrays (.npz); save them as safetensors: \
-                safetensors.numpy.save_file(dict(numpy.load(FILE)), 'policy.safetensors'), with the weights [out, in] under \
+                safetensors.numpy.save_file({k: a.astype('f4') for k, a in numpy.load(FILE).items()}, 'policy.safetensors'), with the weights [out, in] under \
                 names like `0.weight`, or [in, out] under `0.kernel`, and biases under `0.bias`"
             .to_owned();
     }
@@ -76,9 +77,15 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
         Ok(known) => hints.activation = known,
         Err(unsaid) => hints.unsaid = Some(unsaid),
     }
-    hints.is_said = true;
+    hints.is_said = data["action_space"].is_object();
     hints.clip = number(&kwargs["clip_mean"])?;
-    hints.refusal = own_classes(&data);
+    if let Some((what, class)) = own_class(&data) {
+        hints.around.push(format!("what the {what} `{class}` does"));
+        hints.refusal = Some(format!(
+            "`data` has the {what} `{class}`, whose code is not in plain words: what it does with the observations would \
+             be lost; --network imports the layers alone, or export the model to ONNX with it"
+        ));
+    }
     observations(&data, &mut hints);
     // With exploration that depends on the state, PPO may bound its actions as SAC does.
     let squashed =
@@ -87,7 +94,9 @@ fn hints(data: &[u8]) -> Result<Hints, String> {
         hints.output = Some(Activation::Tanh);
     }
     let is_off_policy = data.get("replay_buffer_class").is_some();
-    actions(&data["action_space"], squashed || is_off_policy, &mut hints);
+    if hints.is_said {
+        actions(&data["action_space"], squashed || is_off_policy, &mut hints);
+    }
     Ok(hints)
 }
 
@@ -103,24 +112,17 @@ fn number(value: &Value) -> Result<Option<f64>, String> {
     finite.map(Some).ok_or_else(problem)
 }
 
-/// The refusal of a model with a class of its own, which may do anything with observations and actions.
-fn own_classes(data: &Value) -> Option<String> {
+/// A class of the model's own, which may do anything with observations and actions: under which key, and its name.
+fn own_class(data: &Value) -> Option<(&'static str, String)> {
     let extractor = data["policy_kwargs"]["features_extractor_class"].as_str();
     let extractor = extractor.filter(|class| !class.ends_with("torch_layers.FlattenExtractor'>"));
-    let module = data["policy_class"]["__module__"].as_str();
-    let module = module.filter(|module| {
-        !["stable_baselines3", "sb3_contrib"]
-            .contains(&module.split('.').next().unwrap_or_default())
-    });
-    let (what, class) = match (extractor, module) {
-        (Some(class), _) => ("features_extractor_class", class),
-        (_, Some(class)) => ("policy_class", class),
-        _ => return None,
-    };
-    Some(format!(
-        "`data` has the {what} `{class}`, whose code is not in plain words: what it does with the observations would be \
-         lost; --network imports the layers alone, or export the model to ONNX with it"
-    ))
+    if let Some(class) = extractor {
+        return Some(("features_extractor_class", class.to_owned()));
+    }
+    let module = data["policy_class"]["__module__"].as_str()?;
+    let library = module.split('.').next().unwrap_or_default();
+    let own = !["stable_baselines3", "sb3_contrib"].contains(&library);
+    own.then(|| ("policy_class of the module", module.to_owned()))
 }
 
 /// The activation between the layers, where the model was given one.
@@ -132,11 +134,7 @@ fn activation(kwargs: &Value) -> Result<Option<Activation>, String> {
             Activation::words()
         )
     };
-    // A class of the user's own may be called as one of PyTorch is.
-    let module =
-        class.trim_start_matches("<class '").rsplit_once('.').map_or("", |(module, _)| module);
-    let own = class.starts_with("<class '") && !module.starts_with("torch.nn");
-    said::activation(class).filter(|_| !own).map(Some).ok_or_else(problem)
+    said::activation(class).map(Some).ok_or_else(problem)
 }
 
 /// What the model does with observations before its layers: images are divided, choices are written out, and parts joined.
@@ -147,6 +145,7 @@ fn observations(data: &Value, hints: &mut Hints) {
     let kind = class.trim_end_matches("'>").rsplit('.').next().unwrap_or_default();
     match kind {
         "Box" if is_image(data) => {
+            hints.around.push("the division of the observations by 255".to_owned());
             hints.refusal = Some(format!(
                 "its observations are images of shape {} with numbers from 0 to 255, which predict() divides by 255, and \
                  whose channels it may put first; export the model to ONNX with that, or --network imports the layers alone",
@@ -189,6 +188,7 @@ fn is_image(data: &Value) -> bool {
 fn actions(space: &Value, squashed: bool, hints: &mut Hints) {
     let class = space[":type:"].as_str().unwrap_or_default();
     if class.contains("Discrete") || class.contains("MultiBinary") {
+        hints.around.push("the choice of an action by the largest output".to_owned());
         hints.refusal = Some(format!(
             "its actions are `{class}`, chosen by the largest output; a policy here gives numbers. --network imports \
              the layers alone"
@@ -222,16 +222,20 @@ fn actions(space: &Value, squashed: bool, hints: &mut Hints) {
         false => Map::clamp(low.clone(), high.clone()),
     };
     if !map.is_identity() {
-        hints.notes.push(format!("the output is {what}, {low:?} to {high:?}, as predict() does"));
-        hints.output_map = Some(map);
+        hints.around.push(format!("the output is {what}, {low:?} to {high:?}, as predict() does"));
     }
+    // Limits of another count than the outputs are refused there.
+    hints.output_map = Some(map).filter(|map| map.width() > 1 || !map.is_identity());
 }
 
-/// The limits of actions, where the texts of both are finite numbers, as many as their shape says.
+/// The limits of actions, finite numbers and as many as their shape says: of the space as it was pickled, since texts
+/// have as many digits as NumPy was asked to print, or else of these.
 fn limits(space: &Value) -> Option<[Vec<f64>; 2]> {
     let lengths: Option<Vec<u64>> =
         space["_shape"].as_array().map(|all| all.iter().filter_map(Value::as_u64).collect());
-    let count = lengths.map(|all| all.iter().product::<u64>());
+    let product = |all: Vec<u64>| all.iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
+    let count = lengths.map(|all| product(all).unwrap_or(u64::MAX));
+    let pickled = space[":serialized:"].as_str().and_then(spaces::limits);
     let numbers = |key: &str| -> Option<Vec<f64>> {
         let words = space[key].as_str()?.split(|c: char| c.is_whitespace() || "[]".contains(c));
         let words = words.filter(|word| !word.is_empty());
@@ -239,7 +243,10 @@ fn limits(space: &Value) -> Option<[Vec<f64>; 2]> {
         let fits = count.is_none_or(|count| count == numbers.len() as u64);
         Some(numbers).filter(|numbers| fits && !numbers.is_empty())
     };
-    let [low, high] = [numbers("low")?, numbers("high")?];
+    let [low, high] = match pickled {
+        Some([low, high]) if count.is_none_or(|count| count == low.len() as u64) => [low, high],
+        _ => [numbers("low")?, numbers("high")?],
+    };
     let ordered = low.len() == high.len() && low.iter().zip(&high).all(|(low, high)| low < high);
     let finite = low.iter().chain(&high).all(|limit| limit.is_finite());
     (ordered && finite).then_some([low, high])

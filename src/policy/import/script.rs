@@ -72,7 +72,7 @@ impl Script {
             Err(more) => Err(format!(
                 "the code of this TorchScript module does more than its layers one after the other, as far as it can \
                  be read: {more}. An ONNX export keeps it: torch.onnx.export(module, torch.zeros(1, INPUTS), \
-                 'policy.onnx'), of the module before it is compiled; --activation and --output, both stated, import \
+                 'policy.onnx', external_data=False), of the module before it is compiled; --activation and --output, both stated, import \
                  its layers in a row without it"
             )),
         }

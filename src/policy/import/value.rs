@@ -85,6 +85,14 @@ pub(super) struct View<'a> {
     pub(super) strides: Vec<usize>,
 }
 
+impl View<'_> {
+    /// Whether its numbers lie one behind the other, the last index the fastest.
+    pub(super) fn is_in_rows(&self) -> bool {
+        let step = |i: usize| self.shape[i + 1..].iter().product::<usize>();
+        (0..self.shape.len()).all(|i| self.strides.get(i) == Some(&step(i)))
+    }
+}
+
 /// An object that was not made: what it would have been made of.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Object<'a> {
@@ -173,14 +181,19 @@ impl<'a> Pickle<'a> {
         };
         key.map_or(Ok(()), |key| {
             Err(format!(
-                "a tensor or dictionary with an attribute `{key}` of its own, which would be lost; save it under a key"
+                "a tensor or dictionary with a state of its own, the attribute `{key}` or other numbers, which would be lost; save \
+                 what it is under a key"
             ))
         })
     }
 
-    /// The first attribute in a dictionary of them.
+    /// The first attribute of a state; what is no dictionary of them may be anything.
     fn attribute(&self, state: Value<'_>) -> Option<&'a str> {
-        let Value::Dict(dict) = state else { return None };
+        let dict = match state {
+            Value::Dict(dict) => dict,
+            Value::Other => return None,
+            _ => return Some("?"),
+        };
         self.dicts[dict].iter().find_map(|(key, _)| match key {
             Value::Text("_metadata") => None,
             Value::Text(key) => Some(*key),

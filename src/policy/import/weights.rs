@@ -81,7 +81,8 @@ pub(super) fn convolution(
         [outputs, kernel @ ..] if kernel.len() > 1 => (*outputs, kernel.iter().product::<usize>()),
         _ => return Err(format!("`{}` has shape {:?}", node.inputs[1], weight.shape).into()),
     };
-    let whole = walk.draft.width() == Some(inputs) && plain("pads", 0) && plain("dilations", 1);
+    let width = number.rows.as_ref().map(Vec::len).or(walk.draft.width());
+    let whole = width == Some(inputs) && plain("pads", 0) && plain("dilations", 1);
     if !matches!(node.text("auto_pad"), "" | "NOTSET" | "VALID") {
         return Err(format!("with auto_pad {}", node.text("auto_pad")).into());
     }
