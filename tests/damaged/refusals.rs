@@ -169,6 +169,7 @@ fn parts() {
     let slice = ["Slice s from to one steps -> y"];
     let ends = |from: i64, to: i64| vec![list("from", &[from]), list("to", &[to]), one()];
     not(&["`Slice`", "not there"], &slice, &[ends(0, 4), vec![list("steps", &[0])]].concat());
+    not(&["`Slice`", "not there"], &slice, &[ends(0, 4), vec![list("steps", &[2, 2])]].concat());
     not(&["`Slice`", "not there"], &["Slice s from to one -> y"], &ends(3, 3));
     let split = |lengths: &[i64]| {
         let split = node_with("Split s parts -> y z", &[attribute("axis", 1)]);

@@ -79,15 +79,26 @@ fn a_clip_of_0_is_none() {
     assert_eq!(found.network.hidden_words(), "relu");
 }
 
+/// A box of Gymnasium from [-0.12345678, -2.7182817] to [0.98765433, 3.1415927], as a model has it.
+const BOX: &str = "gAWViQEAAAAAAACMFGd5bW5hc2l1bS5zcGFjZXMuYm94lIwDQm94lJOUKYGUfZQojAVkdHlwZZSMBW51bXB5lIwF\
+    ZHR5cGWUk5SMAmY0lImIh5RSlChLA4wBPJROTk5K/////0r/////SwB0lGKMBl9zaGFwZZRLAoWUjANsb3eUjBNu\
+    dW1weS5fY29yZS5udW1lcmljlIwLX2Zyb21idWZmZXKUk5QolggAAAAAAAAA6db8vVT4LcCUaAtLAoWUjAFDlHSU\
+    UpSMDWJvdW5kZWRfYmVsb3eUaBMolgIAAAAAAAAAAQGUaAiMAmIxlImIh5RSlChLA4wBfJROTk5K/////0r/////\
+    SwB0lGJLAoWUaBZ0lFKUjARoaWdolGgTKJYIAAAAAAAAAOrWfD/bD0lAlGgLSwKFlGgWdJRSlIwNYm91bmRlZF9h\
+    Ym92ZZRoEyiWAgAAAAAAAAABAZRoHUsChZRoFnSUUpSMCGxvd19yZXBylE6MCWhpZ2hfcmVwcpROjApfbnBfcmFu\
+    ZG9tlE51Yi4=";
+
 #[test]
 fn limits_of_actions_are_read_in_every_shape_or_their_lack_is_no_silence() {
-    let with = |name: &str, shape: Value, low: &str, high: &str| {
-        let content = std::fs::read(path(name)).unwrap();
-        let content = with_data(&content, &|data| {
+    let changed = |name: &str, shape: Value, low: &str, high: &str| {
+        with_data(&std::fs::read(path(name)).unwrap(), &|data| {
             let space = &mut data["action_space"];
             (space["_shape"], space["low"], space["high"]) =
                 (shape.clone(), json!(low), json!(high));
-        });
+        })
+    };
+    let with = |name: &str, shape: Value, low: &str, high: &str| {
+        let content = changed(name, shape, low, high);
         from_bytes("x.zip".as_ref(), &content, &Request::default())
     };
     let notes = |found: reachcast::Result<Imported>| found.unwrap().notes.join("; ");
@@ -100,9 +111,31 @@ fn limits_of_actions_are_read_in_every_shape_or_their_lack_is_no_silence() {
         let error = with("sb3_sac.zip", json!([2]), low, high).unwrap_err().to_string();
         assert!(error.contains("gives the output scaled to the limits"), "{error}");
         assert!(error.contains("--network imports the layers alone"), "{error}");
+        let content = changed("sb3_sac.zip", json!([2]), low, high);
+        let layers = named(&["actor.latent_pi", "actor.mu"]);
+        let note = notes(from_bytes("x.zip".as_ref(), &content, &layers));
+        assert!(note.contains("not in it: predict() gives the output scaled to"), "{note}");
         let note = notes(with("sb3_ppo.zip", json!([2]), low, high));
         assert!(note.contains("not in it: predict() gives the output kept within"), "{note}");
     }
+    // The space itself has all digits, whatever NumPy was asked to print, and layers by name come without it.
+    let content = with_data(&std::fs::read(path("sb3_sac.zip")).unwrap(), &|data| {
+        let space = &mut data["action_space"];
+        (space[":serialized:"], space["low"], space["high"]) =
+            (json!(BOX), json!("[-0.1 -3.]"), json!("[1. 3.]"));
+    });
+    let exact =
+        "[-0.12345678359270096, -2.7182817459106445] to [0.9876543283462524, 3.1415927410125732]";
+    let note = notes(from_bytes("x.zip".as_ref(), &content, &Request::default()));
+    assert!(note.contains(exact) && !note.contains("not in it"), "{note}");
+    let note =
+        notes(from_bytes("x.zip".as_ref(), &content, &named(&["actor.latent_pi", "actor.mu"])));
+    assert!(
+        note.contains(&format!(
+            "not in it: the output is scaled to the limits of the actions, {exact}"
+        )),
+        "{note}"
+    );
 }
 
 #[test]

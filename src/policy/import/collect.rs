@@ -225,7 +225,7 @@ fn amount(value: Value<'_>) -> Option<Amount> {
 }
 
 /// The tensor `name`.
-fn tensor(name: String, dict: usize, view: &View<'_>) -> Tensor {
+pub(super) fn tensor(name: String, dict: usize, view: &View<'_>) -> Tensor {
     let View { storage, offset, shape, strides } = view.clone();
     let place = match storage.place {
         value::Place::Entry(key) => Place::Entry(key.to_owned()),

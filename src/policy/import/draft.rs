@@ -160,11 +160,11 @@ impl Draft {
             Step::Linear(_) => (Map::nothing(width), Some(step)),
             step => return Ok(Some(step)),
         };
-        self.write(self.choice().map_or(0, |choice| choice.weight.len()))?;
+        let moved = self.choice().map(|choice| Moved::of(choice, &map));
+        self.write(moved.as_ref().map_or(0, |moved| moved.choice.weight.len()))?;
         // Limits of each number by itself lie at the inputs or nowhere.
-        let moves = |moved: &Moved| moved.is_far() || !map.is_affine();
-        let far = self.choice().map(|choice| Moved::of(choice, &map)).filter(moves);
-        let Some(Moved { front, choice, rest, .. }) = far else {
+        let moves = |moved: &Moved| moved.is_far || !map.is_affine();
+        let Some(Moved { front, choice, rest, .. }) = moved.filter(moves) else {
             return Ok(Some(next.unwrap_or(Step::Map(map))));
         };
         self.steps.pop();
@@ -346,7 +346,7 @@ fn open(
                 "operations between layers that need layers of more than {MOST_WEIGHTS} weights"
             ));
         }
-        let linear = Linear::diagonal(&Map::affine(vec![1.0; width], vec![0.0; width]))?;
+        let linear = Linear::diagonal(&Map::nothing(width))?;
         let activation = Activation::Identity;
         stages.push(Stage { linear, norm: None, activation, is_made: true });
     }

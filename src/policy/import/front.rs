@@ -19,7 +19,7 @@ pub(super) struct Moved {
     /// What is left of a map with limits.
     pub(super) rest: Option<Map>,
     /// Whether something is added that loses digits.
-    is_far: bool,
+    pub(super) is_far: bool,
 }
 
 impl Moved {
@@ -42,11 +42,6 @@ impl Moved {
         // It has the widths of the choice.
         let is_affine = rest.is_affine() && choice.scaled(&rest).is_ok();
         Self { front, choice, rest: Some(rest).filter(|_| !is_affine), is_far }
-    }
-
-    /// Whether numbers far from 0 lose digits behind the choice.
-    pub(super) fn is_far(&self) -> bool {
-        self.is_far
     }
 }
 

@@ -36,7 +36,7 @@ impl Map {
         let width = low.len();
         // The upper limit is the last word where they are the wrong way around.
         low.iter_mut().zip(&high).for_each(|(low, high)| *low = low.min(*high));
-        Self { scale: vec![1.0; width], shift: vec![0.0; width], low, high }
+        Self { low, high, ..Self::nothing(width) }
     }
 
     /// The same map of `width` numbers, where it is one of a single number.

@@ -37,8 +37,8 @@ pub(super) fn apply(
             let steps = wholes(3, "steps").unwrap_or_default();
             let one = |all: Option<Vec<i64>>| all.filter(|all| all.len() == 1).map(|all| all[0]);
             let ends = one(wholes(0, "starts")).zip(one(wholes(1, "ends"))).map(<[i64; 2]>::from);
-            let step = one(Some(steps)).unwrap_or(1);
-            ends.map(|ends| vec![slice(&all, ends, step)])
+            let step = if steps.is_empty() { Some(1) } else { one(Some(steps)) };
+            ends.zip(step).map(|(ends, step)| vec![slice(&all, ends, step)])
         }
         _ => {
             let picks = constant(rest, 0)?.wholes();

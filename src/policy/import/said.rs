@@ -81,7 +81,7 @@ pub(super) fn check(source: &Source<'_>, hidden: Used, last: Used) -> Result<(),
     for Said { name, text } in &source.said {
         let (before, key) = name.rsplit_once('.').unwrap_or(("", name));
         let names_one = NAMES.iter().any(|end| key == *end || key.ends_with(&format!("_{end}")));
-        if !names_one || before.split(['.', '_']).chain(key.split('_')).any(judges) {
+        if !names_one || before.split('.').chain(key.split('_')).any(judges) {
             continue;
         }
         let is_last = LAST.iter().any(|word| key.contains(word));

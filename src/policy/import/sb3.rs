@@ -205,6 +205,7 @@ fn actions(space: &Value, squashed: bool, hints: &mut Hints) {
             format!("predict() gives the output {what}, which `data` does not say in plain words");
         match squashed {
             true => {
+                hints.around.push(unsaid.clone());
                 hints.refusal = Some(format!(
                     "{unsaid}; --network imports the layers alone, whose output is not scaled"
                 ));

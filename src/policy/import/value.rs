@@ -85,14 +85,6 @@ pub(super) struct View<'a> {
     pub(super) strides: Vec<usize>,
 }
 
-impl View<'_> {
-    /// Whether its numbers lie one behind the other, the last index the fastest.
-    pub(super) fn is_in_rows(&self) -> bool {
-        let step = |i: usize| self.shape[i + 1..].iter().product::<usize>();
-        (0..self.shape.len()).all(|i| self.strides.get(i) == Some(&step(i)))
-    }
-}
-
 /// An object that was not made: what it would have been made of.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Object<'a> {
